@@ -1,0 +1,149 @@
+"""Actuations: what drives a sheet while the control parameter lambda runs from 0 to 1 in a step.
+
+All of them are data. `bh.program` turns the steps of a model into ramps (value at lambda and its rate).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+
+Array = NDArray[np.float64]
+Angles = float | Sequence[float]
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """A value that goes linearly from `start` to `end`; both arrays of one shape."""
+
+    start: Array
+    end: Array
+
+    def at(self, lam: float) -> Array:
+        return (1.0 - lam) * self.start + lam * self.end
+
+    @property
+    def rate(self) -> Array:
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Fold a crease.
+
+    Attributes:
+        crease: its name, or "all" for every crease that is drawn as mountain or valley.
+        to: dihedral angle that is imposed exactly (rigid connector), rad in (0, 2 pi); one number or one an edge.
+        by: fold angle, mountain or valley as drawn, rad in (-pi, pi); imposed exactly, or the rest angle of a
+            spring crease if `Lstar` or `stiffness` is given; "drawn" takes the angles of the pattern.
+        rest: rest dihedral angle of a spring crease, rad in [0, 2 pi].
+        Lstar: length scale of the crease, mm; stiffness a length is E t^3 / (12 Lstar) (Eq. 3.12).
+        stiffness: of the crease a length, N mm / (mm rad) (instead of `Lstar`).
+    """
+
+    crease: str
+    to: Angles | None = None
+    by: Angles | str | None = None
+    rest: Angles | None = None
+    Lstar: float | None = None
+    stiffness: float | None = None
+
+    def __post_init__(self) -> None:
+        given = [key for key in ("to", "by", "rest") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ModelError(
+                f"fold of crease '{self.crease}' needs exactly one of to, by and rest, but has {given or 'none'}"
+            )
+        if self.Lstar is not None and self.stiffness is not None:
+            raise ModelError(f"fold of crease '{self.crease}' has Lstar and stiffness; give one of them")
+        if self.to is not None and (self.Lstar is not None or self.stiffness is not None):
+            raise ModelError(
+                f"fold of crease '{self.crease}': 'to' is imposed exactly and takes no stiffness; use 'rest' for a spring"
+            )
+        for key in ("Lstar", "stiffness"):
+            value = getattr(self, key)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise ModelError(f"fold of crease '{self.crease}': {key} = {value} cannot be; give a positive number")
+        if isinstance(self.by, str) and self.by != "drawn":
+            raise ModelError(f"fold of crease '{self.crease}': by = '{self.by}' is not understood; use rad or 'drawn'")
+        limits = {"to": (0.0, 2.0 * math.pi), "rest": (0.0, 2.0 * math.pi), "by": (-math.pi, math.pi)}
+        for key in given:
+            value = getattr(self, key)
+            if isinstance(value, str):
+                continue
+            low, high = limits[key]
+            angles = np.atleast_1d(np.asarray(value, dtype=float))
+            if not (np.isfinite(angles).all() and (angles >= low).all() and (angles <= high).all()):
+                raise ModelError(
+                    f"fold of crease '{self.crease}': {key} = {value} rad is outside {low:.4g} to {high:.4g}"
+                    + ("; angles are radians, not degrees" if np.abs(angles).max(initial=0.0) > 7.0 else "")
+                )
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A dead couple a length on a crease, N mm / mm; positive folds the crease the way that it is drawn."""
+
+    crease: str
+    to: float
+
+    def __post_init__(self) -> None:
+        _finite(f"moment on crease '{self.crease}'", (self.to,))
+
+
+@dataclass(frozen=True)
+class Force:
+    """A dead force. `each` (N) acts on every node of the place; `total` (N) is shared equally among them."""
+
+    at: str | Sequence[int]
+    each: Sequence[float] | None = None
+    total: Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        if (self.each is None) == (self.total is None):
+            raise ModelError(f"force at '{self.at}' needs either each or total, a vector of three numbers in N")
+        vector = self.each if self.each is not None else self.total
+        assert vector is not None
+        _vector(f"force at '{self.at}'", vector)
+
+
+@dataclass(frozen=True)
+class Displace:
+    """Prescribed displacement from the stress-free position: `by` (mm) along `direction` (three numbers, or x, y, z).
+
+    Nodes stay free across the direction, and keep their displacement in later steps.
+    """
+
+    at: str | Sequence[int]
+    direction: str | Sequence[float]
+    by: float
+
+    def __post_init__(self) -> None:
+        _finite(f"displacement at '{self.at}'", (self.by,))
+        if isinstance(self.direction, str):
+            if self.direction not in ("x", "y", "z"):
+                raise ModelError(f"displacement at '{self.at}': direction '{self.direction}' is not x, y, z or a vector")
+        else:
+            _vector(f"displacement at '{self.at}': direction", self.direction)
+            if not any(self.direction):
+                raise ModelError(f"displacement at '{self.at}': the direction is the zero vector")
+
+
+Actuation = Fold | Moment | Force | Displace
+
+
+def _finite(what: str, values: Sequence[float]) -> None:
+    if not all(math.isfinite(value) for value in values):
+        raise ModelError(f"{what} is not finite; give numbers")
+
+
+def _vector(what: str, vector: Sequence[float]) -> None:
+    if len(vector) != 3:
+        raise ModelError(f"{what} needs three numbers, but has {len(vector)}")
+    _finite(what, vector)

@@ -1,0 +1,411 @@
+"""The source's formulation: bars (Eq. 3.4), bending hinges (Eq. 3.11) and folding hinges (Eq. 3.12).
+
+Energy (Eq. 3.1): 1/2 k_s delta^2 for bars, 1/2 k_b theta^2 and 1/2 k_f (phi - phi_R)^2 for hinges. A crease whose
+angle is imposed exactly is a hinge with a multiplier (its moment), in augmented form (Hestenes 1969; Powell 1969).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from bh.actuation import Ramp
+from bh.errors import ModelError
+from bh.mechanics.assembly import (
+    Pattern,
+    build_pattern,
+    nodal_forces,
+    predicted_forces,
+    tangent_times,
+    tangent_values,
+)
+from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
+from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness, sheet_bars
+from bh.model import Model
+from bh.program import HELD, SHEET, SPRING, StepProgram
+from bh.solvers.matrices import FreeBodyMatrix, Matrix, MultiplierMatrix
+from bh.solvers.system import Evaluation
+from bh.state import Energy, State
+from bh.supports import Constraints, free_motions, rigid_motions
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+LARGEST_TURN = 1.3  # rad that any hinge may turn in one increment before the driver mistrusts it
+ROUNDING = 8.0 * np.finfo(float).eps
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Element arrays of one step. Hinges are ordered: bending, spring creases, held creases.
+
+    `source` (h,) is the row of `mesh.topology.hinges` of each hinge.
+    """
+
+    bars: Ints
+    bar_length: Array
+    bar_stiffness: Array
+    hinges: Ints
+    source: Ints
+    hinge_stiffness: Array
+    rest: Ramp
+    couple: Ramp
+    bending: int
+    spring: int
+    held: int
+
+
+def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Elements:
+    """Element stiffness of a model in one step; `held_start` (m,) are the dihedral angles that the step begins with."""
+    mesh, sheet = model.mesh, model.sheet
+    topology = mesh.topology
+    points = mesh.points
+    edge_vector = points[topology.edges[:, 1]] - points[topology.edges[:, 0]]
+    lengths = np.linalg.norm(edge_vector, axis=1)
+    sides = topology.edge_triangles
+    areas = mesh.areas[sides[:, 0]] + np.where(sides[:, 1] >= 0, mesh.areas[sides[:, 1]], 0.0)
+    k_bar = sheet_bars(sheet.E, sheet.t, lengths, areas, mesh.spans)
+
+    hinge_length, hinge_area = lengths[topology.hinge_edges], areas[topology.hinge_edges]
+    groups = [np.flatnonzero(program.law == law) for law in (SHEET, SPRING, HELD)]
+    source = np.concatenate(groups)
+    reference = dihedral_angles(points, topology.hinges)
+    k_bend = bending_hinge_stiffness(sheet.E, sheet.t, hinge_length, hinge_area)
+    k_fold = folding_hinge_stiffness(program.stiffness, hinge_length)
+    # augmentation comparable to what the bars give a wing: it keeps the condition number and corrects in a step or two
+    gamma = 10.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
+    stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], gamma)
+    held_from = np.where(np.isnan(program.held.start), held_start, program.held.start)
+    law = program.law[source]
+
+    def ramp(bend: Array, spring: Array, held: Array) -> Array:
+        return np.where(law == SHEET, bend[source], np.where(law == SPRING, spring[source], held[source]))
+
+    rest = Ramp(
+        ramp(reference, program.rest.start, held_from), ramp(reference, program.rest.end, program.held.end)
+    )
+    scale = np.where(law == HELD, 0.0, hinge_length[source])
+    couple = Ramp(program.moment.start[source] * scale, program.moment.end[source] * scale)
+    return Elements(
+        bars=topology.edges, bar_length=lengths, bar_stiffness=k_bar,
+        hinges=np.ascontiguousarray(topology.hinges[source]), source=source,
+        hinge_stiffness=stiffness[source], rest=rest, couple=couple,
+        bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]),
+    )  # fmt: skip
+
+
+class BarsAndHingesSystem:
+    """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then held moments (N mm)."""
+
+    def __init__(self, model: Model, program: StepProgram, start: State | None) -> None:
+        self.mesh = model.mesh
+        mesh = self.mesh
+        self.reference = mesh.points
+        start_points = mesh.points if start is None else start.points
+        held_start = dihedral_angles(start_points, mesh.topology.hinges)
+        self.elements = sheet_elements(model, program, held_start)
+        self.constraints: Constraints = program.constraints
+        self.force = program.force
+        self.program = program
+
+        free = ~self.constraints.fixed
+        self.number = np.full(free.shape, -1, dtype=np.int64)
+        self.number[free] = np.arange(free.sum())
+        self.free = np.flatnonzero(free.ravel())
+        self.primal = len(self.free)
+        self.size = self.primal + self.elements.held
+        self.turned = np.flatnonzero(self.constraints.frame_of >= 0)
+        self.turned_axes = self.constraints.frames[self.constraints.frame_of[self.turned]]
+        self.prescribed_rate = (self.constraints.end - self.constraints.start) * self.constraints.fixed
+        self._bar_scale = model.sheet.E * model.sheet.t
+        self._moments_start = None if start is None else start.crease_moments
+        self._start_points = start_points
+        self._d_bar = np.empty((len(self.elements.bars), 3))
+        self._g_hinge = np.empty((len(self.elements.hinges), 12))
+        if self.constraints.rigid_body:
+            self._check_balance()
+
+    # ------------------------------------------------------------------------------- unknowns and positions
+
+    @property
+    def rotation(self) -> float:
+        return self.program.rotation
+
+    def start(self) -> Array:
+        """Unknowns of the state that the step begins with."""
+        q = np.zeros(self.size)
+        q[: self.primal] = self.to_local(self._start_points - self.reference).ravel()[self.free]
+        if self._moments_start is not None and self.elements.held:
+            moments = self._moments_start[self.elements.source[-self.elements.held :]]
+            lengths = self._hinge_lengths[-self.elements.held :]
+            q[self.primal :] = np.nan_to_num(moments) * lengths
+        return q
+
+    def positions(self, q: Array, lam: float) -> Array:
+        """(n, 3) node positions, mm."""
+        local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
+        local.ravel()[self.free] = q[: self.primal]
+        return self.reference + self.to_global(local)
+
+    def to_global(self, local: Array) -> Array:
+        if len(self.turned) == 0:
+            return local
+        out = local.copy()
+        out[self.turned] = np.einsum("nij,ni->nj", self.turned_axes, local[self.turned])
+        return out
+
+    def to_local(self, vectors: Array) -> Array:
+        if len(self.turned) == 0:
+            return vectors
+        out = vectors.copy()
+        out[self.turned] = np.einsum("nij,nj->ni", self.turned_axes, vectors[self.turned])
+        return out
+
+    @cached_property
+    def _hinge_lengths(self) -> Array:
+        ends = self.reference[self.elements.hinges[:, 1:3]]
+        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+    # ------------------------------------------------------------------------------- the System protocol
+
+    def evaluate(self, q: Array, lam: float) -> Evaluation:
+        x = self.positions(q, lam)
+        energy, size, f, forces = self._internal(x, q, lam)
+        load = (1.0 - lam) * self.force.start + lam * self.force.end
+        energy -= float(np.vdot(load, x - self.reference))
+        f -= load
+        residual = np.empty(self.size)
+        residual[: self.primal] = self.to_local(f).ravel()[self.free]
+        gap = 0.0
+        if self.elements.held:
+            held = slice(-self.elements.held, None)
+            turn = (forces[held] - q[self.primal :]) / self.elements.hinge_stiffness[held]
+            residual[self.primal :] = turn
+            gap = 100.0 * float(np.abs(turn).max())  # a held angle is to be met far better than a force
+            # the independent force of a held hinge is its multiplier; the penalty gamma * turn is no physical moment
+            # and would only spoil the geometric stiffness while the angle is not yet met
+            forces[held] = q[self.primal :]
+        return Evaluation(energy, residual, self._imbalance(residual, size, load, x, gap), forces)
+
+    def _imbalance(self, residual: Array, size: float, load: Array, x: Array, gap: float) -> float:
+        largest = float(np.abs(residual[: self.primal]).max(initial=0.0))
+        # coordinates are rounded to eps |x|, which the bars turn into forces that nobody can balance
+        floor = ROUNDING * self._stiffest * float(np.abs(x).max())
+        if largest <= floor:
+            return gap
+        size = max(size, float(np.abs(load).max(initial=0.0)), 1e-300)
+        return max((largest - floor) / size, gap)
+
+    @cached_property
+    def _stiffest(self) -> float:
+        return float(self.elements.bar_stiffness.max())
+
+    def _internal(self, x: Array, q: Array, lam: float) -> tuple[float, float, Array, Array]:
+        """Energy, typical element force, nodal forces (n, 3) and element forces (bars, then hinges)."""
+        e = self.elements
+        f = np.zeros_like(x)
+        forces = np.empty(len(e.bars) + len(e.hinges))
+        energy, size = nodal_forces(
+            x, e.bars, e.bar_length, e.bar_stiffness, e.hinges, e.hinge_stiffness,
+            e.rest.at(lam), self._couple(q, lam), f, forces[: len(e.bars)], forces[len(e.bars) :],
+        )  # fmt: skip
+        return energy, size, f, forces
+
+    def _couple(self, q: Array, lam: float) -> Array:
+        couple = self.elements.couple.at(lam)
+        if self.elements.held:
+            couple[-self.elements.held :] = q[self.primal :]
+        return couple
+
+    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+        e, pattern = self.elements, self._pattern
+        bars = len(e.bars)
+        x = self.positions(q, lam)
+        data = np.zeros(pattern.size)
+        tangent_values(
+            x, e.bars, e.bar_stiffness, forces[:bars], pattern.slots[0], e.hinges, e.hinge_stiffness, forces[bars:],
+            pattern.slots[1], self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge,
+        )  # fmt: skip
+        matrix: Matrix
+        if self.constraints.rigid_body:
+            Z = self._rigid(x)
+            self._ground(Z, data)
+            matrix = FreeBodyMatrix(pattern.matrix(data), Z)
+        else:
+            matrix = pattern.matrix(data)
+        if not e.held:
+            return matrix
+        return MultiplierMatrix(matrix, self._constraint_rows(), e.hinge_stiffness[-e.held :])  # type: ignore[arg-type]
+
+    def predicted_forces(self, forces: Array, dq: Array) -> Array:
+        e = self.elements
+        bars = len(e.bars)
+        local = np.zeros_like(self.reference)
+        local.ravel()[self.free] = dq[: self.primal]
+        out = np.empty_like(forces)
+        predicted_forces(
+            e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, e.hinge_stiffness, forces[bars:],
+            self._g_hinge, self.to_global(local), out[:bars], out[bars:],
+        )  # fmt: skip
+        if e.held:
+            out[-e.held :] = forces[-e.held :] + dq[self.primal :]
+        return out
+
+    def control_rate(self, q: Array, lam: float) -> Array:
+        e = self.elements
+        x = self.positions(q, lam)
+        _, _, _, forces = self._internal(x, q, lam)
+        g = dihedral_gradients(x, e.hinges)
+        moment_rate = e.couple.rate - e.hinge_stiffness * e.rest.rate
+        out = -self.force.rate.copy()
+        np.add.at(out, e.hinges, (moment_rate[:, None] * g).reshape(-1, 4, 3))
+        moving = self.to_global(self.prescribed_rate)
+        if moving.any():
+            bars = len(e.bars)
+            tangent_times(
+                x, moving, e.bars, e.bar_stiffness, forces[:bars], e.hinges, e.hinge_stiffness, forces[bars:], out
+            )
+        rate = np.empty(self.size)
+        rate[: self.primal] = self.to_local(out).ravel()[self.free]
+        if e.held:
+            turn = np.einsum("hpc,hpc->h", g.reshape(-1, 4, 3), moving[e.hinges]) - e.rest.rate
+            rate[self.primal :] = turn[-e.held :]
+        return rate
+
+    def power(self, q: Array, lam: float) -> float:
+        e = self.elements
+        x = self.positions(q, lam)
+        _, _, f, forces = self._internal(x, q, lam)
+        turn = dihedral_angles(x, e.hinges) - e.rest.at(lam)
+        total = float(e.couple.rate @ turn - forces[len(e.bars) :] @ e.rest.rate)
+        total -= float(np.vdot(self.force.rate, x - self.reference))
+        unbalanced = self.to_local(f - self.force.at(lam))
+        return total + float(np.vdot(unbalanced, self.prescribed_rate))
+
+    def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        e = self.elements
+        before = dihedral_angles(self.positions(q, lam), e.hinges)
+        after = dihedral_angles(self.positions(q_new, lam_new), e.hinges)
+        turn = float(np.abs(after - before).max(initial=0.0))
+        return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
+
+    # ------------------------------------------------------------------------------- pattern, grounding, constraints
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        groups = (self.elements.bars, self.elements.hinges)
+        if self.constraints.rigid_body:
+            groups += (self.mesh.triangles[self._ground_triangle][None, :],)
+        return build_pattern(self.number, groups)
+
+    @cached_property
+    def _constraint_pattern(self) -> tuple[NDArray[np.bool_], Ints, Ints]:
+        columns = self.number[self.elements.hinges[-self.elements.held :]].reshape(-1, 12)
+        keep = columns >= 0
+        return keep, columns[keep], np.concatenate(([0], np.cumsum(keep.sum(axis=1))))
+
+    def _constraint_rows(self) -> sp.csr_array:
+        keep, columns, indptr = self._constraint_pattern
+        held = self.elements.hinges[-self.elements.held :]
+        g = self._g_hinge[-self.elements.held :]
+        if len(self.turned):
+            index = self.constraints.frame_of[held]
+            axes = np.where((index >= 0)[..., None, None], self.constraints.frames[index], np.eye(3))
+            g = np.einsum("hpij,hpj->hpi", axes, g.reshape(-1, 4, 3)).reshape(-1, 12)
+        return sp.csr_array((g[keep], columns, indptr), shape=(len(held), self.primal))
+
+    def _rigid(self, x: Array) -> Array:
+        """Orthonormal rigid motions (primal, r) that the supports leave free at positions x."""
+        motions = rigid_motions(x) @ free_motions(x, self.constraints)
+        for column in range(motions.shape[1]):
+            motions[:, column] = self.to_local(motions[:, column].reshape(-1, 3)).ravel()
+        return np.linalg.qr(motions[self.free])[0]
+
+    @cached_property
+    def _ground_triangle(self) -> int:
+        """The triangle that carries the stiffness against rigid motions: in the middle, without supports of its own."""
+        centres = self.reference[self.mesh.triangles].mean(axis=1)
+        distance = np.linalg.norm(centres - self.reference.mean(axis=0), axis=1)
+        held = (self.number[self.mesh.triangles] < 0).sum(axis=(1, 2))
+        return int(np.lexsort((distance, held))[0])
+
+    def _ground(self, Z: Array, data: Array) -> None:
+        number = self.number[self.mesh.triangles[self._ground_triangle]].ravel()
+        rows = np.where(number[:, None] >= 0, Z[np.maximum(number, 0)], 0.0)
+        Q = np.linalg.qr(rows)[0] if Z.shape[1] else rows
+        block = self._bar_scale * (Q @ Q.T)
+        slots = self._pattern.slots[2][0]
+        values = block[np.tril_indices(9)]
+        keep = slots >= 0
+        np.add.at(data, slots[keep], values[keep])
+
+    def _check_balance(self) -> None:
+        Z = self._rigid(self.reference)
+        for load in (self.force.start, self.force.end):
+            local = self.to_local(load).ravel()[self.free]
+            if np.abs(Z.T @ local).max(initial=0.0) > 1e-9 * max(float(np.abs(local).sum()), 1e-300):
+                raise ModelError(
+                    "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
+                )
+
+
+class BarsAndHinges:
+    """Formulation "bars-and-hinges"; Poisson's ratio of the sheet is taken as 0, as in the source (3.3.2)."""
+
+    name = "bars-and-hinges"
+
+    def system(self, model: Model, program: StepProgram, start: State | None) -> BarsAndHingesSystem:
+        """The system of one step that begins at `start` (None: the stress-free sheet)."""
+        return BarsAndHingesSystem(model, program, start)
+
+    def observe(
+        self, model: Model, system: BarsAndHingesSystem, q: Array, lam: float, step: int = 0, stable: bool | None = None
+    ) -> State:
+        """Everything that can be read from the unknowns `q` at `lam`."""
+        e, mesh = system.elements, system.mesh
+        x = system.positions(q, lam)
+        _, _, f, forces = system._internal(x, q, lam)
+        phi = dihedral_angles(x, e.hinges)
+        turn = phi - e.rest.at(lam)
+        s_bar, s_hinge = forces[: len(e.bars)], forces[len(e.bars) :]
+        stretch = 0.5 * s_bar**2 / e.bar_stiffness
+        bend = slice(0, e.bending)
+        spring = slice(e.bending, e.bending + e.spring)
+        by_hinge = 0.5 * e.hinge_stiffness * turn**2
+        density = {
+            "stretching": _to_triangles(model, stretch, np.arange(len(e.bars))),
+            "bending": _to_triangles(model, by_hinge[bend], mesh.topology.hinge_edges[e.source[bend]]),
+            "folding": _to_triangles(model, by_hinge[spring], mesh.topology.hinge_edges[e.source[spring]]),
+        }
+        angles = np.empty(len(e.hinges))
+        angles[e.source] = phi
+        moments = np.full(len(e.hinges), np.nan)
+        crease = slice(e.bending, None)
+        elastic = s_hinge.copy()  # of springs the spring's own moment, without the couple applied to it
+        elastic[spring] -= e.couple.at(lam)[spring]
+        moments[e.source[crease]] = elastic[crease] / system._hinge_lengths[crease]
+        reactions = np.zeros_like(x)
+        local = system.to_local(f - system.force.at(lam))
+        reactions[system.constraints.fixed] = local[system.constraints.fixed]
+        return State(
+            mesh=mesh, step=step, lam=lam, points=x,
+            energy=Energy(float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum())),
+            dihedral_angles=angles, energy_density=density, reactions=system.to_global(reactions),
+            crease_moments=moments, stable=stable,
+        )  # fmt: skip
+
+
+def _to_triangles(model: Model, energy: Array, edges: Ints) -> Array:
+    """Energy of edges shared by area among their triangles, as a density (t,), N mm / mm^2."""
+    mesh = model.mesh
+    sides = mesh.topology.edge_triangles[edges]
+    areas = np.where(sides >= 0, mesh.areas[np.maximum(sides, 0)], 0.0)
+    share = energy / areas.sum(axis=1)
+    density = np.zeros(len(mesh.triangles))
+    for side in range(2):
+        inside = sides[:, side] >= 0
+        np.add.at(density, sides[inside, side], share[inside])
+    return density

@@ -1,0 +1,203 @@
+"""The steps of a model as ramps: for every step what each hinge, node and support does while lambda runs.
+
+Description only, shared by all formulations: no stiffness of the sheet, no unknowns.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.actuation import Actuation, Array, Displace, Fold, Force, Moment, Ramp
+from bh.errors import ModelError
+from bh.model import CreaseLaw, Model
+from bh.supports import AXES, Constraints, Prescribed, resolve, select
+from meshes import SheetMesh
+from meshes.topology import Ints
+
+SHEET, SPRING, HELD = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class StepProgram:
+    """One step. Hinge arrays have one entry for each row of `mesh.topology.hinges`.
+
+    Attributes:
+        law: (m,) SHEET (uncreased), SPRING (elastic crease) or HELD (angle imposed exactly).
+        stiffness: (m,) of spring creases a length, N mm / (mm rad).
+        rest: rest dihedral angles of the springs, rad.
+        held: imposed dihedral angles, rad; start is nan where the angle at the start of the step is to be taken.
+        moment: couple a length that closes the dihedral angle below the sheet, N mm / mm.
+        force: (n, 3) dead forces, N.
+        constraints: supports and prescribed displacements.
+    """
+
+    law: NDArray[np.int64]
+    stiffness: Array
+    rest: Ramp
+    held: Ramp
+    moment: Ramp
+    force: Ramp
+    constraints: Constraints
+
+    @property
+    def rotation(self) -> float:
+        """Largest change of an imposed or rest angle in this step, rad."""
+        held = np.where(np.isnan(self.held.start), math.pi, self.held.start)
+        change = np.concatenate((np.abs(self.held.end - held)[self.law == HELD], np.abs(self.rest.rate)))
+        return float(change.max(initial=0.0))
+
+
+class _Builder:
+    """Walks through the steps and remembers what the last one left behind."""
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.mesh = model, model.mesh
+        topology = model.mesh.topology
+        hinges, nodes = len(topology.hinges), len(model.mesh.points)
+        self.hinge_of_edge = np.full(len(topology.edges), -1, dtype=np.int64)
+        self.hinge_of_edge[topology.hinge_edges] = np.arange(hinges)
+        self.law = np.zeros(hinges, dtype=np.int64)
+        self.stiffness = np.zeros(hinges)
+        self.rest = np.full(hinges, math.pi)
+        self.held = np.full(hinges, np.nan)
+        self.moment = np.zeros(hinges)
+        self.force = np.zeros((nodes, 3))
+        self.displaced: dict[tuple[int, tuple[float, float, float]], float] = {}
+        for name, crease in model.creases.items():
+            self._spring(self.hinges(name), crease)
+            self.rest[self.hinges(name)] = crease.rest
+        for step in model.steps:  # a spring that a later step names is there from the start, at rest flat
+            for item in step:
+                if isinstance(item, Fold) and (item.Lstar is not None or item.stiffness is not None):
+                    self._spring(self.creases(item.crease)[0], CreaseLaw(item.Lstar, item.stiffness))
+
+    def _spring(self, hinges: Ints, law: CreaseLaw) -> None:
+        self.law[hinges] = SPRING
+        self.stiffness[hinges] = law.per_length(self.model.sheet)
+
+    def hinges(self, crease: str) -> Ints:
+        found = self.hinge_of_edge[self.mesh.topology.find_edges(self.mesh.crease_edges(crease))]
+        if (found < 0).any():
+            raise ModelError(f"crease '{crease}' runs along the boundary, where nothing can fold; draw it inside")
+        return found
+
+    def creases(self, name: str) -> tuple[Ints, Array, Array]:
+        """Hinges of a crease or of "all", the drawn sense (+1 mountain, -1 valley) and the drawn fold angles."""
+        if name == "all":
+            names = [crease for crease in self.mesh.creases if self.mesh.folds.get(crease) != "flat"]
+            if not names:
+                raise ModelError("fold of crease 'all': the sheet has no mountain or valley crease")
+        else:
+            names = [name]
+        hinges = [self.hinges(each) for each in names]
+        sense = [
+            np.full(len(found), -1.0 if self.mesh.folds.get(each) == "valley" else 1.0)
+            for each, found in zip(names, hinges, strict=True)
+        ]
+        drawn = [
+            np.asarray(self.mesh.fold_angles.get(each, np.full(len(found), np.nan)))
+            for each, found in zip(names, hinges, strict=True)
+        ]
+        joined, first = np.unique(np.concatenate(hinges), return_index=True)
+        if name != "all":  # keep the order along the crease, angles may be given an edge
+            first = np.sort(first)
+            joined = np.concatenate(hinges)[first]
+        return joined, np.concatenate(sense)[first], np.concatenate(drawn)[first]
+
+    def step(self, actuations: tuple[Actuation, ...]) -> StepProgram:
+        before = (self.rest.copy(), self.held.copy(), self.moment.copy(), self.force.copy())
+        displaced = dict(self.displaced)
+        for item in actuations:
+            if isinstance(item, Fold):
+                self._fold(item)
+            elif isinstance(item, Moment):
+                hinges, sense, _ = self.creases(item.crease)
+                self.moment[hinges] = sense * item.to
+            elif isinstance(item, Force):
+                self._force(item)
+            else:
+                self._displace(item)
+        rest, held, moment, force = before
+        return StepProgram(
+            law=self.law.copy(),
+            stiffness=self.stiffness.copy(),
+            rest=Ramp(rest, self.rest.copy()),
+            held=Ramp(held, self.held.copy()),
+            moment=Ramp(moment, self.moment.copy()),
+            force=Ramp(force, self.force.copy()),
+            constraints=resolve(self.mesh, self.model.supports, self._prescribed(displaced)),
+        )
+
+    def _fold(self, item: Fold) -> None:
+        hinges, sense, drawn = self.creases(item.crease)
+        spring = item.rest is not None or item.Lstar is not None or item.stiffness is not None
+        if isinstance(item.by, str):
+            if np.isnan(drawn).any():
+                raise ModelError(f"fold of crease '{item.crease}': the pattern gives no fold angles; use by = radians")
+            angle = math.pi - drawn
+        elif item.by is not None:
+            angle = math.pi - sense * self._per_edge(item, item.by, len(hinges))
+        else:
+            value = item.to if item.to is not None else item.rest
+            assert value is not None
+            angle = self._per_edge(item, value, len(hinges))
+        if not spring:
+            inside = (angle > 0.0) & (angle < 2.0 * math.pi)
+            if not inside.all():
+                raise ModelError(f"fold of crease '{item.crease}' closes it completely; stay inside (0, 2 pi) rad")
+            self.law[hinges] = HELD
+            self.held[hinges] = angle
+            return
+        if (self.law[hinges] != SPRING).any():
+            raise ModelError(f"fold of crease '{item.crease}' by its rest angle needs Lstar or stiffness")
+        self.rest[hinges] = angle
+
+    @staticmethod
+    def _per_edge(item: Fold, value: float | object, count: int) -> Array:
+        angles = np.asarray(value, dtype=float)
+        if angles.ndim and angles.shape != (count,):
+            raise ModelError(f"fold of crease '{item.crease}' has {angles.size} angles for {count} edges")
+        return np.broadcast_to(angles, (count,)).copy()
+
+    def _force(self, item: Force) -> None:
+        nodes = select(self.mesh, item.at)
+        vector = item.each if item.each is not None else item.total
+        share = 1.0 if item.each is not None else 1.0 / len(nodes)
+        self.force[nodes] = share * np.asarray(vector, dtype=float)
+
+    def _displace(self, item: Displace) -> None:
+        raw = AXES[item.direction] if isinstance(item.direction, str) else item.direction
+        unit = np.asarray(raw, dtype=float) / np.linalg.norm(raw)
+        key = (float(unit[0]), float(unit[1]), float(unit[2]))
+        for node in select(self.mesh, item.at).tolist():
+            self.displaced[(node, key)] = item.by
+
+    def _prescribed(self, before: dict[tuple[int, tuple[float, float, float]], float]) -> list[Prescribed]:
+        return [
+            Prescribed(np.array([node]), direction, before.get((node, direction), 0.0), end)
+            for (node, direction), end in self.displaced.items()
+        ]
+
+
+def program(model: Model) -> tuple[StepProgram, ...]:
+    """The ramps of every step of `model`, in order; nothing is solved.
+
+    Raises:
+        ModelError, MeshError: an actuation or support that the sheet cannot take; the message names it.
+    """
+    builder = _Builder(model)
+    return tuple(builder.step(actuations) for actuations in model.steps)
+
+
+def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:
+    """Rows of `mesh.topology.hinges` along a crease, in order."""
+    topology = mesh.topology
+    edges = topology.find_edges(mesh.crease_edges(crease))
+    order = np.full(len(topology.edges), -1, dtype=np.int64)
+    order[topology.hinge_edges] = np.arange(len(topology.hinges))
+    found = order[edges]
+    return found[found >= 0]

@@ -1,0 +1,151 @@
+"""Newton's method for one value of lambda: bold with independent forces, careful with energy line search and shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.solvers.matrices import Factor, Indefinite, Matrix
+from bh.solvers.system import Evaluation, System
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What came of one solve; `q` is only an equilibrium where `converged`.
+
+    `iterations` counts factorisations that moved the state; `stable` tells if the Hessian there is positive definite
+    (on the null space of the constraints), None where that was not looked at.
+    """
+
+    q: Array
+    evaluation: Evaluation
+    iterations: int
+    converged: bool
+    reason: str = ""
+    stable: bool | None = None
+    careful: bool = False
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Solve residual(q) = 0 at a fixed lambda.
+
+    First boldly: full steps with the tangent of independent element forces, which takes the large rotations of thin
+    sheets in a few iterations though the energy rises on the way. If that does not converge, once more from the start
+    and carefully: the exact Hessian, shifted until it is positive definite, and a line search on the energy, which
+    can only go downhill.
+
+    Attributes:
+        tolerance: on `Evaluation.imbalance`.
+        bold, careful: most iterations of either way.
+    """
+
+    tolerance: float = 1e-8
+    bold: int = 14
+    careful: int = 80
+
+    def solve(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
+        """Equilibrium at `lam` from the guess `q`; `forces` are the element forces that go with the guess."""
+        first = self.solve_boldly(system, q, lam, forces)
+        if first.converged or self.careful == 0:
+            return first
+        second = self.solve_carefully(system, q, lam)
+        return Solution(
+            second.q, second.evaluation, first.iterations + second.iterations, second.converged, second.reason,
+            second.stable, careful=True,
+        )  # fmt: skip
+
+    def solve_boldly(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
+        """Full steps with independent forces; gives up on an indefinite tangent or when it runs away."""
+        now = system.evaluate(q, lam)
+        forces, least = now.forces if forces is None else forces, now.imbalance
+        for iteration in range(self.bold):
+            if now.imbalance <= self.tolerance:
+                return self._finish(system, q, lam, now, iteration, careful=False)
+            try:
+                factor = system.tangent(q, lam, forces).factorise()
+            except Indefinite:
+                return Solution(q, now, iteration, False, "indefinite tangent")
+            dq = -factor.solve(now.residual)
+            forces = system.predicted_forces(now.forces, dq)
+            q = q + dq
+            now = system.evaluate(q, lam)
+            if not np.isfinite(now.energy) or now.imbalance > 1e8 * max(least, 1.0):
+                return Solution(q, now, iteration + 1, False, "diverged")
+            least = min(least, now.imbalance)
+        if now.imbalance <= self.tolerance:
+            return self._finish(system, q, lam, now, self.bold, careful=False)
+        return Solution(q, now, self.bold, False, "iteration limit")
+
+    def solve_carefully(self, system: System, q: Array, lam: float) -> Solution:
+        """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns."""
+        now = system.evaluate(q, lam)
+        shift = 0.0
+        for iteration in range(self.careful):
+            if now.imbalance <= self.tolerance:
+                return self._finish(system, q, lam, now, iteration, careful=True)
+            matrix = system.tangent(q, lam, now.forces)
+            factor, shift = factorise_shifted(matrix, shift)
+            if factor is None:
+                return Solution(q, now, iteration, False, "singular tangent", careful=True)
+            step = line_search(system, q, lam, now, -factor.solve(now.residual))
+            if step is None:
+                if shift > 1e3:
+                    return Solution(q, now, iteration, False, "no descent", careful=True)
+                shift = max(10.0 * shift, 1e-4)
+                continue
+            q, now, length = step
+            shift = 0.1 * shift if length > 0.5 else shift
+        if now.imbalance <= self.tolerance:
+            return self._finish(system, q, lam, now, self.careful, careful=True)
+        return Solution(q, now, self.careful, False, "iteration limit", careful=True)
+
+    @staticmethod
+    def _finish(system: System, q: Array, lam: float, now: Evaluation, iterations: int, careful: bool) -> Solution:
+        try:
+            system.tangent(q, lam, now.forces).factorise()
+            stable = True
+        except Indefinite:
+            stable = False
+        return Solution(q, now, iterations, True, "", stable, careful)
+
+
+def factorise_shifted(matrix: Matrix, shift: float) -> tuple[Factor | None, float]:
+    """The factor with the smallest tried shift (in parts of the diagonal) that makes the matrix positive definite."""
+    if shift < 1e-9:
+        shift = 0.0
+    for _ in range(40):
+        try:
+            return matrix.factorise(shift), shift
+        except Indefinite:
+            shift = max(4.0 * shift, 1e-7)
+    return None, shift
+
+
+def line_search(
+    system: System, q: Array, lam: float, now: Evaluation, dq: Array
+) -> tuple[Array, Evaluation, float] | None:
+    """Step along dq that lowers the energy enough (Armijo), multipliers held while looking; None if there is none."""
+    p = system.primal
+    slope = float(now.residual[:p] @ dq[:p])
+    noise = 1e-13 * max(abs(now.energy), abs(slope))
+    length = 1.0
+    for _ in range(30):
+        trial = q.copy()
+        trial[:p] += length * dq[:p]
+        there = system.evaluate(trial, lam)
+        if np.isfinite(there.energy) and (
+            there.energy <= now.energy + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
+        ):
+            if len(q) > p:
+                trial[p:] += length * dq[p:]
+                there = system.evaluate(trial, lam)
+            return trial, there, length
+        gain = there.energy - now.energy - length * slope
+        best = -0.5 * slope * length**2 / gain if np.isfinite(gain) and gain > 0.0 else 0.0
+        length = min(max(best, 0.1 * length), 0.5 * length)
+    return None

@@ -1,0 +1,70 @@
+"""What the driver needs to know of a mechanical system; it knows nothing of mechanics.
+
+All actuation enters through one scalar lambda, which runs from 0 to 1 in a step.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.solvers.matrices import Matrix
+
+Array = NDArray[np.float64]
+
+
+class Evaluation(NamedTuple):
+    """A system at (q, lambda).
+
+    Attributes:
+        energy: potential whose stationary points are sought, N mm (with multipliers: the augmented Lagrangian).
+        residual: (n,) its gradient.
+        imbalance: scale-free size of the residual: largest component beyond rounding, over the typical element
+            force; constraint violations in rad or relative units. Zero for perfect equilibrium.
+        forces: element forces at q (one array, in the system's own order); see `System.tangent`.
+    """
+
+    energy: float
+    residual: Array
+    imbalance: float
+    forces: Array
+
+
+class System(Protocol):
+    """q: (n,) unknowns. The first `primal` of them minimise the energy, the rest are multipliers."""
+
+    size: int
+    primal: int
+
+    def evaluate(self, q: Array, lam: float) -> Evaluation: ...
+
+    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+        """Symmetric tangent with the element forces `forces` in its geometric part.
+
+        With `forces` of `evaluate(q, lam)` this is the Hessian; with those of `predicted_forces` it is the tangent
+        of Newton's method with independent forces (Magisano, Leonetti and Garcea 2017).
+        """
+        ...
+
+    def predicted_forces(self, forces: Array, dq: Array) -> Array:
+        """Element forces that the last tangent predicts after the increment dq."""
+        ...
+
+    def control_rate(self, q: Array, lam: float) -> Array:
+        """(n,) d residual / d lambda."""
+        ...
+
+    def power(self, q: Array, lam: float) -> float:
+        """d energy / d lambda at fixed q: the rate of work of the actuation, N mm."""
+        ...
+
+    def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Why an increment from one state to the next is not to be trusted, or an empty string."""
+        ...
+
+    @property
+    def rotation(self) -> float:
+        """Largest change of an imposed or rest angle while lambda runs from 0 to 1, rad."""
+        ...

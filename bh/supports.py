@@ -1,0 +1,220 @@
+"""Supports and prescribed displacements, resolved to constrained directions at nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from meshes import SheetMesh
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+MOTIONS = ("translation along x", "translation along y", "translation along z",
+           "rotation about x", "rotation about y", "rotation about z")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Support:
+    """Nodes that cannot move in some directions.
+
+    Attributes:
+        at: a place of the mesh ("corner:inner-start", "edge:inner", "crease:NAME", "node:N", "all") or node indices.
+        fix: letters out of "xyz", or one or more direction vectors (k, 3) that need not be unit or orthogonal.
+    """
+
+    at: str | Sequence[int]
+    fix: str | Sequence[Sequence[float]] = "xyz"
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """Takes out exactly the rigid motions that the other supports leave free, without any force (see `bh.trace`)."""
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """Displacement along one direction at some nodes, from `start` to `end` (mm) while lambda runs from 0 to 1."""
+
+    nodes: Ints
+    direction: tuple[float, float, float]
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Constrained directions of all nodes in local axes.
+
+    Attributes:
+        fixed: (n, 3) True where the local component is prescribed.
+        start, end: (n, 3) prescribed local displacement at lambda = 0 and 1, mm (zero for supports).
+        frame_of: (n,) row of `frames` for nodes whose local axes are not x, y, z; else -1.
+        frames: (f, 3, 3) rows are the local axes.
+        rigid_body: True if the remaining rigid motions are to be taken out.
+    """
+
+    fixed: NDArray[np.bool_]
+    start: Array
+    end: Array
+    frame_of: Ints
+    frames: Array
+    rigid_body: bool
+
+
+def directions(fix: str | Sequence[Sequence[float]]) -> list[Array]:
+    """Unit direction vectors of a support.
+
+    Raises:
+        ModelError: unknown letters, or vectors that are not three finite numbers.
+    """
+    if isinstance(fix, str):
+        wrong = sorted(set(fix) - set("xyz"))
+        if wrong or not fix or len(set(fix)) != len(fix):
+            raise ModelError(f"support fix = '{fix}' is not understood; use letters out of 'xyz', each once")
+        return [np.array(AXES[letter]) for letter in fix]
+    vectors = np.atleast_2d(np.asarray(fix, dtype=float))
+    if vectors.shape[1] != 3 or not np.isfinite(vectors).all():
+        raise ModelError("support directions must be vectors of three finite numbers")
+    norms = np.linalg.norm(vectors, axis=1)
+    if (norms == 0.0).any():
+        raise ModelError("a support direction is the zero vector; give it a direction")
+    return list(vectors / norms[:, None])
+
+
+def select(mesh: SheetMesh, at: str | Sequence[int]) -> Ints:
+    """Node indices of a place name or of explicit indices; errors name what there is."""
+    if isinstance(at, str):
+        return mesh.nodes(at)
+    nodes = np.asarray(at)
+    if nodes.dtype.kind not in "iu" or nodes.ndim != 1 or len(nodes) == 0:
+        raise ModelError("a place must be a name or a list of node indices")
+    if nodes.min() < 0 or nodes.max() >= len(mesh.points):
+        raise ModelError(f"node {nodes.max()} is not in the mesh; use 0 to {len(mesh.points) - 1}")
+    return nodes.astype(np.int64)
+
+
+def resolve(
+    mesh: SheetMesh, supports: Iterable[Support | RigidBody], prescribed: Iterable[Prescribed] = ()
+) -> Constraints:
+    """Collect all supports and prescribed displacements into local axes a node.
+
+    A sheet without any support gets the rigid-body support by itself.
+
+    Raises:
+        ModelError: supports contradict each other, or leave rigid motions free.
+    """
+    supports, prescribed = list(supports), list(prescribed)
+    wanted: dict[int, list[tuple[Array, float, float]]] = {}
+    rigid_body = not supports and not prescribed
+    for support in supports:
+        if isinstance(support, RigidBody):
+            rigid_body = True
+            continue
+        for direction in directions(support.fix):
+            for node in select(mesh, support.at).tolist():
+                wanted.setdefault(node, []).append((direction, 0.0, 0.0))
+    for item in prescribed:
+        for node in item.nodes.tolist():
+            direction = np.asarray(item.direction, dtype=float)
+            wanted.setdefault(node, []).append((direction, item.start, item.end))
+
+    n = len(mesh.points)
+    fixed = np.zeros((n, 3), dtype=bool)
+    start, end = np.zeros((n, 3)), np.zeros((n, 3))
+    frame_of = np.full(n, -1, dtype=np.int64)
+    frames: list[Array] = []
+    for node, rows in wanted.items():
+        axes, values = _orthonormal(node, rows)
+        aligned = (np.abs(axes).max(axis=1) > 1.0 - 1e-12).all()
+        if aligned:
+            columns = np.abs(axes).argmax(axis=1)
+            signs = np.sign(axes[np.arange(len(axes)), columns])
+            fixed[node, columns] = True
+            start[node, columns], end[node, columns] = signs * values[:, 0], signs * values[:, 1]
+        else:
+            fixed[node, : len(axes)] = True
+            start[node, : len(axes)], end[node, : len(axes)] = values.T
+            frame_of[node] = len(frames)
+            frames.append(_complete(axes))
+    stacked = np.array(frames).reshape(-1, 3, 3)
+    constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body)
+    _check_rigid_motions(mesh, constraints)
+    return constraints
+
+
+def rigid_motions(points: Array) -> Array:
+    """(3 n, 6) displacements of the unit translations and of unit rotations about the centroid."""
+    n = len(points)
+    arm = points - points.mean(axis=0)
+    motions = np.zeros((n, 3, 6))
+    motions[:, [0, 1, 2], [0, 1, 2]] = 1.0
+    motions[:, 1, 3], motions[:, 2, 3] = -arm[:, 2], arm[:, 1]
+    motions[:, 0, 4], motions[:, 2, 4] = arm[:, 2], -arm[:, 0]
+    motions[:, 0, 5], motions[:, 1, 5] = -arm[:, 1], arm[:, 0]
+    return motions.reshape(3 * n, 6)
+
+
+def free_motions(points: Array, constraints: Constraints) -> Array:
+    """(6, r) combinations of the scaled rigid motions that the supports allow, r from 0 to 6.
+
+    Rotations are scaled by the size of the sheet, so that ranks do not depend on the unit of length.
+    """
+    motions = rigid_motions(points).reshape(len(points), 3, 6)
+    scale = np.ones(6)
+    scale[3:] = 1.0 / max(float(np.linalg.norm(np.ptp(points, axis=0))), 1e-300)
+    motions = motions * scale
+    for node in np.flatnonzero(constraints.frame_of >= 0):
+        motions[node] = constraints.frames[constraints.frame_of[node]] @ motions[node]
+    rows = motions[constraints.fixed]
+    if len(rows) == 0:
+        return np.diag(scale)
+    _, values, right = np.linalg.svd(rows, full_matrices=True)
+    rank = int((values > 1e-7 * max(values[0], 1e-300)).sum())
+    return scale[:, None] * right[rank:].T
+
+
+def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints) -> None:
+    if constraints.rigid_body:
+        return
+    left = free_motions(mesh.points, constraints)
+    if left.shape[1] == 0:
+        return
+    size = np.ones(6)
+    size[3:] = mesh.size
+    share = np.linalg.norm(left * size[:, None], axis=1)
+    names = ", ".join(MOTIONS[k] for k in np.flatnonzero(share > 0.3))
+    raise ModelError(
+        f"the supports leave {left.shape[1]} rigid motion(s) free ({names}); "
+        "add supports, or a support at 'rigid-body' that takes them out without force"
+    )
+
+
+def _orthonormal(node: int, rows: list[tuple[Array, float, float]]) -> tuple[Array, Array]:
+    """Gram-Schmidt over the directions at a node; values follow, redundant ones must agree."""
+    axes: list[Array] = []
+    values: list[Array] = []
+    for direction, start, end in rows:
+        rest, value = direction.astype(float).copy(), np.array([start, end])
+        for axis, known in zip(axes, values, strict=True):
+            share = float(rest @ axis)
+            rest, value = rest - share * axis, value - share * known
+        norm = float(np.linalg.norm(rest))
+        if norm > 1e-9:
+            axes.append(rest / norm)
+            values.append(value / norm)
+        elif np.abs(value).max() > 1e-12 * (1.0 + abs(start) + abs(end)):
+            raise ModelError(
+                f"node {node} is held and displaced along the same direction; remove the support or the displacement"
+            )
+    return np.array(axes), np.array(values)
+
+
+def _complete(axes: Array) -> Array:
+    """Three orthonormal rows that begin with the given ones."""
+    _, _, right = np.linalg.svd(axes, full_matrices=True)
+    return np.vstack((axes, right[len(axes) :]))

@@ -1,0 +1,13 @@
+"""Flat geometry: crease patterns, meshes of them, and their file formats."""
+
+from meshes.curves import Arc, Line, Polyline
+from meshes.errors import FileFormatError, InputError, MeshError, PatternError
+from meshes.library import annulus_sector, full_annulus, strip
+from meshes.mesh import SheetMesh
+from meshes.pattern import Crease, CreasePattern
+from meshes.structured import structured
+
+__all__ = [
+    "Arc", "Crease", "CreasePattern", "FileFormatError", "InputError", "Line", "MeshError",
+    "PatternError", "Polyline", "SheetMesh", "annulus_sector", "full_annulus", "strip", "structured",
+]

@@ -1,0 +1,151 @@
+"""The meshed sheet that every solver takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from meshes.curves import Array, Curve
+from meshes.errors import MeshError
+from meshes.pattern import FoldKind
+from meshes.topology import Ints, Topology, build
+
+
+@dataclass(frozen=True, eq=False)
+class SheetMesh:
+    """A triangulated sheet in its stress-free state, with named sets (frozen: arrays are read-only).
+
+    Attributes:
+        points: (n, 3) node positions, mm; a flat sheet lies in z = 0 with triangles counter-clockwise from +z.
+        triangles: (t, 3) node indices.
+        edge_sets: named sets of edges as (k, 2) node pairs in order: "crease:NAME", "edge:inner", ...
+        corners: named single nodes: "corner:inner-start", ...
+        folds: how each crease was drawn.
+        fold_angles: drawn fold angles by crease, one an edge of its set, rad, mountain positive; may be empty.
+        curves: the exact curve that a named edge set lies on, where there is one.
+        spans: (e, 2) for every edge of `topology.edges` how far it goes along and across the crease (mm), or
+            None where the mesh has no such directions.
+        kind: how it was meshed ("staggered", "alternating", "one-way", "mirrored", "gmsh", "imported", ...).
+        aspect_ratio: mean panel height across the crease over width along it (alpha = H / W), or nan.
+
+    Raises:
+        MeshError: indices out of range, degenerate triangles, non-manifold edges, sets that are no edges.
+    """
+
+    points: Array
+    triangles: Ints
+    edge_sets: Mapping[str, Ints] = field(default_factory=dict)
+    corners: Mapping[str, int] = field(default_factory=dict)
+    folds: Mapping[str, FoldKind] = field(default_factory=dict)
+    fold_angles: Mapping[str, Array] = field(default_factory=dict)
+    curves: Mapping[str, Curve] = field(default_factory=dict)
+    spans: Array | None = None
+    kind: str = "imported"
+    aspect_ratio: float = float("nan")
+
+    def __post_init__(self) -> None:
+        points = np.array(self.points, dtype=float)
+        if points.ndim == 2 and points.shape[1] == 2:
+            points = np.column_stack((points, np.zeros(len(points))))
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise MeshError("points must be an array (n, 3) in mm")
+        if not np.isfinite(points).all():
+            node = int(np.argmax(~np.isfinite(points).all(axis=1)))
+            raise MeshError(f"node {node} is not finite; give three numbers in mm")
+        set_ = object.__setattr__
+        set_(self, "points", _frozen(points))
+        set_(self, "triangles", _frozen(np.array(self.triangles, dtype=np.int64)))
+        for name in ("edge_sets", "fold_angles"):
+            dtype = np.int64 if name == "edge_sets" else float
+            frozen = {key: _frozen(np.array(value, dtype=dtype)) for key, value in getattr(self, name).items()}
+            set_(self, name, MappingProxyType(frozen))
+        for name in ("corners", "folds", "curves"):
+            set_(self, name, MappingProxyType(dict(getattr(self, name))))
+        topology = self.topology
+        _check_triangles(points, self.triangles)
+        used = np.zeros(len(points), dtype=bool)
+        used[self.triangles] = True
+        if not used.all():
+            raise MeshError(f"node {int(np.argmin(used))} belongs to no triangle; remove it")
+        for pairs in self.edge_sets.values():
+            topology.find_edges(pairs)
+        if self.spans is not None:
+            if np.shape(self.spans) != topology.edges.shape:
+                raise MeshError(f"spans must have one row an edge, shape {topology.edges.shape}")
+            set_(self, "spans", _frozen(np.array(self.spans, dtype=float)))
+
+    @cached_property
+    def topology(self) -> Topology:
+        return build(self.triangles, len(self.points))
+
+    @cached_property
+    def areas(self) -> Array:
+        """(t,) triangle areas, mm^2."""
+        a, b, c = (self.points[self.triangles[:, k]] for k in range(3))
+        return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+    @property
+    def flat(self) -> bool:
+        """True if every node lies in z = 0 (to 1e-9 of the size)."""
+        return bool(np.abs(self.points[:, 2]).max() <= 1e-9 * self.size)
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box, mm."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @property
+    def creases(self) -> tuple[str, ...]:
+        return tuple(name.removeprefix("crease:") for name in self.edge_sets if name.startswith("crease:"))
+
+    def nodes(self, at: str) -> Ints:
+        """Nodes of a named place: "corner:inner-start", "edge:inner", "crease:NAME", "node:N" or "all".
+
+        Raises:
+            MeshError: there is no such place; the message lists those there are.
+        """
+        if at == "all":
+            return np.arange(len(self.points))
+        if at in self.corners:
+            return np.array([self.corners[at]])
+        if at in self.edge_sets:
+            pairs = self.edge_sets[at].ravel()
+            return pairs[np.sort(np.unique(pairs, return_index=True)[1])]
+        if at.startswith("node:"):
+            text = at.removeprefix("node:")
+            if text.isdigit() and int(text) < len(self.points):
+                return np.array([int(text)])
+            raise MeshError(f"'{at}' is not a node of the mesh; use node:0 to node:{len(self.points) - 1}")
+        places = [*self.corners, *self.edge_sets, "node:N", "all"]
+        raise MeshError(f"the sheet has no place '{at}'; use one of {', '.join(places)}")
+
+    def crease_edges(self, crease: str) -> Ints:
+        """(k, 2) node pairs along a crease, in order.
+
+        Raises:
+            MeshError: there is no such crease; the message lists those there are.
+        """
+        pairs = self.edge_sets.get(f"crease:{crease}")
+        if pairs is None:
+            names = ", ".join(self.creases) or "none (the sheet has no crease)"
+            raise MeshError(f"the sheet has no crease '{crease}'; its creases: {names}")
+        return pairs
+
+
+def _check_triangles(points: Array, triangles: Ints) -> None:
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.max([np.sum(e * e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
+    thin = doubled <= 1e-10 * longest
+    if thin.any():
+        row = int(np.argmax(thin))
+        raise MeshError(f"triangle {row} (nodes {triangles[row].tolist()}) is degenerate; it has no area")
+
+
+def _frozen(array: Array | Ints) -> Array | Ints:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,107 @@
+"""The flat crease pattern: what is drawn before anything is meshed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from meshes.curves import Array, Curve, sample
+from meshes.errors import PatternError
+
+FoldKind = Literal["mountain", "valley", "flat"]
+FOLD_KINDS: tuple[FoldKind, ...] = ("mountain", "valley", "flat")
+
+
+@dataclass(frozen=True)
+class Crease:
+    """A named crease curve; `fold` says how it was drawn: mountain (dihedral < pi), valley (> pi) or flat."""
+
+    name: str
+    curve: Curve
+    fold: FoldKind = "mountain"
+
+    def __post_init__(self) -> None:
+        if self.fold not in FOLD_KINDS:
+            raise PatternError(
+                f"crease '{self.name}': fold '{self.fold}' is not known; use one of {', '.join(FOLD_KINDS)}"
+            )
+
+
+@dataclass(frozen=True)
+class CreasePattern:
+    """A flat sheet with named creases, in millimetres.
+
+    Attributes:
+        rings: closed boundary curves as (k, 2) polygons without a repeated last vertex; the first is the
+            outside, the others are holes.
+        creases: the crease curves.
+        rails: the curves from the inner to the outer edge that panels are ruled between (edges and creases in
+            order, all run the same way); empty where a pattern has no such order, then only an unstructured
+            mesh can be made of it.
+        edges: names of boundary curves ("inner", "outer", "start", "end").
+
+    Raises:
+        PatternError: a crease leaves the sheet, crosses itself or another one, or names are not unique.
+    """
+
+    rings: tuple[Array, ...]
+    creases: tuple[Crease, ...] = ()
+    rails: tuple[Curve, ...] = ()
+    edges: tuple[tuple[str, Curve], ...] = ()
+    units: Literal["mm"] = "mm"
+
+    def __post_init__(self) -> None:
+        if self.units != "mm":
+            raise PatternError(f"units '{self.units}' are not known; give lengths in mm")
+        names = [crease.name for crease in self.creases]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise PatternError(f"crease name '{twice[0]}' is used twice; give every crease its own name")
+        _check_geometry(self.rings, self.creases)
+
+    @property
+    def closed(self) -> bool:
+        """True where the rails close on themselves (a full annulus)."""
+        return bool(self.rails) and self.rails[0].closed
+
+    @property
+    def folds(self) -> dict[str, FoldKind]:
+        return {crease.name: crease.fold for crease in self.creases}
+
+
+def _check_geometry(rings: Sequence[Array], creases: Sequence[Crease]) -> None:
+    """Creases inside the outline, simple and not crossing; predicates by shapely."""
+    import shapely
+
+    if not rings:
+        raise PatternError("the pattern has no outline; give at least one boundary ring")
+    for ring in rings:
+        if len(ring) < 3 or not np.all(np.isfinite(ring)):
+            raise PatternError("a boundary ring needs at least three finite points")
+    sheet = shapely.Polygon(rings[0], holes=list(rings[1:]))
+    if not sheet.is_valid or sheet.area <= 0.0:
+        raise PatternError(f"the outline is not a simple polygon ({shapely.is_valid_reason(sheet)}); redraw it")
+    size = float(np.ptp(rings[0], axis=0).max())
+    # chords of curved outlines cut the sheet short by up to the sampling tolerance
+    grown = sheet.buffer(2e-3 + 1e-6 * size)
+    lines = []
+    for crease in creases:
+        points = sample(crease.curve)
+        if not np.all(np.isfinite(points)) or crease.curve.length <= 0.0:
+            raise PatternError(f"crease '{crease.name}' has no length; give it two distinct finite points")
+        line = shapely.LineString(points)
+        if not line.is_simple:
+            raise PatternError(f"crease '{crease.name}' crosses itself; split or redraw it")
+        if not grown.covers(line):
+            raise PatternError(f"crease '{crease.name}' leaves the sheet; move it inside the outline")
+        lines.append(line)
+    for i, first in enumerate(lines):
+        for j in range(i):
+            second = lines[j]
+            if first.crosses(second) or (first.intersection(second).length > 1e-6 * size):
+                raise PatternError(
+                    f"creases '{creases[j].name}' and '{creases[i].name}' cross; let them meet only at end points"
+                )
