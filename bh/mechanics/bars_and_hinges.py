@@ -76,7 +76,7 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Ele
     k_bend = bending_hinge_stiffness(sheet.E, sheet.t, hinge_length, hinge_area)
     k_fold = folding_hinge_stiffness(program.stiffness, hinge_length)
     # augmentation comparable to what the bars give a wing: it keeps the condition number and corrects in a step or two
-    gamma = 10.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
+    gamma = 30.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
     stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], gamma)
     held_from = np.where(np.isnan(program.held.start), held_start, program.held.start)
     law = program.law[source]
@@ -192,16 +192,23 @@ class BarsAndHingesSystem:
 
     def _imbalance(self, residual: Array, size: float, load: Array, x: Array, gap: float) -> float:
         largest = float(np.abs(residual[: self.primal]).max(initial=0.0))
-        # coordinates are rounded to eps |x|, which the bars turn into forces that nobody can balance
-        floor = ROUNDING * self._stiffest * float(np.abs(x).max())
+        # coordinates are rounded to eps |x| and angles to eps, which the stiffest elements turn into forces that
+        # nobody can balance
+        floor = ROUNDING * (self._stiffest_bar * float(np.abs(x).max()) + self._stiffest_hinge)
         if largest <= floor:
             return gap
         size = max(size, float(np.abs(load).max(initial=0.0)), 1e-300)
         return max((largest - floor) / size, gap)
 
     @cached_property
-    def _stiffest(self) -> float:
+    def _stiffest_bar(self) -> float:
         return float(self.elements.bar_stiffness.max())
+
+    @cached_property
+    def _stiffest_hinge(self) -> float:
+        """Largest stiffness over height of a wing, N / rad."""
+        heights = 2.0 * self.mesh.areas.min() / self._hinge_lengths if len(self._hinge_lengths) else np.ones(1)
+        return float((self.elements.hinge_stiffness / heights).max(initial=0.0))
 
     def _internal(self, x: Array, q: Array, lam: float) -> tuple[float, float, Array, Array]:
         """Energy, typical element force, nodal forces (n, 3) and element forces (bars, then hinges)."""

@@ -1,0 +1,49 @@
+"""Bar-and-hinge simulation of sheets folded along curved creases.
+
+Everything below is loaded when it is first used, so that `import bh` is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bh.actuation import Displace, Fold, Force, Moment
+    from bh.errors import InputError, ModelError, PathFileError, SceneError
+    from bh.model import CreaseLaw, Model, Sheet
+    from bh.path import Path, trace
+    from bh.scene import load_scene
+    from bh.solvers.continuation import LoadControl
+    from bh.solvers.newton import Newton
+    from bh.state import Energy, State
+    from bh.supports import RigidBody, Support
+
+_HOME = {
+    "CreaseLaw": "bh.model", "Displace": "bh.actuation", "Energy": "bh.state", "Fold": "bh.actuation",
+    "Force": "bh.actuation", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
+    "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
+    "Path": "bh.path", "PathFileError": "bh.errors", "RigidBody": "bh.supports", "SceneError": "bh.errors",
+    "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
+}  # fmt: skip
+
+__all__ = [
+    "CreaseLaw", "Displace", "Energy", "Fold", "Force", "InputError", "LoadControl", "Model", "ModelError", "Moment",
+    "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "load_scene", "trace",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        value = getattr(import_module(_HOME[name]), name)
+        globals()[name] = value
+        return value
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("curved-crease-workbench")
+    raise AttributeError(f"module 'bh' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])

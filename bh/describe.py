@@ -1,0 +1,120 @@
+"""A model as plain data and back: JSON for what is small, arrays for what is long. Used to store and to hash inputs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.actuation import Actuation, Displace, Fold, Force, Moment
+from bh.errors import PathFileError
+from bh.model import CreaseLaw, Model, Sheet
+from bh.supports import RigidBody, Support
+from meshes import Arc, Line, Polyline, SheetMesh
+from meshes.curves import Curve
+
+AnyArray = NDArray[Any]
+ACTUATIONS: dict[str, type[Actuation]] = {"fold": Fold, "moment": Moment, "force": Force, "displace": Displace}
+CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "polyline": Polyline}
+FORMAT = 1
+
+
+def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
+    """(data, arrays): everything a model consists of; `data` can be written as JSON."""
+    mesh = model.mesh
+    arrays: dict[str, AnyArray] = {"points": mesh.points, "triangles": mesh.triangles}
+    if mesh.spans is not None:
+        arrays["spans"] = mesh.spans
+    arrays |= {f"edges/{name}": pairs for name, pairs in mesh.edge_sets.items()}
+    arrays |= {f"angles/{name}": angles for name, angles in mesh.fold_angles.items()}
+    data = {
+        "format": FORMAT,
+        "formulation": model.formulation,
+        "sheet": _plain(model.sheet),
+        "mesh": {
+            "corners": dict(mesh.corners),
+            "folds": dict(mesh.folds),
+            "kind": mesh.kind,
+            "aspect_ratio": None if np.isnan(mesh.aspect_ratio) else mesh.aspect_ratio,
+            "curves": {name: _tagged(curve, CURVES) for name, curve in mesh.curves.items()},
+        },
+        "supports": ["rigid-body" if isinstance(s, RigidBody) else _plain(s) for s in model.supports],
+        "creases": {name: _plain(law) for name, law in model.creases.items()},
+        "steps": [[_tagged(item, ACTUATIONS) for item in step] for step in model.steps],
+    }
+    return data, arrays
+
+
+def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
+    """The model that `describe` described.
+
+    Raises:
+        PathFileError: the data are of another version or incomplete.
+    """
+    if data.get("format") != FORMAT:
+        raise PathFileError(f"stored model has format {data.get('format')}, this version reads {FORMAT}; solve again")
+    try:
+        flat = data["mesh"]
+        sets = {name.removeprefix("edges/"): a for name, a in arrays.items() if name.startswith("edges/")}
+        angles = {name.removeprefix("angles/"): a for name, a in arrays.items() if name.startswith("angles/")}
+        mesh = SheetMesh(
+            points=arrays["points"], triangles=arrays["triangles"], edge_sets=sets, corners=flat["corners"],
+            folds=flat["folds"], fold_angles=angles, spans=arrays.get("spans"), kind=flat["kind"],
+            curves={name: _untagged(curve, CURVES) for name, curve in flat["curves"].items()},
+            aspect_ratio=float("nan") if flat["aspect_ratio"] is None else flat["aspect_ratio"],
+        )  # fmt: skip
+        return Model(
+            mesh=mesh,
+            sheet=Sheet(**data["sheet"]),
+            supports=tuple(RigidBody() if s == "rigid-body" else Support(**s) for s in data["supports"]),
+            steps=tuple(tuple(_untagged(item, ACTUATIONS) for item in step) for step in data["steps"]),
+            creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
+            formulation=data["formulation"],
+        )
+    except (KeyError, TypeError) as missing:
+        raise PathFileError(f"the stored model is incomplete ({missing}); solve again") from missing
+
+
+def fingerprint(model: Model) -> str:
+    """SHA-256 of everything a model consists of (hex)."""
+    data, arrays = describe(model)
+    digest = hashlib.sha256(json.dumps(data, sort_keys=True).encode())
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def _plain(item: Any) -> dict[str, Any]:
+    return {f.name: _jsonable(getattr(item, f.name)) for f in fields(item)}
+
+
+def _tagged(item: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
+    kind = next(name for name, cls in kinds.items() if type(item) is cls)
+    return {"kind": kind, **_plain(item)}
+
+
+def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
+    rest = {key: value for key, value in data.items() if key != "kind"}
+    if data["kind"] == "polyline":
+        rest["vertices"] = np.asarray(rest["vertices"])
+    for key in ("start", "end", "centre"):
+        if isinstance(rest.get(key), list):
+            rest[key] = tuple(rest[key])
+    return kinds[data["kind"]](**rest)
+
+
+def _jsonable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, tuple | list):
+        return [_jsonable(item) for item in value]
+    return value

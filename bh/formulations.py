@@ -1,0 +1,53 @@
+"""Formulations, found through the entry-point group "bh.formulations", so that none is known by name here."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from importlib.metadata import entry_points
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from bh.model import Model
+from bh.program import StepProgram
+from bh.state import State
+
+GROUP = "bh.formulations"
+
+
+class Formulation(Protocol):
+    """Turns a description into a `bh.solvers.System` for one step, and reads states from its unknowns.
+
+    The system also has `start()`, the unknowns of the state that the step begins with, and
+    `positions(q, lam)`, the (n, 3) node positions.
+    """
+
+    name: str
+
+    def system(self, model: Model, program: StepProgram, start: State | None) -> Any: ...
+
+    def observe(
+        self, model: Model, system: Any, q: NDArray[np.float64], lam: float, step: int = 0, stable: bool | None = None
+    ) -> State: ...
+
+
+def names() -> list[str]:
+    """Names of all registered formulations."""
+    return sorted(point.name for point in entry_points(group=GROUP))
+
+
+@lru_cache(maxsize=None)
+def formulation(name: str) -> Formulation:
+    """The formulation of that name.
+
+    Raises:
+        ModelError: it is not registered; the message lists those that are.
+    """
+    for point in entry_points(group=GROUP):
+        if point.name == name:
+            made: Formulation = point.load()()
+            return made
+    known = ", ".join(names()) or "none; install the project with pip first"
+    raise ModelError(f"formulation '{name}' is not known; use one of: {known}")

@@ -1,0 +1,320 @@
+"""The equilibrium path of a model: solved, kept, saved, loaded and resumed."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path as FilePath
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.describe import describe, fingerprint, rebuild
+from bh.errors import ModelError, PathFileError
+from bh.formulations import Formulation, formulation
+from bh.model import Model
+from bh.program import StepProgram, program
+from bh.progress import ProgressMeter, meter
+from bh.solvers.continuation import Increment, LoadControl, Point, point
+from bh.solvers.trace import Walk, walk
+from bh.state import State
+from bh.storage import PathFile, StateRow
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepOutcome:
+    """How one step ended: "reached", or why not, with one line of reason."""
+
+    outcome: str
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One accepted state in the solver's terms."""
+
+    step: int
+    lam: float
+    q: Array
+    iterations: int
+    imbalance: float
+    stable: bool | None
+    wall_time_s: float
+    next_increment: float
+    note: str = ""
+    cuts: tuple[str, ...] = ()
+
+
+class Path:
+    """The accepted states of a model, in order, and how each step ended.
+
+    `path[i]` is the i-th `State` (read when asked for); `path[0]` is the state that the first step begins with.
+    """
+
+    def __init__(self, model: Model, provenance: dict[str, Any] | None = None) -> None:
+        self.model = model
+        self.provenance = provenance or _provenance(model)
+        self.records: list[Record] = []
+        self.steps: list[StepOutcome] = []
+        self._formulation: Formulation = formulation(model.formulation)
+        self._programs: tuple[StepProgram, ...] = program(model)
+        self._systems: dict[int, Any] = {}
+        self._states: dict[int, State] = {}
+
+    # ------------------------------------------------------------------------------- reading
+
+    @property
+    def outcome(self) -> str:
+        """ "reached" if every step was; else the outcome of the first step that was not."""
+        for step in self.steps:
+            if step.outcome != "reached":
+                return step.outcome
+        return "reached" if len(self.steps) == len(self.model.steps) else "unfinished"
+
+    @property
+    def reason(self) -> str:
+        """Why the path ended early, or an empty string."""
+        return next((step.reason for step in self.steps if step.outcome != "reached"), "")
+
+    @property
+    def iterations(self) -> int:
+        return sum(record.iterations for record in self.records)
+
+    @property
+    def wall_time_s(self) -> float:
+        """Time spent in the solver, s."""
+        return sum(record.wall_time_s for record in self.records)
+
+    @property
+    def unknowns(self) -> int:
+        return len(self.records[-1].q) if self.records else 0
+
+    @property
+    def lambdas(self) -> Array:
+        """(states,) step + lambda of every state: 1.25 is a quarter of the second step."""
+        return np.array([record.step + record.lam for record in self.records])
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    @overload
+    def __getitem__(self, index: int) -> State: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[State]: ...
+
+    def __getitem__(self, index: int | slice) -> State | list[State]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        index = range(len(self))[index]
+        if index not in self._states:
+            record = self.records[index]
+            self._states[index] = self._formulation.observe(
+                self.model, self._system(record.step), record.q, record.lam, record.step, record.stable
+            )
+        return self._states[index]
+
+    def __iter__(self) -> Iterator[State]:
+        return (self[i] for i in range(len(self)))
+
+    def plot(self, **options: Any) -> Any:
+        """Show the last state as a picture; options of `bh.plotting.show`."""
+        from bh.plotting import show
+
+        return show(self[-1], **options)
+
+    # ------------------------------------------------------------------------------- files
+
+    def save(self, file: str | FilePath) -> None:
+        """Write everything to one file; see `bh.storage`. Replaces an older file of that name.
+
+        Raises:
+            PathFileError: the file cannot be written.
+        """
+        target = _new_file(self, FilePath(file))
+        for index, record in enumerate(self.records):
+            target.add(self._row(index, record))
+        for step, end in enumerate(self.steps):
+            target.finish_step(step, end.outcome, end.reason)
+        target.close()
+
+    @classmethod
+    def load(cls, file: str | FilePath) -> Path:
+        """Read a saved path, also one of a run that was killed.
+
+        Raises:
+            PathFileError: no such file, or not a path file.
+        """
+        source = PathFile.open(FilePath(file))
+        try:
+            meta = source.meta()
+            path = cls(rebuild(meta["model"], source.arrays()), meta["provenance"])
+            for row in source.states():
+                path.records.append(_record(row))
+            ends = source.steps()
+            path.steps = [StepOutcome(*ends[step]) for step in sorted(ends)]
+        except KeyError as missing:
+            raise PathFileError(f"'{file}' has no {missing}; give a file that bh has written") from missing
+        finally:
+            source.close()
+        return path
+
+    def _row(self, index: int, record: Record) -> StateRow:
+        energy = self[index].energy
+        return StateRow(
+            record.step, record.lam, record.iterations, record.imbalance, record.stable, record.wall_time_s,
+            record.next_increment, (energy.stretching, energy.bending, energy.folding), record.note, record.cuts,
+            record.q, self[index].points,
+        )  # fmt: skip
+
+    def _system(self, step: int) -> Any:
+        """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
+        if step not in self._systems:
+            start = None
+            if step > 0:
+                last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
+                start = None if last is None else self[last]
+            self._systems[step] = self._formulation.system(self.model, self._programs[step], start)
+        return self._systems[step]
+
+
+def trace(
+    model: Model,
+    *,
+    progress: bool | ProgressMeter = False,
+    strategy: LoadControl | None = None,
+    file: str | FilePath | None = None,
+    resume: bool = False,
+) -> Path:
+    """Follow the equilibrium of `model` through all its steps.
+
+    Args:
+        progress: True for a bar in the terminal, or an object that is told about every increment.
+        strategy: how increments are chosen; the default suits all scenes.
+        file: write every accepted state to this file before the next increment begins.
+        resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
+
+    Returns:
+        the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
+        its reason and keeps everything up to there.
+
+    Raises:
+        ModelError: the model has no steps, or cannot be solved as described.
+        PathFileError: the file cannot be written, or is of another model.
+    """
+    if not model.steps:
+        raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
+    strategy = strategy or LoadControl()
+    path = Path(model)
+    target: PathFile | None = None
+    if file is not None:
+        if resume:
+            path, target = _resume(model, FilePath(file))
+        else:
+            target = _new_file(path, FilePath(file))
+    report = meter(progress)
+    try:
+        for step in range(len(path.steps), len(model.steps)):
+            end = _run_step(path, step, strategy, report, target)
+            path.steps.append(end)
+            if target is not None:
+                target.finish_step(step, end.outcome, end.reason)
+            if end.outcome != "reached":
+                break
+    finally:
+        report.close(path.outcome)
+        if target is not None:
+            target.close()
+    return path
+
+
+def _run_step(
+    path: Path, step: int, strategy: LoadControl, report: ProgressMeter, target: PathFile | None
+) -> StepOutcome:
+    system = path._system(step)
+    began = time.perf_counter()
+
+    def accept(record: Record) -> None:
+        path.records.append(record)
+        if target is not None:
+            target.add(path._row(len(path.records) - 1, record))
+
+    done = [record for record in path.records if record.step == step]
+    if not done:
+        q = system.start()
+        here = point(system, q, 0.0)
+        if step == 0:
+            imbalance = system.evaluate(q, 0.0).imbalance
+            accept(Record(0, 0.0, q, 0, imbalance, None, time.perf_counter() - began, strategy.limits(system)[0]))
+            began = time.perf_counter()
+        history, increment = [here], None
+    else:
+        history, increment = [point(system, record.q, record.lam) for record in done[-3:]], done[-1].next_increment
+        if len(done) < 3 and (step > 0 or done[0].lam == 0.0) and done[0].lam > 0.0:
+            history.insert(0, point(system, system.start(), 0.0))
+    journey: Iterator[Increment] = walk(Walk(system, strategy, tuple(history), increment))
+    for increment_ in journey:
+        now = time.perf_counter()
+        if increment_.outcome != "reached":
+            return StepOutcome(increment_.outcome, increment_.note)
+        at: Point = increment_.point
+        accept(
+            Record(
+                step, at.lam, at.q, increment_.iterations, increment_.imbalance, increment_.stable, now - began,
+                increment_.next_increment, increment_.note, increment_.cuts,
+            )  # fmt: skip
+        )
+        report.update(step, len(path.model.steps), at.lam, increment_.iterations, at.energy)
+        began = time.perf_counter()
+    return StepOutcome("reached")
+
+
+def _new_file(path: Path, file: FilePath) -> PathFile:
+    data, arrays = describe(path.model)
+    return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)
+
+
+def _resume(model: Model, file: FilePath) -> tuple[Path, PathFile]:
+    path = Path.load(file)
+    if path.provenance.get("input") != fingerprint(model):
+        raise PathFileError(f"'{file}' holds another model; run without --resume, or choose another output folder")
+    path = _with_model(path, model)
+    target = PathFile.open(file)
+    target.forget_failed_steps()
+    path.steps = [step for step in path.steps if step.outcome == "reached"]
+    return path, target
+
+
+def _with_model(path: Path, model: Model) -> Path:
+    other = Path(model, path.provenance)
+    other.records, other.steps = path.records, path.steps
+    return other
+
+
+def _record(row: StateRow) -> Record:
+    return Record(
+        row.step, row.lam, row.q, row.iterations, row.imbalance, row.stable, row.wall_time_s, row.next_increment,
+        row.note, row.cuts,
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def versions() -> dict[str, str]:
+    """Versions of the project and of what its numbers depend on."""
+    found = {"python": platform.python_version()}
+    for name in ("curved-crease-workbench", "numpy", "scipy", "numba"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found
+
+
+def _provenance(model: Model) -> dict[str, Any]:
+    return {"input": fingerprint(model), "versions": versions(), "formulation": model.formulation}

@@ -1,0 +1,354 @@
+"""FOLD files, version 1.2 (https://github.com/edemaine/fold/blob/main/doc/spec.md), to and from `SheetMesh`.
+
+FOLD's fold angles are degrees, valley positive; ours are rad, mountain positive. Frames count as in FOLD: 0 is the
+key frame (the top of the file), i + 1 is `file_frames[i]`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from meshes.curves import Array
+from meshes.errors import FileFormatError, InputError, MeshError
+from meshes.io.export import replacing, shown
+from meshes.mesh import SheetMesh
+from meshes.pattern import FoldKind
+from meshes.topology import Ints, boundary_loops, build
+
+UNITS = {
+    "unit": 1.0, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "pt": 25.4 / 72.0, "um": 1e-3, "nm": 1e-6,
+}  # fmt: skip
+LETTERS = "MVFBUCJ"
+FOLDS: dict[str, FoldKind] = {"M": "mountain", "V": "valley"}
+SETS = {"F": "edge:flat", "U": "edge:unassigned", "J": "edge:join"}
+LIMIT = 1e12  # mm; beyond it products of coordinates lose all meaning
+THIN = 1e-10  # doubled area over longest side squared of a triangle that counts as degenerate (as in SheetMesh)
+STRAIGHT = 1e-3  # rad; files give coordinates to some six digits
+
+Face = list[list[int]]  # rings of vertices: the outside, then holes the other way round
+Side = tuple[int, int]  # two vertices, the smaller one first
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """One frame, checked: what the file says about points (n, 3) in mm, edges and faces."""
+
+    points: Array
+    edges: list[Side]
+    letters: list[str]
+    angles: list[float] | None  # degrees, valley positive; nan where the file has null
+    faces: list[Face]
+
+    @property
+    def flat(self) -> bool:
+        return bool(np.ptp(self.points[:, 2]) <= 1e-9 * np.linalg.norm(np.ptp(self.points, axis=0)))
+
+
+def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMesh:
+    """The sheet of one frame of a FOLD file, with faces triangulated, in mm.
+
+    Vertices keep their order; those that belong to no face are dropped. Faces are turned to agree with each other,
+    and counter-clockwise from +z where the sheet is flat: mountain and valley then are as seen from +z. A frame
+    without faces_vertices gets them from its edges if these are a plane graph; edges assigned B outline holes.
+
+    The edge sets are "crease:mountain" and "crease:valley" (all such edges), their chains "crease:m1", ...,
+    "crease:v1", ... in the order of the file, "edge:boundary", and where there are any "edge:flat" (F),
+    "edge:unassigned" (U, or not in edges_vertices), "edge:join" (J) and "edge:facet" (added to cut faces into
+    triangles). `fold_angles` are there if the file has edges_foldAngle (nan for a null).
+
+    Args:
+        frame: 0 for the key frame, i + 1 for file_frames[i]; None for the first frame that has vertices.
+
+    Raises:
+        FileFormatError: the file cannot be read, is not FOLD, or its frame is not one manifold sheet.
+    """
+    import shapely
+
+    try:
+        return _sheet(_checked(_select(_load(path), frame)))
+    except (InputError, shapely.errors.ShapelyError) as error:
+        text = " ".join(str(error).split())
+        raise FileFormatError(f"{shown(path)}: {text}") from error
+
+
+# --- the file -------------------------------------------------------------------------------------------------
+
+
+def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
+    def refuse(constant: str) -> None:
+        raise FileFormatError(f"{constant} is not JSON; write a number")
+
+    try:
+        text = Path(path).read_bytes().decode("utf-8-sig")
+        if not text.strip():
+            raise FileFormatError("the file is empty; give a FOLD file")
+        data = json.loads(text, parse_constant=refuse)
+    except IsADirectoryError as error:
+        raise FileFormatError("this is a folder; name a .fold file in it") from error
+    except OSError as error:
+        raise FileFormatError(f"the file cannot be read ({error.strerror}); check its name and rights") from error
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
+    except RecursionError as error:
+        raise FileFormatError("brackets are nested too deeply; FOLD has no more than lists of lists") from error
+    except FileFormatError:
+        raise
+    except ValueError as error:  # JSON errors, numbers of thousands of digits, null characters in the path
+        raise FileFormatError(f"this is not JSON ({str(error)[:80]}); mend it or export it again") from error
+    if not isinstance(data, dict):
+        raise FileFormatError(f"the top of the file is {_show(data)}; a FOLD file is a JSON object {{...}}")
+    return data
+
+
+def _select(data: dict[str, Any], frame: int | None) -> dict[str, Any]:
+    """The frame asked for, with all it inherits."""
+    frames = [data, *_list(data, "file_frames")]
+    for number, each in enumerate(frames):
+        if not isinstance(each, dict):
+            raise FileFormatError(f"file_frames[{number - 1}] is {_show(each)}; a frame is an object {{...}}")
+    if frame is not None:
+        if isinstance(frame, bool) or not isinstance(frame, int | np.integer) or not 0 <= frame < len(frames):
+            raise FileFormatError(f"there is no frame {frame!r}; the file has frames 0 to {len(frames) - 1}")
+        return _inherited(frames, int(frame))
+    for number in range(len(frames)):
+        found = _inherited(frames, number)
+        if found.get("vertices_coords"):
+            return found
+    raise FileFormatError("no frame has vertices_coords; give the coordinates of the vertices")
+
+
+def _inherited(frames: list[dict[str, Any]], number: int) -> dict[str, Any]:
+    line = [number]
+    while True:
+        inherit = frames[line[-1]].get("frame_inherit", False)
+        if not isinstance(inherit, bool):
+            raise FileFormatError(f"frame_inherit of frame {line[-1]} is {_show(inherit)}; use true or false")
+        if not inherit:
+            break
+        parent = frames[line[-1]].get("frame_parent")
+        parent = _index(parent, len(frames), f"frame_parent of frame {line[-1]}")
+        if parent in line:
+            raise FileFormatError(f"frame {line[-1]} inherits from itself through frame {parent}; break the circle")
+        line.append(parent)
+    merged: dict[str, Any] = {}
+    for each in reversed(line):
+        merged.update(frames[each])
+    return merged
+
+
+def _checked(frame: dict[str, Any]) -> _Frame:
+    points = _points(frame)
+    count = len(points)
+    edges: list[Side] = []
+    numbers: dict[Side, int] = {}
+    for number, pair in enumerate(_list(frame, "edges_vertices")):
+        what = f"edges_vertices[{number}]"
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise FileFormatError(f"{what} is {_show(pair)}; an edge is a list of two vertex numbers")
+        a, b = (_index(vertex, count, f"a vertex of {what}") for vertex in pair)
+        if a == b:
+            raise FileFormatError(f"{what} joins vertex {a} to itself; remove it")
+        if _side(a, b) in numbers:
+            raise FileFormatError(f"{what} repeats edge {numbers[_side(a, b)]} ({a}-{b}); remove one of them")
+        numbers[_side(a, b)] = number
+        edges.append((a, b))
+    angles = _angles(frame, len(edges))
+    letters = _letters(frame, len(edges), angles)
+    faces: list[Face] = []
+    for number, ring in enumerate(_list(frame, "faces_vertices")):
+        what = f"faces_vertices[{number}]"
+        if not isinstance(ring, list) or len(ring) < 3:
+            raise FileFormatError(f"{what} is {_show(ring)}; a face is a list of three or more vertex numbers")
+        ring = [_index(vertex, count, f"a vertex of {what}") for vertex in ring]
+        if len(set(ring)) < len(ring):
+            raise FileFormatError(f"{what} uses a vertex twice; give every corner once and split faces with slits")
+        faces.append([ring])
+    if not faces and not edges:
+        raise FileFormatError("the frame has no faces_vertices and no edges_vertices; give one of them")
+    return _Frame(points, edges, letters, angles, faces)
+
+
+def _points(frame: dict[str, Any]) -> Array:
+    unit = frame.get("frame_unit", "unit")
+    if not isinstance(unit, str) or unit not in UNITS:
+        raise FileFormatError(f"frame_unit {_show(unit)} is not known; use one of {', '.join(UNITS)}")
+    rows = _list(frame, "vertices_coords")
+    if not rows:
+        raise FileFormatError("the frame has no vertices_coords; give [x, y] or [x, y, z] for every vertex")
+    points = np.zeros((len(rows), 3))
+    for vertex, row in enumerate(rows):
+        if not isinstance(row, list) or len(row) not in (2, 3):
+            raise FileFormatError(f"vertices_coords[{vertex}] is {_show(row)}; give [x, y] or [x, y, z]")
+        for axis, value in enumerate(row):
+            if not _is_number(value) or not abs(value) <= LIMIT / UNITS[unit]:
+                raise FileFormatError(
+                    f"vertices_coords[{vertex}] holds {_show(value)}; give numbers of a size below {LIMIT:g} mm"
+                )
+            points[vertex, axis] = value
+    return points * UNITS[unit]
+
+
+def _angles(frame: dict[str, Any], count: int) -> list[float] | None:
+    if frame.get("edges_foldAngle") is None:
+        return None
+    values = _list(frame, "edges_foldAngle")
+    _same_length("edges_foldAngle", len(values), count)
+    for edge, value in enumerate(values):
+        if value is not None and not (_is_number(value) and abs(value) <= 180.0 + 1e-9):
+            raise FileFormatError(f"edges_foldAngle[{edge}] is {_show(value)}; give degrees from -180 to 180")
+    return [math.nan if value is None else float(value) for value in values]
+
+
+def _letters(frame: dict[str, Any], count: int, angles: list[float] | None) -> list[str]:
+    if frame.get("edges_assignment") is None:  # then the sign of the angle says which crease it is
+        return ["M" if angle < 0.0 else "V" if angle > 0.0 else "U" for angle in angles or [0.0] * count]
+    letters = _list(frame, "edges_assignment")
+    _same_length("edges_assignment", len(letters), count)
+    for edge, letter in enumerate(letters):
+        if not isinstance(letter, str) or len(letter) != 1 or letter not in LETTERS:
+            raise FileFormatError(f"edges_assignment[{edge}] is {_show(letter)}; use one of {', '.join(LETTERS)}")
+    return letters
+
+
+def _same_length(key: str, length: int, count: int) -> None:
+    if length != count:
+        raise FileFormatError(f"{key} has {length} entries for {count} edges_vertices; give one an edge")
+
+
+def _list(frame: dict[str, Any], key: str) -> list[Any]:
+    value = frame.get(key)
+    if value is None:
+        return []
+    if not isinstance(value, list):
+        raise FileFormatError(f"{key} is {_show(value)}; give a list")
+    return value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _index(value: object, count: int, what: str) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < count:
+        raise FileFormatError(f"{what} is {_show(value)}; use a whole number from 0 to {count - 1}")
+    return value
+
+
+def _show(value: object) -> str:
+    """A JSON value in a few characters of ASCII on one line (lists and objects can be nested deeply)."""
+    if isinstance(value, dict | list):
+        return "an object" if isinstance(value, dict) else f"a list of {len(value)}"
+    text = json.dumps(value)
+    return text if len(text) <= 40 else f"{text[:36]} ..."
+
+
+def _side(a: int, b: int) -> Side:
+    return (a, b) if a < b else (b, a)
+
+
+# --- faces ----------------------------------------------------------------------------------------------------
+
+
+def _directed(face: Face) -> list[tuple[int, int]]:
+    return [(ring[i - 1], ring[i]) for ring in face for i in range(len(ring))]
+
+
+def _sides(faces: Sequence[Face]) -> dict[Side, list[int]]:
+    """The one or two faces at every side."""
+    sides: dict[Side, list[int]] = {}
+    for number, face in enumerate(faces):
+        for a, b in _directed(face):
+            sides.setdefault(_side(a, b), []).append(number)
+    for (a, b), at in sides.items():
+        if len(at) > 2:
+            raise FileFormatError(
+                f"edge {a}-{b} belongs to {len(at)} faces (non-manifold): {at[0]}, {at[1]}, {at[2]}; "
+                "a sheet has one or two faces an edge"
+            )
+    return sides
+
+
+def _faces_of_graph(frame: _Frame) -> list[Face]:
+    """The bounded faces of a plane graph, without the holes that B edges outline."""
+    import shapely
+
+    if not frame.flat:
+        raise FileFormatError("a frame in space has no faces_vertices; faces can be built from flat edges only")
+    _check_plane_graph(frame)
+    xy = frame.points[:, :2]
+    vertex = {tuple(xy[v]): v for edge in frame.edges for v in edge}
+    polygons = shapely.polygonize(shapely.linestrings(xy[np.array(frame.edges)])).geoms
+    faces = []
+    for polygon in shapely.orient_polygons(np.array(list(polygons), dtype=object)):
+        rings = [np.asarray(ring.coords)[:-1] for ring in (polygon.exterior, *polygon.interiors)]
+        faces.append([[vertex[tuple(point)] for point in ring] for ring in rings])
+    sides = _sides(faces)
+    for number, (a, b) in enumerate(frame.edges):
+        if _side(a, b) not in sides:
+            raise FileFormatError(
+                f"edge {number} ({a}-{b}) hangs loose: it has the same face on both sides; "
+                "lengthen its line to another one or remove it"
+            )
+    inside = _inside(frame, sides, len(faces))
+    return [face for number, face in enumerate(faces) if inside[number]]
+
+
+def _check_plane_graph(frame: _Frame) -> None:
+    import shapely
+
+    xy, edges = frame.points[:, :2], np.array(frame.edges)
+    size = float(np.linalg.norm(np.ptp(xy, axis=0)))
+    lines = shapely.linestrings(xy[edges])
+    tree = shapely.STRtree(lines)
+    used = np.unique(edges)
+    at, on = tree.query(shapely.points(xy[used]), predicate="dwithin", distance=1e-9 * size)
+    for v, edge in zip(used[at].tolist(), on.tolist(), strict=True):
+        if v not in frame.edges[edge]:
+            raise FileFormatError(
+                f"vertex {v} lies on edge {edge} ({edges[edge][0]}-{edges[edge][1]}) that does not end there; "
+                "split the edge at the vertex or merge vertices in one place"
+            )
+    for i, j in tree.query(lines, predicate="intersects").T.tolist():
+        if i < j and not set(frame.edges[i]) & set(frame.edges[j]):
+            raise FileFormatError(f"edges {i} and {j} cross; give them a vertex where they meet")
+
+
+def _inside(frame: _Frame, sides: dict[Side, list[int]], count: int) -> list[bool]:
+    """Which faces are sheet: those at the outside are, and a closed line of B edges leads into a hole or out."""
+    steps: list[list[tuple[int, bool, int]]] = [[] for _ in range(count)]
+    inside: list[bool | None] = [None] * count
+    for number, (a, b) in enumerate(frame.edges):
+        at = sides[_side(a, b)]
+        if len(at) == 1:
+            inside[at[0]] = True
+        else:
+            change = frame.letters[number] == "B"
+            steps[at[0]].append((at[1], change, number))
+            steps[at[1]].append((at[0], change, number))
+    todo = [face for face in range(count) if inside[face]]
+    # all other edges first: a conflict then shows at a B edge
+    for through_border in (False, True, False):
+        pass
+    while todo:
+        face = todo.pop()
+        for other, change, number in steps[face]:
+            value = bool(inside[face]) != change
+            if inside[other] is None:
+                inside[other] = value
+                todo.append(other)
+            elif inside[other] != value:
+                a, b = frame.edges[number]
+                raise FileFormatError(
+                    f"edges assigned B do not part the sheet from a hole at edge {number} ({a}-{b}); "
+                    "close their line round the hole, or assign M, V, F or U inside the sheet"
+                )
+    return [bool(value) for value in inside]
