@@ -11,6 +11,7 @@ from bh.solvers.matrices import Factor, Indefinite, Matrix
 from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
+NEUTRAL = 1e-13  # shift, in parts of the diagonal, at which an eigenvalue is zero but for rounding
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,13 @@ class Newton:
     Attributes:
         tolerance: on `Evaluation.imbalance`.
         bold, careful: most iterations of either way.
+        bold_shift: largest shift of the bold way; a tangent that is more indefinite asks for the careful one.
     """
 
     tolerance: float = 1e-8
     bold: int = 14
-    careful: int = 80
+    careful: int = 200
+    bold_shift: float = 1e-5
 
     def solve(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
         """Equilibrium at `lam` from the guess `q`; `forces` are the element forces that go with the guess."""
@@ -66,9 +69,8 @@ class Newton:
         for iteration in range(self.bold):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=False)
-            try:
-                factor = system.tangent(q, lam, forces).factorise()
-            except Indefinite:
+            factor, _ = factorise_shifted(system.tangent(q, lam, forces), 0.0, self.bold_shift)
+            if factor is None:
                 return Solution(q, now, iteration, False, "indefinite tangent")
             dq = -factor.solve(now.residual)
             forces = system.predicted_forces(now.forces, dq)
@@ -107,22 +109,26 @@ class Newton:
     @staticmethod
     def _finish(system: System, q: Array, lam: float, now: Evaluation, iterations: int, careful: bool) -> Solution:
         try:
-            system.tangent(q, lam, now.forces).factorise()
+            system.tangent(q, lam, now.forces).factorise(NEUTRAL)
             stable = True
         except Indefinite:
             stable = False
         return Solution(q, now, iterations, True, "", stable, careful)
 
 
-def factorise_shifted(matrix: Matrix, shift: float) -> tuple[Factor | None, float]:
-    """The factor with the smallest tried shift (in parts of the diagonal) that makes the matrix positive definite."""
+def factorise_shifted(matrix: Matrix, shift: float, largest: float = 1e6) -> tuple[Factor | None, float]:
+    """The factor with the smallest tried shift (in parts of the diagonal) that makes the matrix positive definite.
+
+    Neutral modes, such as the phase of the waves of a buckled ring, are first given a stiffness at the level of
+    rounding. Returns None where the shift would exceed `largest`.
+    """
     if shift < 1e-9:
         shift = 0.0
-    for _ in range(40):
+    while shift <= largest:
         try:
             return matrix.factorise(shift), shift
         except Indefinite:
-            shift = max(4.0 * shift, 1e-7)
+            shift = NEUTRAL if shift == 0.0 else max(4.0 * shift, 1e-9)
     return None, shift
 
 

@@ -324,31 +324,204 @@ def _check_plane_graph(frame: _Frame) -> None:
 
 def _inside(frame: _Frame, sides: dict[Side, list[int]], count: int) -> list[bool]:
     """Which faces are sheet: those at the outside are, and a closed line of B edges leads into a hole or out."""
-    steps: list[list[tuple[int, bool, int]]] = [[] for _ in range(count)]
     inside: list[bool | None] = [None] * count
-    for number, (a, b) in enumerate(frame.edges):
-        at = sides[_side(a, b)]
+    near: list[list[int]] = [[] for _ in range(count)]
+    borders: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+    for number, edge in enumerate(frame.edges):
+        at = sides[_side(*edge)]
         if len(at) == 1:
             inside[at[0]] = True
-        else:
-            change = frame.letters[number] == "B"
-            steps[at[0]].append((at[1], change, number))
-            steps[at[1]].append((at[0], change, number))
+            continue
+        for face, other in (at, at[::-1]):
+            if frame.letters[number] == "B":
+                borders[face].append((other, number))
+            else:
+                near[face].append(other)
     todo = [face for face in range(count) if inside[face]]
-    # all other edges first: a conflict then shows at a B edge
-    for through_border in (False, True, False):
-        pass
-    while todo:
-        face = todo.pop()
-        for other, change, number in steps[face]:
-            value = bool(inside[face]) != change
+    crossings: list[tuple[int, int, int]] = []
+    while todo or crossings:
+        if todo:  # borders wait until their region is through, so that a conflict shows at the wrong border
+            face = todo.pop()
+            crossings += [(face, other, number) for other, number in borders[face]]
+            reached, value = near[face], bool(inside[face])
+        else:
+            face, other, number = crossings.pop()
+            reached, value = [other], not inside[face]
+            if inside[other] is not None and inside[other] != value:
+                a, b = frame.edges[number]
+                raise FileFormatError(
+                    f"edge {number} ({a}-{b}) is assigned B but does not part the sheet from a hole; "
+                    "close its line round the hole, or assign M, V, F or U"
+                )
+        for other in reached:
             if inside[other] is None:
                 inside[other] = value
                 todo.append(other)
-            elif inside[other] != value:
-                a, b = frame.edges[number]
-                raise FileFormatError(
-                    f"edges assigned B do not part the sheet from a hole at edge {number} ({a}-{b}); "
-                    "close their line round the hole, or assign M, V, F or U inside the sheet"
-                )
     return [bool(value) for value in inside]
+
+
+def _orient(frame: _Frame, faces: list[Face], sides: dict[Side, list[int]]) -> list[Face]:
+    """The faces of one sheet, turned to agree: with +z where it is flat, else with most of the file's faces."""
+    ahead = [set(_directed(face)) for face in faces]
+    turned: list[bool | None] = [None] * len(faces)
+    turned[0] = False
+    todo = [0]
+    while todo:
+        face = todo.pop()
+        for a, b in ahead[face]:
+            for other in sides[_side(a, b)]:
+                if other == face:
+                    continue
+                value = bool(turned[face]) != ((a, b) in ahead[other])
+                if turned[other] is None:
+                    turned[other] = value
+                    todo.append(other)
+                elif turned[other] != value:
+                    raise FileFormatError(
+                        f"faces {face} and {other} have no common side up (a one-sided band); cut the band open"
+                    )
+    if None in turned:
+        raise FileFormatError(
+            f"faces 0 and {turned.index(None)} are not joined through common edges; a file holds one sheet"
+        )
+    against = sum(map(bool, turned)) > len(faces) / 2
+    if frame.flat:
+        areas = [_area(frame.points[:, :2], face) for face in faces]
+        against = sum(-area if turn else area for area, turn in zip(areas, turned, strict=True)) < 0.0
+    return [
+        [ring[::-1] for ring in face] if turn != against else face
+        for face, turn in zip(faces, turned, strict=True)
+    ]
+
+
+def _area(xy: Array, face: Face) -> float:
+    """Signed area, counter-clockwise positive; from the first vertex, so that far-off sheets lose no digits."""
+    total = 0.0
+    for ring in face:
+        x, y = (xy[ring] - xy[face[0][0]]).T
+        total += 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+    return total
+
+
+# --- triangles ------------------------------------------------------------------------------------------------
+
+
+def _triangulate(points: Array, face: Face, flat: bool) -> list[list[int]]:
+    """Triangles (vertex numbers) of one face, turned as the face is; `points` (n, 3).
+
+    Raises:
+        FileFormatError: the face has no area or is no simple polygon (in space: seen along its mean normal).
+    """
+    import shapely
+
+    vertices = [vertex for ring in face for vertex in ring]
+    xyz = points[vertices] - points[vertices[0]]
+    xy = xyz[:, :2] if flat else _projected(xyz)
+    triangles = [[0, 1, 2]]
+    if len(vertices) > 3:
+        ends = np.cumsum([len(ring) for ring in face])
+        outside, *holes = np.split(xy, ends[:-1])
+        polygon = shapely.Polygon(outside, holes)
+        if not polygon.is_valid:
+            raise FileFormatError(f"is not a simple polygon ({shapely.is_valid_reason(polygon)}); redraw it")
+        if len(vertices) == 4:
+            triangles = _halves(xy, xyz, vertices)
+        else:
+            triangles = _delaunay(polygon, xy, len(vertices) + 2 * len(holes) - 2)
+    if min(_fullness(xy, triangle) for triangle in triangles) <= THIN:
+        raise FileFormatError("has no area or corners in one place; remove it or merge its vertices")
+    return [[vertices[i] for i in triangle] for triangle in triangles]
+
+
+def _projected(xyz: Array) -> Array:
+    """(k, 2) positions of a ring in space in the plane of its mean normal, counter-clockwise."""
+    after = np.roll(xyz, -1, axis=0)
+    normal = np.cross(xyz, after).sum(axis=0)
+    steps = np.linalg.norm(after - xyz, axis=1)
+    if np.linalg.norm(normal) <= THIN * steps.max() ** 2:
+        raise FileFormatError("has no area; remove it or move its vertices apart")
+    normal /= np.linalg.norm(normal)
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    first /= np.linalg.norm(first)
+    return xyz @ np.column_stack((first, np.cross(normal, first)))
+
+
+def _fullness(xy: Array, triangle: Sequence[int]) -> float:
+    """Doubled signed area over the square of the longest side."""
+    a, b, c = xy[list(triangle)].tolist()
+    sides = [(q[0] - p[0], q[1] - p[1]) for p, q in ((a, b), (b, c), (c, a))]
+    longest = max(x * x + y * y for x, y in sides)
+    return (sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0]) / longest if longest > 0.0 else 0.0
+
+
+def _halves(xy: Array, xyz: Array, vertices: list[int]) -> list[list[int]]:
+    """A quadrilateral cut along its shorter diagonal; of two alike, the one at the smallest vertex number."""
+    cuts = [[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]]
+    full = [min(_fullness(xy, triangle) for triangle in cut) for cut in cuts]
+    if min(full) <= 1e-6:  # a corner that is straight or points inwards leaves one choice only
+        return cuts[int(full[1] > full[0])]
+    lengths = [float(np.linalg.norm(xyz[i + 2] - xyz[i])) for i in range(2)]
+    if abs(lengths[0] - lengths[1]) <= 1e-9 * lengths[0]:
+        return cuts[vertices.index(min(vertices)) % 2]
+    return cuts[int(lengths[1] < lengths[0])]
+
+
+def _delaunay(polygon: Any, xy: Array, count: int) -> list[list[int]]:
+    """`count` constrained Delaunay triangles of a polygon with corners `xy`."""
+    import shapely
+
+    corner = {tuple(point): i for i, point in enumerate(xy.tolist())}
+    parts = shapely.constrained_delaunay_triangles(polygon).geoms
+    triangles = [[corner[point] for point in part.exterior.coords[:3]] for part in parts]
+    if len(corner) < len(xy) or len(triangles) != count:
+        raise FileFormatError("cannot be cut into triangles; merge vertices in one place or give triangles")
+    if sum(_fullness(xy, triangle) for triangle in triangles) < 0.0:
+        triangles = [triangle[::-1] for triangle in triangles]
+    # vertices on straight sides may have left triangles without area: these go as sides are turned
+    at = {(t[i - 1], t[i]): number for number, t in enumerate(triangles) for i in range(3)}
+    todo = sorted(side for side in at if side[0] < side[1])
+    for _ in range(100 * count * count):
+        if not todo:
+            break
+        a, b = todo.pop()
+        if (a, b) not in at or (b, a) not in at:
+            continue
+        one, two = at[a, b], at[b, a]
+        c, d = (next(v for v in triangles[t] if v not in (a, b)) for t in (one, two))
+        if not _turns(xy, a, b, c, d):
+            continue
+        del at[a, b], at[b, a]
+        triangles[one], triangles[two] = [a, d, c], [d, b, c]
+        for number in (one, two):
+            t = triangles[number]
+            at.update({(t[i - 1], t[i]): number for i in range(3)})
+        todo += [(a, d), (d, b), (b, c), (c, a)]
+    return triangles
+
+
+def _turns(xy: Array, a: int, b: int, c: int, d: int) -> bool:
+    """Whether side a-b of triangles a, b, c and b, a, d is better c-d: the angles at c and d exceed pi in sum."""
+    ca, cb, da, db = (complex(*(xy[q] - xy[p])) for p, q in ((c, a), (c, b), (d, a), (d, b)))
+    if not (ca and cb and da and db):
+        return False
+    product = (cb / ca) * (da / db)  # its argument is the sum of both angles
+    return product.imag < -1e-9 * abs(product) and min(_fullness(xy, [a, d, c]), _fullness(xy, [d, b, c])) > 0.0
+
+
+# --- the sheet ------------------------------------------------------------------------------------------------
+
+
+def _sheet(frame: _Frame) -> SheetMesh:
+    faces = frame.faces or _faces_of_graph(frame)
+    sides = _sides(faces)
+    _check_edges(frame, sides)
+    faces = _orient(frame, faces, sides)
+    corners: list[list[int]] = []
+    for number, face in enumerate(faces):
+        try:
+            corners += _triangulate(frame.points, face, frame.flat)
+        except FileFormatError as error:
+            more = ", ..." if len(face[0]) > 5 else ""
+            names = ", ".join(map(str, face[0][:5])) + more
+            raise FileFormatError(f"face {number} (vertices {names}) {error}") from error
+    return SheetMesh()
