@@ -109,26 +109,32 @@ def resolve(
         ModelError: supports contradict each other, or leave rigid motions free.
     """
     supports, prescribed = list(supports), list(prescribed)
-    wanted: dict[int, list[tuple[Array, float, float]]] = {}
+    n = len(mesh.points)
+    fixed = np.zeros((n, 3), dtype=bool)
+    oblique: dict[int, list[tuple[Array, float, float]]] = {}
     rigid_body = not supports and not prescribed
     for support in supports:
         if isinstance(support, RigidBody):
             rigid_body = True
             continue
+        nodes = select(mesh, support.at)
         for direction in directions(support.fix):
-            for node in select(mesh, support.at).tolist():
-                wanted.setdefault(node, []).append((direction, 0.0, 0.0))
+            if np.abs(direction).max() == 1.0:
+                fixed[nodes, int(np.abs(direction).argmax())] = True
+            else:
+                for node in nodes.tolist():
+                    oblique.setdefault(node, []).append((direction, 0.0, 0.0))
     for item in prescribed:
         for node in item.nodes.tolist():
             direction = np.asarray(item.direction, dtype=float)
-            wanted.setdefault(node, []).append((direction, item.start, item.end))
+            oblique.setdefault(node, []).append((direction, item.start, item.end))
 
-    n = len(mesh.points)
-    fixed = np.zeros((n, 3), dtype=bool)
     start, end = np.zeros((n, 3)), np.zeros((n, 3))
     frame_of = np.full(n, -1, dtype=np.int64)
     frames: list[Array] = []
-    for node, rows in wanted.items():
+    for node, extra in oblique.items():
+        rows = [(axis, 0.0, 0.0) for axis in np.eye(3)[fixed[node]]] + extra
+        fixed[node] = False
         axes, values = _orthonormal(node, rows)
         aligned = (np.abs(axes).max(axis=1) > 1.0 - 1e-12).all()
         if aligned:

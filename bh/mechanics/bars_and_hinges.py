@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from bh.actuation import Ramp
@@ -27,7 +26,7 @@ from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness, sheet_bars
 from bh.model import Model
 from bh.program import HELD, SHEET, SPRING, StepProgram
-from bh.solvers.matrices import FreeBodyMatrix, Matrix, MultiplierMatrix
+from bh.solvers.matrices import ConstraintRows, FreeBodyMatrix, Matrix, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import Energy, State
 from bh.supports import Constraints, free_motions, rigid_motions
@@ -239,8 +238,8 @@ class BarsAndHingesSystem:
         matrix: Matrix
         if self.constraints.rigid_body:
             Z = self._rigid(x)
-            self._ground(Z, data)
-            matrix = FreeBodyMatrix(pattern.matrix(data), Z)
+            ground = self._ground(Z, data)
+            matrix = FreeBodyMatrix(pattern.matrix(data), Z, *ground)
         else:
             matrix = pattern.matrix(data)
         if not e.held:
@@ -309,20 +308,16 @@ class BarsAndHingesSystem:
         return build_pattern(self.number, groups)
 
     @cached_property
-    def _constraint_pattern(self) -> tuple[NDArray[np.bool_], Ints, Ints]:
-        columns = self.number[self.elements.hinges[-self.elements.held :]].reshape(-1, 12)
-        keep = columns >= 0
-        return keep, columns[keep], np.concatenate(([0], np.cumsum(keep.sum(axis=1))))
+    def _held_columns(self) -> Ints:
+        return self.number[self.elements.hinges[-self.elements.held :]].reshape(-1, 12)
 
-    def _constraint_rows(self) -> sp.csr_array:
-        keep, columns, indptr = self._constraint_pattern
-        held = self.elements.hinges[-self.elements.held :]
+    def _constraint_rows(self) -> ConstraintRows:
         g = self._g_hinge[-self.elements.held :]
         if len(self.turned):
-            index = self.constraints.frame_of[held]
+            index = self.constraints.frame_of[self.elements.hinges[-self.elements.held :]]
             axes = np.where((index >= 0)[..., None, None], self.constraints.frames[index], np.eye(3))
             g = np.einsum("hpij,hpj->hpi", axes, g.reshape(-1, 4, 3)).reshape(-1, 12)
-        return sp.csr_array((g[keep], columns, indptr), shape=(len(held), self.primal))
+        return ConstraintRows(g.copy(), self._held_columns, self.primal)
 
     def _rigid(self, x: Array) -> Array:
         """Orthonormal rigid motions (primal, r) that the supports leave free at positions x."""
@@ -339,7 +334,8 @@ class BarsAndHingesSystem:
         held = (self.number[self.mesh.triangles] < 0).sum(axis=(1, 2))
         return int(np.lexsort((distance, held))[0])
 
-    def _ground(self, Z: Array, data: Array) -> None:
+    def _ground(self, Z: Array, data: Array) -> tuple[Ints, Array]:
+        """Add a stiffness against the rigid motions of one triangle; returns its unknowns and its matrix."""
         number = self.number[self.mesh.triangles[self._ground_triangle]].ravel()
         rows = np.where(number[:, None] >= 0, Z[np.maximum(number, 0)], 0.0)
         Q = np.linalg.qr(rows)[0] if Z.shape[1] else rows
@@ -348,6 +344,8 @@ class BarsAndHingesSystem:
         values = block[np.tril_indices(9)]
         keep = slots >= 0
         np.add.at(data, slots[keep], values[keep])
+        inside = number >= 0
+        return number[inside], block[np.ix_(inside, inside)]
 
     def _check_balance(self) -> None:
         Z = self._rigid(self.reference)

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
@@ -159,12 +160,16 @@ class FreeBodyMatrix:
 
     grounded: BandMatrix | SparseMatrix
     Z: Array
+    ground_rows: Ints
+    ground: Array
 
     def factorise(self, shift: float = 0.0) -> FreeBodyFactor:
         return FreeBodyFactor(self.grounded.factorise(shift), self.Z)
 
     def __matmul__(self, x: Array) -> Array:
-        return self.grounded @ x
+        out = self.grounded @ x
+        out[self.ground_rows] -= self.ground @ x[self.ground_rows]
+        return out
 
     def diagonal(self) -> Array:
         return self.grounded.diagonal()
@@ -180,65 +185,100 @@ class FreeBodyFactor:
         return x - self.Z @ (self.Z.T @ x)
 
 
+@njit(cache=True, nogil=True)
+def _times(values, columns, x, out):  # type: ignore[no-untyped-def]
+    for i in range(len(values)):
+        total = 0.0
+        for j in range(values.shape[1]):
+            if columns[i, j] >= 0:
+                total += values[i, j] * x[columns[i, j]]
+        out[i] = total
+
+
+@njit(cache=True, nogil=True)
+def _transpose_times(values, columns, y, out):  # type: ignore[no-untyped-def]
+    for i in range(len(values)):
+        for j in range(values.shape[1]):
+            if columns[i, j] >= 0:
+                out[columns[i, j]] += values[i, j] * y[i]
+
+
+@dataclass(frozen=True)
+class ConstraintRows:
+    """Gradients G (c, n) of constraints, each with a few entries: `values` and `columns` (c, w), column -1 unused."""
+
+    values: Array
+    columns: Ints
+    n: int
+
+    def times(self, x: Array) -> Array:
+        out = np.empty(len(self.values))
+        _times(self.values, self.columns, x, out)
+        return out
+
+    def transpose_times(self, y: Array) -> Array:
+        out = np.zeros(self.n)
+        _transpose_times(self.values, self.columns, y, out)
+        return out
+
+
 @dataclass(frozen=True)
 class MultiplierMatrix:
-    """The saddle matrix [[K, G^T], [G, 0]] of constraints, held in augmented form.
+    """The saddle matrix [[A, G^T], [G, 0]] of constraints in augmented form, A = K + gamma G^T G.
 
-    `augmented` is K + gamma G^T G, which is positive definite just where K is so on the null space of G (for gamma
-    large enough), has the sparsity of ordinary hinges, and makes solving cheap: the multipliers are eliminated by a
-    few corrections, each of which shrinks the constraint error by about (constraint stiffness / gamma).
-    The right-hand side and the solution are (n + c,), multipliers last, those of the saddle with K = augmented.
+    A is positive definite just where K is so on the null space of G (for gamma large enough) and has the sparsity of
+    ordinary hinges. Right-hand sides and solutions are (n + c,), multipliers last.
     """
 
     augmented: BandMatrix | SparseMatrix | FreeBodyMatrix
-    G: sp.csr_array
+    G: ConstraintRows
     gamma: Array  # (c,) one for each constraint
 
     def factorise(self, shift: float = 0.0) -> MultiplierFactor:
         return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma)
 
     def __matmul__(self, x: Array) -> Array:
-        n = self.G.shape[1]
-        return np.concatenate((self.augmented @ x[:n] + self.G.T @ x[n:], self.G @ x[:n]))
+        n = self.G.n
+        top = self.augmented @ x[:n] + self.G.transpose_times(x[n:])
+        return np.concatenate((top, self.G.times(x[:n])))
 
     def diagonal(self) -> Array:
-        return np.concatenate((self.augmented.diagonal(), np.zeros(self.G.shape[0])))
+        return np.concatenate((self.augmented.diagonal(), np.zeros(len(self.gamma))))
 
 
 @dataclass(frozen=True)
 class MultiplierFactor:
+    """Solves by conjugate gradients on the Schur complement S = G A^-1 G^T, preconditioned by gamma.
+
+    S is 1 / gamma up to the stiffness of the structure against the constraints, so few steps suffice; x and y meet
+    the first row exactly after each of them. The tolerance is relative to the multipliers: Newton's method corrects
+    the rest (an inexact Newton, Dembo, Eisenstat and Steihaug 1982).
+    """
+
     factor: Factor
-    G: sp.csr_array
+    G: ConstraintRows
     gamma: Array
     most: int = 40
-    tolerance: float = 1e-5
+    tolerance: float = 1e-3
 
     def solve(self, b: Array) -> Array:
-        """Conjugate gradients on the Schur complement S = G A^-1 G^T, preconditioned by gamma.
-
-        S is 1 / gamma up to the stiffness of the structure against the constraints, so few steps suffice; x and y
-        meet the first row exactly after each of them.
-        """
-        n = self.G.shape[1]
-        force, gap = b[:n], b[n:]
-        transpose = self.G.T.tocsr()
+        G, n = self.G, self.G.n
+        gap = b[n:]
         y = np.zeros(len(gap))
-        x = self.factor.solve(force)
-        miss = self.G @ x - gap
-        goal = 1e-9 * float(np.abs(gap).max(initial=0.0))
-        z = self.gamma * miss
-        p, rho = z, float(miss @ z)
+        x = self.factor.solve(b[:n])
+        miss = G.times(x) - gap
+        goal = 1e-7 * float(np.abs(gap).max(initial=0.0))
+        p = z = self.gamma * miss
+        rho = float(miss @ z)
         for _ in range(self.most):
-            if rho == 0.0 or (
-                np.abs(miss).max() <= goal and np.abs(z).max() <= self.tolerance * np.abs(y).max()
-            ):
+            if rho == 0.0 or (np.abs(miss).max() <= goal and np.abs(z).max() <= self.tolerance * np.abs(y).max()):
                 break
-            v = self.factor.solve(transpose @ p)
-            Sp = self.G @ v
+            v = self.factor.solve(G.transpose_times(p))
+            Sp = G.times(v)
             step = rho / float(p @ Sp)
-            y = y + step * p
-            x = x - step * v
-            miss = miss - step * Sp
+            y += step * p
+            x -= step * v
+            miss -= step * Sp
             z = self.gamma * miss
             rho, before = float(miss @ z), rho
             p = z + (rho / before) * p

@@ -35,7 +35,7 @@ def write_mesh(
     node_fields: Mapping[str, ArrayLike] | None = None,
     cell_fields: Mapping[str, ArrayLike] | None = None,
 ) -> None:
-    """Write the triangles to `path`; its suffix (.vtu, .vtk, .msh, .obj, .stl, .ply, .off, .inp) is the format.
+    """Write the triangles to `path` in the format of its suffix: one of `FORMATS`.
 
     The file appears whole or not at all: it is written beside its place and then moved there.
 
@@ -61,8 +61,8 @@ def write_mesh(
     if place.shape != mesh.points.shape or not np.isfinite(place).all():
         raise FileFormatError(f"{name}: points must be {len(mesh.points)} rows of three finite numbers in mm")
     count, nodes = len(mesh.triangles), len(mesh.points)
-    at_nodes = {key: _field(name, f"node field '{key}'", v, nodes) for key, v in (node_fields or {}).items()}
-    at_cells = {key: [_field(name, f"cell field '{key}'", v, count)] for key, v in (cell_fields or {}).items()}
+    at_nodes = {k: _field(name, f"node field {k!r}", v, nodes) for k, v in (node_fields or {}).items()}
+    at_cells = {k: [_field(name, f"cell field {k!r}", v, count)] for k, v in (cell_fields or {}).items()}
     # .ply has no 64-bit integers: meshio would cast them with a printed warning
     triangles = mesh.triangles.astype(np.int32) if form == "ply" else mesh.triangles
     try:
@@ -82,7 +82,7 @@ def _field(name: str, what: str, values: ArrayLike, count: int) -> Array:
     if array.dtype.kind not in "biuf":
         raise FileFormatError(f"{name}: {what} is not an array of numbers; give one row of numbers each")
     if array.ndim not in (1, 2) or len(array) != count:
-        raise FileFormatError(f"{name}: {what} has shape {array.shape}; give ({count},) or ({count}, k) values")
+        raise FileFormatError(f"{name}: {what} has shape {array.shape}; give ({count},) or ({count}, k)")
     array = array.astype(float if array.dtype.kind == "f" else np.int64)
     if array.ndim == 2 and array.shape[1] == 2:  # VTK knows vectors of three components only
         array = np.column_stack((array, np.zeros_like(array[:, 0])))

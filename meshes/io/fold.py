@@ -1,11 +1,12 @@
 """FOLD files, version 1.2 (https://github.com/edemaine/fold/blob/main/doc/spec.md), to and from `SheetMesh`.
 
-FOLD's fold angles are degrees, valley positive; ours are rad, mountain positive. Frames count as in FOLD: 0 is the
-key frame (the top of the file), i + 1 is `file_frames[i]`.
+FOLD's fold angles are degrees, valley positive; ours are rad, mountain positive. Frames count as in FOLD: 0
+is the key frame (the top of the file), i + 1 is `file_frames[i]`.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import os
@@ -18,11 +19,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes.curves import Array
-from meshes.errors import FileFormatError, InputError, MeshError
+from meshes.errors import FileFormatError, InputError
 from meshes.io.export import replacing, shown
 from meshes.mesh import SheetMesh
 from meshes.pattern import FoldKind
-from meshes.topology import Ints, boundary_loops, build
+from meshes.topology import boundary_loops, build
 
 UNITS = {
     "unit": 1.0, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "pt": 25.4 / 72.0, "um": 1e-3, "nm": 1e-6,
@@ -31,7 +32,7 @@ LETTERS = "MVFBUCJ"
 FOLDS: dict[str, FoldKind] = {"M": "mountain", "V": "valley"}
 SETS = {"F": "edge:flat", "U": "edge:unassigned", "J": "edge:join"}
 LIMIT = 1e12  # mm; beyond it products of coordinates lose all meaning
-THIN = 1e-10  # doubled area over longest side squared of a triangle that counts as degenerate (as in SheetMesh)
+THIN = 1e-10  # doubled area over longest side squared of a degenerate triangle, as in SheetMesh
 STRAIGHT = 1e-3  # rad; files give coordinates to some six digits
 
 Face = list[list[int]]  # rings of vertices: the outside, then holes the other way round
@@ -56,9 +57,9 @@ class _Frame:
 def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMesh:
     """The sheet of one frame of a FOLD file, with faces triangulated, in mm.
 
-    Vertices keep their order; those that belong to no face are dropped. Faces are turned to agree with each other,
-    and counter-clockwise from +z where the sheet is flat: mountain and valley then are as seen from +z. A frame
-    without faces_vertices gets them from its edges if these are a plane graph; edges assigned B outline holes.
+    Vertices keep their order; those that belong to no face are dropped. Faces are turned to agree with each
+    other, and counter-clockwise from +z where the sheet is flat: mountain and valley then are as seen from +z.
+    A frame without faces_vertices gets them from its edges if these are a plane graph; B edges outline holes.
 
     The edge sets are "crease:mountain" and "crease:valley" (all such edges), their chains "crease:m1", ...,
     "crease:v1", ... in the order of the file, "edge:boundary", and where there are any "edge:flat" (F),
@@ -80,7 +81,7 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
         raise FileFormatError(f"{shown(path)}: {text}") from error
 
 
-# --- the file -------------------------------------------------------------------------------------------------
+# --- the file -------------------------------------------------------------------------------------
 
 
 def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -95,11 +96,11 @@ def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
     except IsADirectoryError as error:
         raise FileFormatError("this is a folder; name a .fold file in it") from error
     except OSError as error:
-        raise FileFormatError(f"the file cannot be read ({error.strerror}); check its name and rights") from error
+        raise FileFormatError(f"cannot be read ({error.strerror}); check the name and rights") from error
     except UnicodeDecodeError as error:
         raise FileFormatError(f"byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
     except RecursionError as error:
-        raise FileFormatError("brackets are nested too deeply; FOLD has no more than lists of lists") from error
+        raise FileFormatError("brackets are nested too deeply; FOLD has only lists of lists") from error
     except FileFormatError:
         raise
     except ValueError as error:  # JSON errors, numbers of thousands of digits, null characters in the path
@@ -137,7 +138,7 @@ def _inherited(frames: list[dict[str, Any]], number: int) -> dict[str, Any]:
         parent = frames[line[-1]].get("frame_parent")
         parent = _index(parent, len(frames), f"frame_parent of frame {line[-1]}")
         if parent in line:
-            raise FileFormatError(f"frame {line[-1]} inherits from itself through frame {parent}; break the circle")
+            raise FileFormatError(f"frame {line[-1]} inherits from itself by frame {parent}; break the loop")
         line.append(parent)
     merged: dict[str, Any] = {}
     for each in reversed(line):
@@ -167,10 +168,10 @@ def _checked(frame: dict[str, Any]) -> _Frame:
     for number, ring in enumerate(_list(frame, "faces_vertices")):
         what = f"faces_vertices[{number}]"
         if not isinstance(ring, list) or len(ring) < 3:
-            raise FileFormatError(f"{what} is {_show(ring)}; a face is a list of three or more vertex numbers")
+            raise FileFormatError(f"{what} is {_show(ring)}; a face is a list of three or more vertices")
         ring = [_index(vertex, count, f"a vertex of {what}") for vertex in ring]
         if len(set(ring)) < len(ring):
-            raise FileFormatError(f"{what} uses a vertex twice; give every corner once and split faces with slits")
+            raise FileFormatError(f"{what} uses a vertex twice; name every corner once, split slit faces")
         faces.append([ring])
     if not faces and not edges:
         raise FileFormatError("the frame has no faces_vertices and no edges_vertices; give one of them")
@@ -191,7 +192,7 @@ def _points(frame: dict[str, Any]) -> Array:
         for axis, value in enumerate(row):
             if not _is_number(value) or not abs(value) <= LIMIT / UNITS[unit]:
                 raise FileFormatError(
-                    f"vertices_coords[{vertex}] holds {_show(value)}; give numbers of a size below {LIMIT:g} mm"
+                    f"vertices_coords[{vertex}] holds {_show(value)}; give numbers up to {LIMIT:g} mm in size"
                 )
             points[vertex, axis] = value
     return points * UNITS[unit]
@@ -215,7 +216,7 @@ def _letters(frame: dict[str, Any], count: int, angles: list[float] | None) -> l
     _same_length("edges_assignment", len(letters), count)
     for edge, letter in enumerate(letters):
         if not isinstance(letter, str) or len(letter) != 1 or letter not in LETTERS:
-            raise FileFormatError(f"edges_assignment[{edge}] is {_show(letter)}; use one of {', '.join(LETTERS)}")
+            raise FileFormatError(f"edges_assignment[{edge}] is {_show(letter)}; use one of {LETTERS}")
     return letters
 
 
@@ -255,7 +256,7 @@ def _side(a: int, b: int) -> Side:
     return (a, b) if a < b else (b, a)
 
 
-# --- faces ----------------------------------------------------------------------------------------------------
+# --- faces ----------------------------------------------------------------------------------------
 
 
 def _directed(face: Face) -> list[tuple[int, int]]:
@@ -282,7 +283,7 @@ def _faces_of_graph(frame: _Frame) -> list[Face]:
     import shapely
 
     if not frame.flat:
-        raise FileFormatError("a frame in space has no faces_vertices; faces can be built from flat edges only")
+        raise FileFormatError("a frame in space has no faces_vertices; give them (flat edges do without)")
     _check_plane_graph(frame)
     xy = frame.points[:, :2]
     vertex = {tuple(xy[v]): v for edge in frame.edges for v in edge}
@@ -312,9 +313,10 @@ def _check_plane_graph(frame: _Frame) -> None:
     used = np.unique(edges)
     at, on = tree.query(shapely.points(xy[used]), predicate="dwithin", distance=1e-9 * size)
     for v, edge in zip(used[at].tolist(), on.tolist(), strict=True):
-        if v not in frame.edges[edge]:
+        a, b = frame.edges[edge]
+        if v not in (a, b):
             raise FileFormatError(
-                f"vertex {v} lies on edge {edge} ({edges[edge][0]}-{edges[edge][1]}) that does not end there; "
+                f"vertex {v} lies on edge {edge} ({a}-{b}) that does not end there; "
                 "split the edge at the vertex or merge vertices in one place"
             )
     for i, j in tree.query(lines, predicate="intersects").T.tolist():
@@ -323,7 +325,7 @@ def _check_plane_graph(frame: _Frame) -> None:
 
 
 def _inside(frame: _Frame, sides: dict[Side, list[int]], count: int) -> list[bool]:
-    """Which faces are sheet: those at the outside are, and a closed line of B edges leads into a hole or out."""
+    """Which faces are sheet: those at the outside, and a closed line of B edges leads into a hole or out."""
     inside: list[bool | None] = [None] * count
     near: list[list[int]] = [[] for _ in range(count)]
     borders: list[list[tuple[int, int]]] = [[] for _ in range(count)]
@@ -361,7 +363,7 @@ def _inside(frame: _Frame, sides: dict[Side, list[int]], count: int) -> list[boo
 
 
 def _orient(frame: _Frame, faces: list[Face], sides: dict[Side, list[int]]) -> list[Face]:
-    """The faces of one sheet, turned to agree: with +z where it is flat, else with most of the file's faces."""
+    """The faces of one sheet, turned to agree: with +z where it is flat, else with most of the faces."""
     ahead = [set(_directed(face)) for face in faces]
     turned: list[bool | None] = [None] * len(faces)
     turned[0] = False
@@ -378,7 +380,7 @@ def _orient(frame: _Frame, faces: list[Face], sides: dict[Side, list[int]]) -> l
                     todo.append(other)
                 elif turned[other] != value:
                     raise FileFormatError(
-                        f"faces {face} and {other} have no common side up (a one-sided band); cut the band open"
+                        f"faces {face} and {other} have no common side up (one-sided band); cut the band open"
                     )
     if None in turned:
         raise FileFormatError(
@@ -395,7 +397,7 @@ def _orient(frame: _Frame, faces: list[Face], sides: dict[Side, list[int]]) -> l
 
 
 def _area(xy: Array, face: Face) -> float:
-    """Signed area, counter-clockwise positive; from the first vertex, so that far-off sheets lose no digits."""
+    """Signed area, counter-clockwise positive; from the first vertex, lest far-off sheets lose digits."""
     total = 0.0
     for ring in face:
         x, y = (xy[ring] - xy[face[0][0]]).T
@@ -403,7 +405,7 @@ def _area(xy: Array, face: Face) -> float:
     return total
 
 
-# --- triangles ------------------------------------------------------------------------------------------------
+# --- triangles ------------------------------------------------------------------------------------
 
 
 def _triangulate(points: Array, face: Face, flat: bool) -> list[list[int]]:
@@ -500,15 +502,16 @@ def _delaunay(polygon: Any, xy: Array, count: int) -> list[list[int]]:
 
 
 def _turns(xy: Array, a: int, b: int, c: int, d: int) -> bool:
-    """Whether side a-b of triangles a, b, c and b, a, d is better c-d: the angles at c and d exceed pi in sum."""
+    """Whether c-d is better than a-b between triangles abc and bad: angles at c and d exceed pi in sum."""
     ca, cb, da, db = (complex(*(xy[q] - xy[p])) for p, q in ((c, a), (c, b), (d, a), (d, b)))
     if not (ca and cb and da and db):
         return False
     product = (cb / ca) * (da / db)  # its argument is the sum of both angles
-    return product.imag < -1e-9 * abs(product) and min(_fullness(xy, [a, d, c]), _fullness(xy, [d, b, c])) > 0.0
+    least = min(_fullness(xy, [a, d, c]), _fullness(xy, [d, b, c]))
+    return product.imag < -1e-9 * abs(product) and least > 0.0
 
 
-# --- the sheet ------------------------------------------------------------------------------------------------
+# --- the sheet ------------------------------------------------------------------------------------
 
 
 def _sheet(frame: _Frame) -> SheetMesh:
@@ -519,9 +522,253 @@ def _sheet(frame: _Frame) -> SheetMesh:
     corners: list[list[int]] = []
     for number, face in enumerate(faces):
         try:
+            if frame.flat and _area(frame.points[:, :2], face) < 0.0:
+                raise FileFormatError("is turned over (folded flat); choose a frame where it lies open")
             corners += _triangulate(frame.points, face, frame.flat)
         except FileFormatError as error:
-            more = ", ..." if len(face[0]) > 5 else ""
-            names = ", ".join(map(str, face[0][:5])) + more
+            names = ", ".join(map(str, face[0][:5])) + (", ..." if len(face[0]) > 5 else "")
             raise FileFormatError(f"face {number} (vertices {names}) {error}") from error
-    return SheetMesh()
+    _check_fans(corners)
+    if frame.flat and frame.faces:
+        _check_overlap(frame.points[:, :2], corners)
+
+    used, triangles = np.unique(np.array(corners), return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    new = np.full(len(frame.points), -1)
+    new[used] = np.arange(len(used))
+    named, fold_angles = _edge_sets(frame, sides)
+    edge_sets = {name: new[np.array(pairs)] for name, pairs in named.items() if pairs}
+    topology = build(triangles, len(used))
+    loops = boundary_loops(topology)
+    if loops:
+        edge_sets["edge:boundary"] = np.vstack([np.column_stack((each, np.roll(each, -1))) for each in loops])
+    drawn = {_side(a, b) for a, b in new[np.array(list(sides))].tolist()}
+    added = [pair for pair in topology.edges.tolist() if tuple(pair) not in drawn]
+    if added:
+        edge_sets["edge:facet"] = np.array(added)
+    creases = [name.removeprefix("crease:") for name in edge_sets if name.startswith("crease:")]
+    return SheetMesh(
+        points=frame.points[used],
+        triangles=triangles,
+        edge_sets=edge_sets,
+        folds={name: FOLDS[name[0].upper()] for name in creases},
+        fold_angles={name: fold_angles[name] for name in creases if name in fold_angles},
+        kind="imported",
+    )
+
+
+def _check_edges(frame: _Frame, sides: dict[Side, list[int]]) -> None:
+    """Every edge is the side of a face, creases lie inside the sheet, borders and cuts at its rim."""
+    for number, ((a, b), letter) in enumerate(zip(frame.edges, frame.letters, strict=True)):
+        edge = f"edge {number} ({a}-{b})"
+        faces = sides.get(_side(a, b))
+        if faces is None:
+            raise FileFormatError(f"{edge} is not a side of any face; remove it or add its faces")
+        if len(faces) == 2 and letter == "C":
+            raise FileFormatError(f"{edge} is a cut (C) inside the sheet; double its vertices to open it")
+        if len(faces) == 2 and letter == "B":
+            raise FileFormatError(f"{edge} is assigned B but has a face on both sides; assign M, V, F or U")
+        if len(faces) == 1 and letter in FOLDS:
+            raise FileFormatError(f"{edge} is assigned {letter} but has a face on one side only; assign B")
+
+
+def _check_fans(triangles: list[list[int]]) -> None:
+    """The triangles at every vertex form one fan (or a full turn)."""
+    link: dict[int, dict[int, list[int]]] = {}
+    for t in triangles:
+        for i in range(3):
+            near = link.setdefault(t[i], {})
+            near.setdefault(t[i - 1], []).append(t[i - 2])
+            near.setdefault(t[i - 2], []).append(t[i - 1])
+    for vertex, near in link.items():
+        todo = [next(iter(near))]
+        seen = set(todo)
+        while todo:
+            fresh = set(near[todo.pop()]) - seen
+            seen |= fresh
+            todo += fresh
+        if len(seen) < len(near):
+            raise FileFormatError(
+                f"at vertex {vertex} parts of the sheet touch at a point (non-manifold); double the vertex"
+            )
+
+
+def _check_overlap(xy: Array, triangles: list[list[int]]) -> None:
+    import shapely
+
+    parts = shapely.polygons(xy[np.array(triangles)])
+    total, covered = float(shapely.area(parts).sum()), float(shapely.union_all(parts).area)
+    if covered < (1.0 - 1e-6) * total:
+        raise FileFormatError(
+            f"faces of the flat sheet lie over each other ({1.0 - covered / total:.2g} of its area); "
+            "draw every face in its own place"
+        )
+
+
+def _edge_sets(frame: _Frame, sides: dict[Side, list[int]]) -> tuple[dict[str, list[Side]], dict[str, Array]]:
+    """The named edges inside the sheet (vertex pairs in order) and the fold angles of the creases (rad)."""
+    sets: dict[str, list[Side]] = {}
+    angles: dict[str, Array] = {}
+    for letter, fold in FOLDS.items():
+        chains = _chains(frame, [number for number, each in enumerate(frame.letters) if each == letter])
+        named = {f"{letter.lower()}{i + 1}": chain for i, chain in enumerate(chains)}
+        for name, chain in ({fold: list(itertools.chain(*chains))} | named).items():  # the whole first
+            sets[f"crease:{name}"] = [(a, b) for _, a, b in chain]
+            if frame.angles is not None:
+                angles[name] = -np.radians([frame.angles[number] for number, _, _ in chain])
+    for letter, name in SETS.items():
+        edges = (edge for edge, each in zip(frame.edges, frame.letters, strict=True) if each == letter)
+        sets[name] = [edge for edge in edges if len(sides[_side(*edge)]) == 2]
+    listed = {_side(*edge) for edge in frame.edges}
+    sets["edge:unassigned"] += [side for side, at in sides.items() if len(at) == 2 and side not in listed]
+    return sets, angles
+
+
+Step = tuple[int, int, int]  # number of an edge, and the vertices it is walked from and to
+
+
+def _chains(frame: _Frame, numbers: list[int]) -> list[list[Step]]:
+    """The lines that edges of one assignment make up, each in the direction of its first edge in the file."""
+    at: dict[int, list[int]] = {}
+    for number in numbers:
+        for vertex in frame.edges[number]:
+            at.setdefault(vertex, []).append(number)
+    beyond: dict[tuple[int, int], int] = {}
+    for vertex, met in at.items():
+        for one, two in [(met[0], met[1])] if len(met) == 2 else _straight(frame, vertex, met):
+            beyond[one, vertex], beyond[two, vertex] = two, one
+    free = set(numbers)
+
+    def walk(edge: int, vertex: int) -> list[Step]:
+        steps: list[Step] = []
+        while beyond.get((edge, vertex)) in free:
+            edge = beyond[edge, vertex]
+            free.discard(edge)
+            other = sum(frame.edges[edge]) - vertex
+            steps.append((edge, vertex, other))
+            vertex = other
+        return steps
+
+    chains = []
+    for number in numbers:
+        if number in free:
+            free.discard(number)
+            a, b = frame.edges[number]
+            ahead = walk(number, b)
+            back = [(edge, head, tail) for edge, tail, head in reversed(walk(number, a))]
+            chains.append([*back, (number, a, b), *ahead])
+    return chains
+
+
+def _straight(frame: _Frame, vertex: int, met: list[int]) -> list[tuple[int, int]]:
+    """Pairs of the edges `met` at a vertex that go straight on into each other, the straightest first."""
+    ends = np.array([sum(frame.edges[number]) - vertex for number in met])
+    away = frame.points[ends] - frame.points[vertex]
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    bend = [(float(np.linalg.norm(away[i] + away[j])), i, j) for i in range(len(met)) for j in range(i)]
+    pairs: list[tuple[int, int]] = []
+    taken: set[int] = set()
+    for angle, i, j in sorted(bend):
+        if angle <= STRAIGHT and not taken & {i, j}:
+            taken |= {i, j}
+            pairs.append((met[i], met[j]))
+    return pairs
+
+
+# --- writing --------------------------------------------------------------------------------------
+
+
+def write_fold(
+    path: str | os.PathLike[str],
+    mesh: SheetMesh,
+    *,
+    frames: Sequence[tuple[str, ArrayLike, ArrayLike | None]] = (),
+    title: str | None = None,
+) -> None:
+    """Write a mesh as the key frame of a FOLD file, and folded states as further frames; lengths in mm.
+
+    Edges are those of `mesh.topology.edges`: B on the boundary, M and V on creases as `mesh.folds` says, U
+    and J in "edge:unassigned" and "edge:join", else F. Fold angles are written if the mesh has any, null where
+    a crease has none. The file appears whole or not at all.
+
+    Args:
+        frames: (title, points (n, 3) in mm, fold angles (e,) in rad, mountain positive, one for each of
+            `mesh.topology.edges`, or None) of each state.
+
+    Raises:
+        FileFormatError: arrays that do not fit the mesh, or the file cannot be written.
+    """
+    edges = mesh.topology.edges
+    letters, angles = _assignment(mesh)
+    data: dict[str, Any] = {
+        "file_spec": 1.2,
+        "file_creator": "curved-crease-workbench",
+        "file_classes": ["singleModel", "animation"] if frames else ["singleModel"],
+    }
+    if title is not None:
+        data["file_title"] = str(title)
+    data |= {
+        "frame_classes": ["creasePattern" if mesh.flat else "foldedForm"],
+        "frame_attributes": ["2D" if mesh.flat else "3D", "manifold", "orientable"],
+        "frame_unit": "mm",
+        "vertices_coords": (mesh.points[:, :2] if mesh.flat else mesh.points).tolist(),
+        "edges_vertices": edges.tolist(),
+        "edges_assignment": letters,
+    }
+    if angles is not None:
+        data["edges_foldAngle"] = _degrees(angles)
+    data["faces_vertices"] = mesh.triangles.tolist()
+    states = []
+    for number, (name, points, folds) in enumerate(frames):
+        what = f"{shown(path)}: state {number} ({_show(str(name))})"
+        place = _numbers(f"{what}: points", points, mesh.points.shape)
+        state = {
+            "frame_title": str(name),
+            "frame_classes": ["foldedForm"],
+            "frame_attributes": ["3D", "manifold", "orientable"],
+            "frame_parent": 0,
+            "frame_inherit": True,
+            "vertices_coords": place.tolist(),
+        }
+        if folds is not None:
+            state["edges_foldAngle"] = _degrees(_numbers(f"{what}: fold angles", folds, (len(edges),)))
+        states.append(state)
+    if states:
+        data["file_frames"] = states
+    # one line a key: still readable, and a difference of two files says what changed
+    text = ",\n".join(f'"{key}": {json.dumps(value, allow_nan=False)}' for key, value in data.items())
+    with replacing(path) as temporary:
+        temporary.write_text("{\n" + text + "\n}\n", encoding="utf-8")
+
+
+def _assignment(mesh: SheetMesh) -> tuple[list[str], Array | None]:
+    """Letter and drawn fold angle (rad, mountain positive; nan unknown) of every edge of the topology."""
+    topology = mesh.topology
+    letters = np.full(len(topology.edges), "F")
+    angles = np.zeros(len(letters))
+    for letter, name in SETS.items():
+        if name in mesh.edge_sets:
+            letters[topology.find_edges(mesh.edge_sets[name])] = letter
+    for crease in mesh.creases:
+        at = topology.find_edges(mesh.crease_edges(crease))
+        fold = mesh.folds.get(crease, "flat")
+        letters[at] = {"mountain": "M", "valley": "V", "flat": "F"}[fold]
+        angles[at] = mesh.fold_angles.get(crease, np.nan if fold != "flat" else 0.0)
+    rim = topology.edge_triangles[:, 1] < 0
+    letters[rim], angles[rim] = "B", 0.0
+    return letters.tolist(), angles if mesh.fold_angles else None
+
+
+def _degrees(angles: Array) -> list[float | None]:
+    """FOLD's fold angles (valley positive) of ours."""
+    return [None if math.isnan(angle) else 0.0 - angle for angle in np.degrees(angles).tolist()]
+
+
+def _numbers(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise FileFormatError(f"{what} are not numbers; give an array of shape {shape}") from error
+    if array.shape != shape or not np.isfinite(array).all():
+        raise FileFormatError(f"{what} have shape {array.shape} or are not finite; give shape {shape}")
+    return array
