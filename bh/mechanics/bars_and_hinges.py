@@ -291,6 +291,25 @@ class BarsAndHingesSystem:
         unbalanced = self.to_local(f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.prescribed_rate))
 
+    def control_stiffness(self, q: Array, lam: float) -> float:
+        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        e = self.elements
+        x = self.positions(q, lam)
+        total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
+        moving = self.to_global(self.prescribed_rate)
+        if moving.any():
+            _, _, _, forces = self._internal(x, q, lam)
+            bars = len(e.bars)
+            out = np.zeros_like(x)
+            tangent_times(
+                x, moving, e.bars, e.bar_stiffness, forces[:bars], e.hinges, e.hinge_stiffness, forces[bars:], out
+            )
+            g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
+            turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
+            total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
+            total += 2.0 * float((e.couple.rate - e.hinge_stiffness * e.rest.rate) @ turn)
+        return total
+
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         e = self.elements
         before = dihedral_angles(self.positions(q, lam), e.hinges)

@@ -12,6 +12,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ class _Frame:
     angles: list[float] | None  # degrees, valley positive; nan where the file has null
     faces: list[Face]
 
-    @property
+    @cached_property
     def flat(self) -> bool:
         return bool(np.ptp(self.points[:, 2]) <= 1e-9 * np.linalg.norm(np.ptp(self.points, axis=0)))
 
@@ -59,7 +60,7 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
 
     Vertices keep their order; those that belong to no face are dropped. Faces are turned to agree with each
     other, and counter-clockwise from +z where the sheet is flat: mountain and valley then are as seen from +z.
-    A frame without faces_vertices gets them from its edges if these are a plane graph; B edges outline holes.
+    A frame without faces_vertices gets them from its edges if these are a plane graph; B edges round holes.
 
     The edge sets are "crease:mountain" and "crease:valley" (all such edges), their chains "crease:m1", ...,
     "crease:v1", ... in the order of the file, "edge:boundary", and where there are any "edge:flat" (F),
@@ -507,8 +508,9 @@ def _turns(xy: Array, a: int, b: int, c: int, d: int) -> bool:
     if not (ca and cb and da and db):
         return False
     product = (cb / ca) * (da / db)  # its argument is the sum of both angles
-    least = min(_fullness(xy, [a, d, c]), _fullness(xy, [d, b, c]))
-    return product.imag < -1e-9 * abs(product) and least > 0.0
+    if product.imag >= -1e-9 * abs(product):
+        return False
+    return _fullness(xy, [a, d, c]) > 0.0 and _fullness(xy, [d, b, c]) > 0.0
 
 
 # --- the sheet ------------------------------------------------------------------------------------
@@ -688,8 +690,8 @@ def write_fold(
     """Write a mesh as the key frame of a FOLD file, and folded states as further frames; lengths in mm.
 
     Edges are those of `mesh.topology.edges`: B on the boundary, M and V on creases as `mesh.folds` says, U
-    and J in "edge:unassigned" and "edge:join", else F. Fold angles are written if the mesh has any, null where
-    a crease has none. The file appears whole or not at all.
+    and J in "edge:unassigned" and "edge:join", else F. Fold angles are written if the mesh has any, null on a
+    crease without. The file appears whole or not at all.
 
     Args:
         frames: (title, points (n, 3) in mm, fold angles (e,) in rad, mountain positive, one for each of

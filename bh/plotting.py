@@ -1,0 +1,538 @@
+"""Pictures of folded sheets, curves of energy, and series for ParaView.
+
+Pictures are rendered by pyvista without a window and framed by matplotlib, which both are imported when first
+needed. On Linux rendering needs one of the libraries EGL, OSMesa or X11; which of them there is is asked before
+VTK is, because VTK ends the process where it finds none.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import shutil
+import sys
+import tempfile
+import uuid
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, NamedTuple
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshes.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bh.path import Path
+    from bh.state import State
+
+Array = NDArray[np.float64]
+
+KINDS = ("stretching", "bending", "folding")
+INK, PAPER, BLANK_SHEET, COLOURS = "#1b1b1f", "white", "#b9c4cf", "viridis"
+# Okabe and Ito's colours, told apart with any colour vision; dashes tell the lines apart in grey
+CURVES = {
+    "total": (INK, "-"),
+    "bending": ("#0072b2", "-"),
+    "stretching": ("#d55e00", (0, (5, 1.5))),
+    "folding": ("#009e73", (0, (1.2, 1.2))),
+}
+MOST_EDGES = 20_000  # triangles of a mesh whose edges can still be told apart in a picture
+
+
+class PlotError(InputError):
+    """A picture, curve or series that cannot be made or written."""
+
+
+class Colouring(NamedTuple):
+    """Values (n,) at nodes, N mm / mm^2; colours end at `top` > 0; `cut` if some lie above it."""
+
+    values: Array
+    top: float
+    cut: bool
+
+
+def picture(
+    state: State,
+    file: str | os.PathLike[str],
+    colour: str | None = "bending",
+    size: tuple[int, int] = (1200, 900),
+    *,
+    caption: str | bool = True,
+    camera: tuple[float, float] | None = None,
+    top: float | None = None,
+) -> FilePath:
+    """Write a picture of the folded sheet, coloured by energy density, without a window.
+
+    Args:
+        file: to write, .png; appears whole or not at all.
+        colour: "stretching", "bending", "folding" or "total" energy density averaged to nodes, N mm / mm^2; None
+            for the plain sheet (which is also drawn where there is no such energy at all).
+        size: width and height, pixels.
+        caption: a line of text; True for lambda and the energies, False for none.
+        camera: azimuth and elevation that it looks from, rad; None for where most of the sheet is seen.
+        top: energy density where the colours end, to compare pictures; None for the largest there is.
+
+    Returns:
+        the absolute path of the file.
+
+    Raises:
+        PlotError: an unknown colour, a size that cannot be, no library to draw with, or a file that cannot be
+            written.
+    """
+    target = FilePath(file)
+    if target.suffix.lower() != ".png":
+        raise PlotError(f"picture '{target}' is not a .png file; name it so")
+    width, height = size
+    if not (160 <= width <= 8000 and 120 <= height <= 8000):
+        raise PlotError(f"picture size {width} x {height} cannot be; give 160 x 120 to 8000 x 8000 pixels")
+    colouring = _colouring(state, colour, top)
+    title = _energies(state) if caption is True else (caption or "")
+    unit = min(width / 1200, height / 900)
+    head, foot = int(60 * unit) if title else 0, int(110 * unit) if colouring is not None else 0
+    inner = height - head - foot
+    image = _render(state, colouring, (width, inner), _camera(state, width / inner, camera))
+    figure = _frame(image, (width, height), foot, title, f"{colour} energy density", colouring)
+    with _replacing(target) as temporary:
+        figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
+    return target.resolve()
+
+
+def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
+    """Show the folded sheet in a window that turns with the mouse; returns when it is closed.
+
+    Args:
+        colour: as for `picture`.
+        options: of `pyvista.Plotter.show`.
+
+    Raises:
+        PlotError: an unknown colour, or there is no display.
+    """
+    if not _has_display():
+        raise PlotError("there is no display to show the sheet on; use bh.plotting.picture(state, 'sheet.png')")
+    import pyvista as pv
+
+    colouring = _colouring(state, colour, None)
+    plotter = pv.Plotter(window_size=[1200, 900], title="bh")
+    aim = _camera(state, 4 / 3, None)
+    _draw(plotter, state, colouring, 2.0 * aim.half_height / 900)
+    if colouring is not None:
+        plotter.add_scalar_bar(title=f"{colour} energy density, N mm / mm^2", color=INK, n_labels=4, fmt="%.2g")
+    plotter.add_text(_energies(state), font_size=9, color=INK)
+    aim.aim(plotter)
+    return plotter.show(**options)
+
+
+def curves(path: Path) -> Figure:
+    """Energy by kind, N mm, against step + lambda, as a matplotlib figure; kinds that stay zero are left out.
+
+    Raises:
+        PlotError: the path has no states.
+    """
+    from matplotlib.figure import Figure
+
+    if len(path) == 0:
+        raise PlotError("the path has no states to plot; trace the model first")
+    at = path.lambdas
+    energies = [state.energy.as_dict() for state in path]
+    series = {kind: np.array([energy[kind] for energy in energies]) for kind in CURVES}
+    shown = {kind: values for kind, values in series.items() if np.any(values != 0.0)}
+    if len(shown) <= 2:  # the only kind there is says all that the total would
+        shown.pop("total", None)
+    figure = Figure(figsize=(7.2, 4.4), dpi=100, layout="constrained")
+    axes = figure.subplots()
+    for boundary in range(1, int(np.ceil(at[-1] - 1e-12))):
+        axes.axvline(boundary, color="0.85", linewidth=1.0, zorder=0)
+    for kind, values in shown.items():
+        colour, dashes = CURVES[kind]
+        axes.plot(at, values, color=colour, linestyle=dashes, marker="o", markersize=3.0, linewidth=1.8, label=kind)
+    axes.set(xlabel="step + λ", ylabel="energy, N mm", xlim=(at[0], max(at[-1], at[0] + 1e-3)))
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(y=0.06)
+    if shown:
+        axes.set_ylim(bottom=min(0.0, *(float(values.min()) for values in shown.values())))
+        axes.legend(frameon=False, loc="upper left")
+    return figure
+
+
+def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path") -> FilePath:
+    """Write every state as a VTU file and the collection `name`.pvd that ParaView plays, time = step + lambda.
+
+    Point data are the displacement (mm) and the energy densities by kind averaged to nodes, cell data the energy
+    densities of the triangles (N mm / mm^2). The states lie in the folder `name` beside the collection; both
+    appear when all is written and replace what was there.
+
+    Returns:
+        the absolute path of the collection.
+
+    Raises:
+        PlotError: a path without states, or a folder that cannot be written to.
+    """
+    from meshes.io import write_mesh
+
+    if not name or not name.replace("-", "").replace("_", "").isalnum():
+        raise PlotError(f"series name '{name}' cannot be; use letters, digits, '-' and '_'")
+    if len(path) == 0:
+        raise PlotError("the path has no states to export; trace the model first")
+    home = FilePath(folder)
+    new = home / f".{name}-{uuid.uuid4().hex}"
+    try:
+        new.mkdir(parents=True)
+        entries = []
+        for index, (state, time) in enumerate(zip(path, path.lambdas.tolist(), strict=True)):
+            file = f"{index:04d}.vtu"
+            at_nodes: dict[str, Array] = {"displacement": state.points - state.mesh.points}
+            at_nodes |= {f"{kind}_energy_density": state.nodal_energy_density(kind) for kind in KINDS}
+            at_cells = {f"{kind}_energy_density": state.energy_density[kind] for kind in KINDS}
+            write_mesh(new / file, state.mesh, state.points, at_nodes, at_cells)
+            entries.append(f'    <DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{file}")}/>')
+        _swap(new, home / name)
+        text = "\n".join(
+            ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
+             "  <Collection>", *entries, "  </Collection>", "</VTKFile>", ""]
+        )  # fmt: skip
+        with _replacing(home / f"{name}.pvd") as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise PlotError(
+            f"series '{home / name}' cannot be written ({error.strerror}); choose a folder that you may write to"
+        ) from error
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+    return (home / f"{name}.pvd").resolve()
+
+
+# --- what is drawn --------------------------------------------------------------------------------------------
+
+
+def _colouring(state: State, colour: str | None, top: float | None) -> Colouring | None:
+    if colour is None:
+        return None
+    if colour == "total":
+        values = np.sum([state.nodal_energy_density(kind) for kind in KINDS], axis=0)
+    elif colour in KINDS:
+        values = state.nodal_energy_density(colour)
+    else:
+        raise PlotError(f"colour '{colour}' is not known; use one of {', '.join(KINDS)}, total")
+    if top is None:
+        top = float(values.max(initial=0.0))
+    if not (np.isfinite(top) and top >= 0.0):
+        raise PlotError(f"top = {top} cannot be; give an energy density in N mm / mm^2")
+    if top == 0.0:
+        return None
+    return Colouring(values, top, bool(values.max(initial=0.0) > top * (1.0 + 1e-9)))
+
+
+def _energies(state: State) -> str:
+    energy = state.energy
+    parts = [f"{kind} {_number(getattr(energy, kind))}" for kind in KINDS if getattr(energy, kind) != 0.0]
+    what = ", ".join(parts) + " N mm" if parts else "no energy"
+    return f"step {state.step + 1}, λ = {state.lam:.4g}     {what}"
+
+
+def _number(value: float) -> str:
+    """Three digits, with a power of ten in superscript where that is shorter."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.3g}" if abs(value) < 1e3 else f"{value:.0f}"
+    mantissa, exponent = f"{value:.2e}".split("e")
+    return f"{mantissa} × 10{_superscript(int(exponent))}"
+
+
+def _superscript(exponent: int) -> str:
+    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _panels(state: State) -> Any:
+    """The sheet as a pyvista surface cut open along its creases, so that shading is smooth up to them."""
+    import pyvista as pv
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    mesh, topology = state.mesh, state.mesh.topology
+    joined = np.ones(len(topology.edges), dtype=bool)
+    joined[topology.edge_triangles[:, 1] < 0] = False
+    for crease in mesh.creases:
+        joined[topology.find_edges(mesh.crease_edges(crease))] = False
+    one, two = topology.edge_triangles[joined].T
+    count = len(mesh.triangles)
+    graph = coo_array((np.ones(len(one)), (one, two)), shape=(count, count))
+    _, panel = connected_components(graph, directed=False)
+    keys = np.column_stack((np.repeat(panel, 3), mesh.triangles.ravel()))
+    corners, triangles = np.unique(keys, axis=0, return_inverse=True)
+    surface = pv.PolyData.from_regular_faces(state.points[corners[:, 1]], triangles.reshape(-1, 3))
+    surface.point_data["node"] = corners[:, 1]
+    return surface
+
+
+def _draw(plotter: Any, state: State, colouring: Colouring | None, pixel: float) -> None:
+    """Sheet, mesh edges, boundary and creases; `pixel` is how many mm one is wide."""
+    surface = _panels(state).compute_normals(
+        cell_normals=False, split_vertices=False, consistent_normals=False, auto_orient_normals=False
+    )
+    look: dict[str, Any] = {"ambient": 0.57, "diffuse": 0.47, "specular": 0.0}
+    edges = _lines(state, state.mesh.topology.edges)
+    faint: dict[str, Any] = {"line_width": 1.0, "lighting": False, "show_scalar_bar": False}
+    if colouring is None:
+        look["color"] = BLANK_SHEET
+        faint |= {"color": INK, "opacity": 0.25}
+    else:
+        scale = {"clim": (0.0, colouring.top), "show_scalar_bar": False, "interpolate_before_map": True}
+        look |= {"scalars": colouring.values[surface.point_data["node"]], "cmap": COLOURS, **scale}
+        faint |= {"scalars": colouring.values, "cmap": _shades_of_edges(), **scale}
+    drawn = plotter.add_mesh(surface, smooth_shading=True, **look)
+    # pushed back a little, so that the edges in the surface win over it
+    drawn.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    drawn.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(2.0, 2.0)
+    if len(state.mesh.triangles) <= MOST_EDGES:
+        plotter.add_mesh(edges, **faint)
+    _tubes(plotter, _lines(state, state.mesh.topology.boundary), 0.9 * pixel)
+    for crease in state.mesh.creases:
+        _tubes(plotter, _lines(state, state.mesh.crease_edges(crease)), 2.3 * pixel)
+    plotter.set_background(PAPER)
+
+
+def _shades_of_edges() -> Any:
+    """The colour map, a shade lighter where it is dark and a shade darker where it is light."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    colours = colormaps[COLOURS](np.linspace(0.0, 1.0, 256))[:, :3]
+    dark = colours @ (0.30, 0.59, 0.11) < 0.36
+    return ListedColormap(np.where(dark[:, None], 0.72 * colours + 0.28, 0.78 * colours))
+
+
+def _lines(state: State, pairs: NDArray[np.int64]) -> Any:
+    import pyvista as pv
+
+    cells = np.column_stack((np.full(len(pairs), 2), pairs))
+    return pv.PolyData(state.points, lines=cells.ravel())
+
+
+def _tubes(plotter: Any, lines: Any, radius: float) -> None:
+    joined = lines.strip(join=True, max_length=100_000)
+    plotter.add_mesh(joined.tube(radius=radius, n_sides=12, capping=True), color=INK, lighting=False)
+
+
+# --- where it is seen from ------------------------------------------------------------------------------------
+
+
+class Camera(NamedTuple):
+    """Parallel projection with z up: unit vectors of the picture in space, where it looks, half its height, mm."""
+
+    across: Array
+    up: Array
+    back: Array
+    centre: Array
+    half_height: float
+    depth: float
+
+    def aim(self, plotter: Any) -> None:
+        plotter.enable_parallel_projection()
+        plotter.camera.focal_point = self.centre
+        plotter.camera.position = self.centre + 2.0 * self.depth * self.back
+        plotter.camera.up = self.up
+        plotter.camera.parallel_scale = self.half_height
+        plotter.camera.clipping_range = (0.5 * self.depth, 3.5 * self.depth)
+
+
+def _camera(state: State, aspect: float, view: tuple[float, float] | None) -> Camera:
+    """The sheet fills the picture (`aspect` wide a height) but for a margin."""
+    across, up, back = axes = _axes(*(view or _view(state, aspect)))
+    to_picture = np.column_stack(axes)
+    seen = state.points @ to_picture
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    half_height = 0.5 * 1.08 * max(float(high[0] - low[0]) / aspect, float(high[1] - low[1]))
+    return Camera(across, up, back, to_picture @ (0.5 * (low + high)), half_height, float(np.linalg.norm(high - low)))
+
+
+def _view(state: State, aspect: float) -> tuple[float, float]:
+    """Azimuth and elevation, rad, from where most of the upper side is seen and the picture is well filled."""
+    triangles = state.points[state.mesh.triangles]
+    doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(doubled, axis=1)
+    normal, weight = doubled / area[:, None], area / area.sum()
+    if weight @ normal[:, 2] < 0.0:
+        normal = -normal
+    plan = state.points[:, :2] - state.points[:, :2].mean(axis=0)
+    long_axis = np.linalg.eigh(plan.T @ plan)[1][:, 1]
+    best, choice = -np.inf, (0.0, 0.0)
+    for elevation in np.deg2rad((30.0, 36.0, 42.0, 48.0)):
+        for azimuth in np.deg2rad(np.arange(-60.0, 300.0, 10.0)):
+            across, up, back = _axes(azimuth, elevation)
+            facing = np.log(np.maximum(normal @ back, 0.08))
+            extent = max(np.ptp(state.points @ across) / aspect, np.ptp(state.points @ up))
+            # along and across the sheet are dull; so is a view from far above
+            slanted = abs(2.0 * (long_axis @ across[:2]) * (long_axis @ back[:2]))
+            score = float(weight @ facing - 0.8 * np.log(extent) + 0.3 * slanted - 0.6 * elevation)
+            if score > best + 1e-9:
+                best, choice = score, (float(azimuth), float(elevation))
+    return choice
+
+
+def _axes(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
+    """Unit vectors of the picture in space: to its right, to its top, and towards the viewer."""
+    back = np.array(
+        (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
+    )
+    across = np.array((-np.sin(azimuth), np.cos(azimuth), 0.0))
+    return across, np.cross(back, across), back
+
+
+# --- rendering ------------------------------------------------------------------------------------------------
+
+
+def _render(state: State, colouring: Colouring | None, size: tuple[int, int], camera: Camera) -> Array:
+    """(height, width, 3) picture of the sheet alone, values in [0, 1]."""
+    width, height = size
+    with _off_screen():
+        import pyvista as pv
+
+        # drawn twice as large and averaged: the same smooth lines from every driver
+        plotter = pv.Plotter(off_screen=True, window_size=[2 * width, 2 * height], lighting="none")
+        try:
+            plotter.add_light(pv.Light(light_type="headlight", intensity=0.6))
+            plotter.add_light(pv.Light(position=(-0.8, 0.9, 0.7), light_type="camera light", intensity=0.55))
+            _draw(plotter, state, colouring, 2.0 * camera.half_height / height * max(height / 700.0, 0.5))
+            camera.aim(plotter)
+            image = np.asarray(plotter.screenshot(return_img=True), dtype=float)[..., :3] / 255.0
+        finally:
+            plotter.close()
+    averaged: Array = image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
+    return averaged
+
+
+def _frame(
+    image: Array, size: tuple[int, int], foot: int, title: str, label: str, colouring: Colouring | None
+) -> Figure:
+    """The rendered sheet, `foot` pixels above the bottom, with a line of text above and a colour bar below."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    width, height = size
+    unit = min(width / 1200, height / 900)
+    figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor=PAPER)
+    figure.figimage(image, 0, foot, origin="upper", zorder=-1)
+    text = {"color": INK, "fontsize": 13.5 * unit, "family": "DejaVu Sans"}
+    if title:
+        figure.text(0.03, 1.0 - 28 * unit / height, title.replace("$", r"\$"), ha="left", va="top", **text)
+    if colouring is not None:
+        power = int(np.floor(np.log10(colouring.top)))
+        power = power if not -2 <= power <= 2 else 0
+        scale = f"10{_superscript(power)} " if power else ""
+        axes = figure.add_axes((0.03, 52 * unit / height, 0.36, 16 * unit / height))
+        colours = ScalarMappable(Normalize(0.0, colouring.top / 10.0**power), colormaps[COLOURS])
+        bar = figure.colorbar(colours, cax=axes, orientation="horizontal", extend="max" if colouring.cut else "neither")
+        bar.outline.set_visible(False)  # type: ignore[operator]
+        axes.tick_params(length=5.0 * unit, width=unit, color=INK, labelcolor=INK, labelsize=12.5 * unit)
+        axes.locator_params(nbins=5)
+        axes.set_title(f"{label}, {scale}N mm / mm²", loc="left", pad=8.0 * unit, **text)
+    return figure
+
+
+@contextlib.contextmanager
+def _off_screen() -> Iterator[None]:
+    """Let VTK make its window from a library that is there, and leave the environment as it was."""
+    key = "VTK_DEFAULT_OPENGL_WINDOW"
+    chosen, before = _window(), os.environ.get(key)
+    if chosen and before is None:
+        os.environ[key] = chosen
+    try:
+        yield
+    finally:
+        if chosen and before is None:
+            os.environ.pop(key, None)
+
+
+def _window() -> str:
+    """VTK's kind of window to draw in off screen; "" to let VTK choose."""
+    if not sys.platform.startswith("linux"):
+        return ""
+    if _egl_works():
+        return "vtkEGLRenderWindow"
+    if any(_library(name) for name in ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")):
+        return "vtkOSOpenGLRenderWindow"
+    if _has_display():
+        return "vtkXOpenGLRenderWindow"
+    raise PlotError(
+        "pictures need an OpenGL library to draw with; on Debian or Ubuntu: apt-get install libegl1 libgl1-mesa-dri"
+    )
+
+
+@lru_cache(maxsize=1)
+def _egl_works() -> bool:
+    """True if EGL can be set up on some device (a processor will do). It stays set up, VTK shares it."""
+    egl = _library("libEGL.so.1")
+    if egl is None:
+        return False
+    egl.eglGetProcAddress.restype = ctypes.c_void_p
+    query, platform = (egl.eglGetProcAddress(name) for name in (b"eglQueryDevicesEXT", b"eglGetPlatformDisplayEXT"))
+    if not (query and platform):
+        return False
+    devices, count = (ctypes.c_void_p * 16)(), ctypes.c_int()
+    query_devices = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(query)
+    display_of = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)(platform)
+    egl.eglInitialize.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+    egl.eglInitialize.restype = ctypes.c_uint
+    if not query_devices(16, devices, ctypes.byref(count)):
+        return False
+    device_platform = 0x313F  # EGL_PLATFORM_DEVICE_EXT
+    displays = (display_of(device_platform, devices[i], None) for i in range(count.value))
+    return any(display and egl.eglInitialize(display, None, None) for display in displays)
+
+
+def _has_display() -> bool:
+    """True if a window can be opened."""
+    if not sys.platform.startswith("linux"):
+        return True
+    x11 = _library("libX11.so.6") if os.environ.get("DISPLAY") else None
+    if x11 is None:
+        return False
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XCloseDisplay.argtypes = (ctypes.c_void_p,)
+    display = x11.XOpenDisplay(None)
+    if display:
+        x11.XCloseDisplay(display)
+    return bool(display)
+
+
+def _library(name: str) -> ctypes.CDLL | None:
+    try:
+        return ctypes.CDLL(name)
+    except OSError:
+        return None
+
+
+# --- files ----------------------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def _replacing(target: FilePath) -> Iterator[FilePath]:
+    """A temporary file in the same folder that takes the place of `target` once the block is through."""
+    if target.is_dir():
+        raise PlotError(f"'{target}' is a folder; name a file to write")
+    temporary = target.parent / f".{uuid.uuid4().hex}{target.suffix}"
+    try:
+        yield temporary
+        os.replace(temporary, target)
+    except OSError as error:
+        raise PlotError(
+            f"'{target}' cannot be written ({error.strerror}); choose an existing folder that you may write to"
+        ) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _swap(new: FilePath, place: FilePath) -> None:
+    """Move the folder `new` to `place`, whatever was there before."""
+    with tempfile.TemporaryDirectory(dir=place.parent, prefix=".old-") as old:
+        if place.exists():
+            os.replace(place, FilePath(old) / place.name)
+        os.replace(new, place)

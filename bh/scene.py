@@ -1,0 +1,309 @@
+"""Scene files: TOML to a `Model`, with errors that name the key, its value and what is allowed.
+
+Every error is a `SceneError` of one line. Keys are told as dotted paths; entries of [[steps]] and [[supports]]
+count from 0, so that `steps[0]` is the first step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from bh.actuation import Actuation, Fold, Moment
+from bh.describe import ACTUATIONS as MAKERS
+from bh.errors import InputError, SceneError
+from bh.formulations import names
+from bh.model import CreaseLaw, Model, Sheet
+from bh.program import program
+from bh.scene_schema import (
+    ACTUATIONS,
+    LIBRARY,
+    CreaseTable,
+    FilePattern,
+    MeshTable,
+    ModelTable,
+    OutputsTable,
+    SheetTable,
+    SupportTable,
+    as_table,
+    as_tables,
+    check_keys,
+    nearest,
+    one_line,
+    one_or_more,
+    read_table,
+    read_toml,
+    shown,
+    within,
+)
+from bh.supports import RigidBody, Support, directions, select
+from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip, structured
+from meshes.structured import Kind
+
+SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
+LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
+LONGEST_FILE = 20_000_000  # bytes
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What `bh run` writes beside the result: pictures (PNG), the path (PVD, VTU), the folded sheet (FOLD)."""
+
+    pictures: bool = False
+    vtu: bool = False
+    fold: bool = False
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene that is ready to be solved: `bh.trace(scene.model)`.
+
+    Attributes:
+        model: checked; its steps can be programmed (`bh.program`), nothing is solved.
+        outputs: what a run is to write.
+        name: the file's name without its suffix.
+        source: the file, or None for a scene that was parsed from text.
+    """
+
+    model: Model
+    outputs: Outputs
+    name: str = "scene"
+    source: Path | None = None
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read a scene file.
+
+    Raises:
+        SceneError: it cannot be read, or asks for what cannot be; one line that begins with the file's name.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            content = file.read(LONGEST_FILE + 1)
+        if len(content) > LONGEST_FILE:
+            raise SceneError(f"the file is longer than {LONGEST_FILE // 10**6} MB; give a scene file (TOML)")
+        text = content.decode("utf-8-sig")
+        scene = _scene(text, path.parent)
+    except FileNotFoundError as error:
+        raise SceneError(one_line(f"there is no scene file '{path}'; check the name")) from error
+    except IsADirectoryError as error:
+        raise SceneError(one_line(f"'{path}' is a folder; give the scene file (TOML) in it")) from error
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            one_line(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text")
+        ) from error
+    except InputError as error:
+        raise SceneError(one_line(f"{path}: {error}")) from error
+    except (OSError, ValueError) as error:  # rights, a null character in the name
+        why = getattr(error, "strerror", None) or error
+        raise SceneError(one_line(f"the scene file '{path}' cannot be read ({why})")) from error
+    return replace(scene, name=path.stem, source=path)
+
+
+def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
+    """A scene from its text; `folder` is where files that it names are looked for.
+
+    Raises:
+        SceneError: the text is not TOML, or what it asks for cannot be; one line that begins with `name`.
+    """
+    try:
+        return replace(_scene(text, Path(folder)), name=name)
+    except InputError as error:
+        raise SceneError(one_line(f"{name}: {error}")) from error
+
+
+def _scene(text: str, folder: Path) -> Scene:
+    data = read_toml(text)
+    check_keys("", data, SECTIONS)
+    for key in ("pattern", "sheet", "steps"):
+        if key not in data:
+            raise SceneError(f"{key} is missing; add a table {'[[steps]]' if key == 'steps' else f'[{key}]'}")
+    sheet = read_table(SheetTable, data["sheet"], "sheet")
+    formulation = _formulation(read_table(ModelTable, data.get("model", {}), "model").formulation)
+    outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
+    supports = as_tables(data.get("supports", []), "supports")
+    creases = as_table(data.get("creases", {}), "creases")
+    model = Model(
+        mesh=_mesh(data["pattern"], data.get("mesh"), folder),
+        sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
+        supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
+        steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
+        creases={name: _crease(item, f"creases.{name}") for name, item in creases.items()},
+        formulation=formulation,
+    )
+    _check(model)
+    return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold))
+
+
+# --- from tables to descriptions ----------------------------------------------------------------------------
+
+
+def _formulation(name: str) -> str:
+    known = names()
+    if name not in known:
+        listed = ", ".join(known) or "none; install the project with pip first"
+        raise SceneError(
+            f"model.formulation = {shown(name)} is not known{nearest(name, known)}; use one of {listed}"
+        )
+    return name
+
+
+def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
+    table = as_table(pattern, "pattern")
+    if "file" in table:
+        return _mesh_from_file(read_table(FilePattern, table, "pattern"), mesh, folder)
+    kind = table.get("kind")
+    listed = ", ".join(LIBRARY)
+    if kind is None:
+        raise SceneError(f"pattern.kind is missing; use one of {listed}, or give a file")
+    if not isinstance(kind, str) or kind not in LIBRARY:
+        raise SceneError(
+            f"pattern.kind = {shown(kind)} is not known{nearest(kind, LIBRARY)}; use one of {listed}"
+        )
+    drawn = read_table(LIBRARY[kind], table, "pattern")
+    if mesh is None:
+        raise SceneError(
+            "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
+        )
+    how = _mesh_table(as_table(mesh, "mesh"))
+    flat = _pattern(drawn)
+    _check_size(flat, how)
+    with within("mesh"):
+        return structured(flat, how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
+
+
+def _mesh_table(table: dict[str, Any]) -> MeshTable:
+    if table.get("kind") == "gmsh":
+        listed = ", ".join(get_args(Kind))
+        raise SceneError(f'mesh.kind = "gmsh": this version does not mesh with gmsh yet; use one of {listed}')
+    if "size" in table:
+        raise SceneError(
+            f"mesh.size = {shown(table['size'])} is for gmsh, not there yet; use along or aspect_ratio"
+        )
+    return read_table(MeshTable, table, "mesh")
+
+
+def _pattern(table: Any) -> CreasePattern:
+    with within("pattern"):
+        if table.kind == "strip":
+            return strip(table.length, table.width, table.creases, table.fold)
+        if table.kind == "annulus_sector":
+            return annulus_sector(table.radius, table.width, table.angle, table.fold)
+        return full_annulus(table.radius, table.width, table.fold)
+
+
+def _mesh_from_file(table: FilePattern, mesh: Any, folder: Path) -> SheetMesh:
+    name = shown(table.file)
+    if Path(table.file).suffix.lower() != ".fold":
+        raise SceneError(f"pattern.file = {name} is not a .fold file; this version reads no other yet")
+    if mesh is not None:
+        raise SceneError(f"mesh: {name} brings its own faces, and they are the mesh; remove [mesh]")
+    from meshes.io import read_fold
+
+    with within("pattern.file"):
+        return read_fold(folder / table.file, table.frame)
+
+
+def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
+    """Refuse what would only fill the memory; `structured` decides the exact numbers."""
+    panels = len(pattern.rails) - 1
+    along = float(how.along or 0)
+    if how.aspect_ratio is not None:
+        length = max(rail.length for rail in pattern.rails)
+        inner, outer = (rail.point(np.zeros(1))[0] for rail in (pattern.rails[0], pattern.rails[-1]))
+        height = math.dist(inner, outer) / panels
+        along = how.aspect_ratio * length / height * how.rows
+    triangles = 2.0 * along * how.rows * panels
+    if triangles > LARGEST_MESH:
+        raise SceneError(f"mesh: this is some {triangles:.2g} triangles; ask for fewer than {LARGEST_MESH:,}")
+
+
+def _support(item: Any, at: str) -> Support | RigidBody:
+    table = read_table(SupportTable, item, at)
+    if table.at == "rigid-body":
+        return RigidBody()
+    place = table.at if isinstance(table.at, str) else tuple(table.at)
+    if table.fix is None:
+        return Support(place)
+    fix: Any = table.fix
+    if not isinstance(fix, str):
+        vectors = fix if isinstance(fix[0], list) else [fix]
+        fix = tuple(_direction(vector, f"{at}.fix") for vector in vectors)
+    with within(f"{at}.fix"):
+        directions(fix)
+    return Support(place, fix)
+
+
+def _crease(item: Any, at: str) -> CreaseLaw:
+    table = read_table(CreaseTable, item, at)
+    with within(at):
+        return CreaseLaw(table.Lstar, table.stiffness, table.rest)
+
+
+def _step(item: Any, at: str) -> tuple[Actuation, ...]:
+    step = as_table(item, at)
+    if "pinch" in step:
+        raise SceneError(f"{at}.pinch: this version cannot pinch yet; use fold, moment, force or displace")
+    check_keys(at, step, ACTUATIONS)
+    if not step:
+        raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
+    found: list[Actuation] = []
+    for key, value in step.items():
+        for where, each in one_or_more(value, f"{at}.{key}"):
+            found.append(_actuation(key, each, where))
+    return tuple(found)
+
+
+def _actuation(key: str, item: Any, at: str) -> Actuation:
+    given = {name: _tuple(value) for name, value in read_table(ACTUATIONS[key], item, at)}
+    if isinstance(given.get("direction"), tuple):
+        given["direction"] = _direction(given["direction"], f"{at}.direction")
+    with within(at):
+        return MAKERS[key](**given)
+
+
+def _direction(vector: Sequence[float], at: str) -> tuple[float, ...]:
+    """The vector over its largest component, so that very small and very large ones keep their direction."""
+    largest = max(abs(component) for component in vector)
+    if largest == 0.0:
+        raise SceneError(f"{at} = {shown(list(vector))} is the zero vector; give it a direction")
+    return tuple(component / largest for component in vector)
+
+
+def _check(model: Model) -> None:
+    """Are all places and creases there, can the steps be programmed? Errors tell where in the scene it is."""
+    mesh = model.mesh
+    for name in model.creases:
+        with within(f"creases.{name}"):
+            mesh.crease_edges(name)
+    for i, support in enumerate(model.supports):
+        if isinstance(support, Support):
+            with within(f"supports[{i}].at"):
+                select(mesh, support.at)
+    for i, step in enumerate(model.steps):
+        for item in step:
+            key = type(item).__name__.lower()
+            if isinstance(item, Fold | Moment):
+                if item.crease != "all":
+                    with within(f"steps[{i}].{key}.crease"):
+                        mesh.crease_edges(item.crease)
+            else:
+                with within(f"steps[{i}].{key}.at"):
+                    select(mesh, item.at)
+    try:
+        program(model)
+    except InputError:
+        for i in range(len(model.steps)):  # the first step that the sheet cannot take
+            with within(f"steps[{i}]"):
+                program(replace(model, steps=model.steps[: i + 1]))
+        raise
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

@@ -1,0 +1,1 @@
+"""Closed forms, one file a source; nothing in here imports the solvers."""
