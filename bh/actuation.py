@@ -64,14 +64,18 @@ class Fold:
             raise ModelError(f"fold of crease '{self.crease}' has Lstar and stiffness; give one of them")
         if self.to is not None and (self.Lstar is not None or self.stiffness is not None):
             raise ModelError(
-                f"fold of crease '{self.crease}': 'to' is imposed exactly and takes no stiffness; use 'rest' for a spring"
+                f"fold of crease '{self.crease}': 'to' is exact and takes no stiffness; use 'rest' for a spring"
             )
         for key in ("Lstar", "stiffness"):
             value = getattr(self, key)
             if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise ModelError(f"fold of crease '{self.crease}': {key} = {value} cannot be; give a positive number")
+                raise ModelError(
+                    f"fold of crease '{self.crease}': {key} = {value} cannot be; give a positive number"
+                )
         if isinstance(self.by, str) and self.by != "drawn":
-            raise ModelError(f"fold of crease '{self.crease}': by = '{self.by}' is not understood; use rad or 'drawn'")
+            raise ModelError(
+                f"fold of crease '{self.crease}': by = '{self.by}' is not understood; use rad or 'drawn'"
+            )
         limits = {"to": (0.0, 2.0 * math.pi), "rest": (0.0, 2.0 * math.pi), "by": (-math.pi, math.pi)}
         for key in given:
             value = getattr(self, key)
@@ -107,7 +111,9 @@ class Force:
 
     def __post_init__(self) -> None:
         if (self.each is None) == (self.total is None):
-            raise ModelError(f"force at '{self.at}' needs either each or total, a vector of three numbers in N")
+            raise ModelError(
+                f"force at '{self.at}' needs either each or total, a vector of three numbers in N"
+            )
         vector = self.each if self.each is not None else self.total
         assert vector is not None
         _vector(f"force at '{self.at}'", vector)
@@ -128,7 +134,9 @@ class Displace:
         _finite(f"displacement at '{self.at}'", (self.by,))
         if isinstance(self.direction, str):
             if self.direction not in ("x", "y", "z"):
-                raise ModelError(f"displacement at '{self.at}': direction '{self.direction}' is not x, y, z or a vector")
+                raise ModelError(
+                    f"displacement at '{self.at}': direction '{self.direction}' is not x, y, z or a vector"
+                )
         else:
             _vector(f"displacement at '{self.at}': direction", self.direction)
             if not any(self.direction):

@@ -19,7 +19,12 @@ from meshes import Arc, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
 AnyArray = NDArray[Any]
-ACTUATIONS: dict[str, type[Actuation]] = {"fold": Fold, "moment": Moment, "force": Force, "displace": Displace}
+ACTUATIONS: dict[str, type[Actuation]] = {
+    "fold": Fold,
+    "moment": Moment,
+    "force": Force,
+    "displace": Displace,
+}
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "polyline": Polyline}
 FORMAT = 1
 
@@ -57,7 +62,9 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
         PathFileError: the data are of another version or incomplete.
     """
     if data.get("format") != FORMAT:
-        raise PathFileError(f"stored model has format {data.get('format')}, this version reads {FORMAT}; solve again")
+        raise PathFileError(
+            f"stored model has format {data.get('format')}, this version reads {FORMAT}; solve again"
+        )
     try:
         flat = data["mesh"]
         sets = {name.removeprefix("edges/"): a for name, a in arrays.items() if name.startswith("edges/")}

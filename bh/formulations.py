@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 from importlib.metadata import entry_points
 from typing import Any, Protocol
 
@@ -29,7 +29,13 @@ class Formulation(Protocol):
     def system(self, model: Model, program: StepProgram, start: State | None) -> Any: ...
 
     def observe(
-        self, model: Model, system: Any, q: NDArray[np.float64], lam: float, step: int = 0, stable: bool | None = None
+        self,
+        model: Model,
+        system: Any,
+        q: NDArray[np.float64],
+        lam: float,
+        step: int = 0,
+        stable: bool | None = None,
     ) -> State: ...
 
 
@@ -38,7 +44,7 @@ def names() -> list[str]:
     return sorted(point.name for point in entry_points(group=GROUP))
 
 
-@lru_cache(maxsize=None)
+@cache
 def formulation(name: str) -> Formulation:
     """The formulation of that name.
 

@@ -56,7 +56,9 @@ class CreaseLaw:
         assert value is not None
         low_ok = value > 0.0 if self.Lstar is not None else value >= 0.0
         if not (math.isfinite(value) and low_ok):
-            raise ModelError(f"crease stiffness {value} cannot be; give a positive Lstar, or a stiffness of 0 or more")
+            raise ModelError(
+                f"crease stiffness {value} cannot be; give a positive Lstar, or a stiffness of 0 or more"
+            )
 
     def per_length(self, sheet: Sheet) -> float:
         """Stiffness a length of crease (Eq. 3.12 with nu = 0), N mm / (mm rad)."""

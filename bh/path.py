@@ -251,11 +251,16 @@ def _run_step(
         here = point(system, q, 0.0)
         if step == 0:
             imbalance = system.evaluate(q, 0.0).imbalance
-            accept(Record(0, 0.0, q, 0, imbalance, None, time.perf_counter() - began, strategy.limits(system)[0]))
+            accept(
+                Record(0, 0.0, q, 0, imbalance, None, time.perf_counter() - began, strategy.limits(system)[0])
+            )
             began = time.perf_counter()
         history, increment = [here], None
     else:
-        history, increment = [point(system, record.q, record.lam) for record in done[-3:]], done[-1].next_increment
+        history, increment = (
+            [point(system, record.q, record.lam) for record in done[-3:]],
+            done[-1].next_increment,
+        )
         if len(done) < 3 and (step > 0 or done[0].lam == 0.0) and done[0].lam > 0.0:
             history.insert(0, point(system, system.start(), 0.0))
     journey: Iterator[Increment] = walk(Walk(system, strategy, tuple(history), increment))
@@ -266,9 +271,17 @@ def _run_step(
         at: Point = increment_.point
         accept(
             Record(
-                step, at.lam, at.q, increment_.iterations, increment_.imbalance, increment_.stable, now - began,
-                increment_.next_increment, increment_.note, increment_.cuts,
-            )  # fmt: skip
+                step,
+                at.lam,
+                at.q,
+                increment_.iterations,
+                increment_.imbalance,
+                increment_.stable,
+                now - began,
+                increment_.next_increment,
+                increment_.note,
+                increment_.cuts,
+            )
         )
         report.update(step, len(path.model.steps), at.lam, increment_.iterations, at.energy)
         began = time.perf_counter()
@@ -283,7 +296,9 @@ def _new_file(path: Path, file: FilePath) -> PathFile:
 def _resume(model: Model, file: FilePath) -> tuple[Path, PathFile]:
     path = Path.load(file)
     if path.provenance.get("input") != fingerprint(model):
-        raise PathFileError(f"'{file}' holds another model; run without --resume, or choose another output folder")
+        raise PathFileError(
+            f"'{file}' holds another model; run without --resume, or choose another output folder"
+        )
     path = _with_model(path, model)
     target = PathFile.open(file)
     target.forget_failed_steps()

@@ -1,8 +1,8 @@
 """Pictures of folded sheets, curves of energy, and series for ParaView.
 
-Pictures are rendered by pyvista without a window and framed by matplotlib, which both are imported when first
-needed. On Linux rendering needs one of the libraries EGL, OSMesa or X11; which of them there is is asked before
-VTK is, because VTK ends the process where it finds none.
+Pictures are rendered by pyvista without a window and framed by matplotlib, both imported when first needed. On
+Linux rendering needs EGL, OSMesa or an X server. Which of them works is found out before VTK is asked, because
+VTK ends the whole process where it finds none.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, NamedTuple
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshes.errors import InputError
+from meshes.io.export import replacing, write_mesh
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,8 +71,8 @@ def picture(
 
     Args:
         file: to write, .png; appears whole or not at all.
-        colour: "stretching", "bending", "folding" or "total" energy density averaged to nodes, N mm / mm^2; None
-            for the plain sheet (which is also drawn where there is no such energy at all).
+        colour: "stretching", "bending", "folding" or "total" energy density averaged to nodes,
+            N mm / mm^2; None for the plain sheet (also drawn where there is no such energy at all).
         size: width and height, pixels.
         caption: a line of text; True for lambda and the energies, False for none.
         camera: azimuth and elevation that it looks from, rad; None for where most of the sheet is seen.
@@ -98,7 +98,7 @@ def picture(
     inner = height - head - foot
     image = _render(state, colouring, (width, inner), _camera(state, width / inner, camera))
     figure = _frame(image, (width, height), foot, title, f"{colour} energy density", colouring)
-    with _replacing(target) as temporary:
+    with replacing(target) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
     return target.resolve()
 
@@ -114,7 +114,7 @@ def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
         PlotError: an unknown colour, or there is no display.
     """
     if not _has_display():
-        raise PlotError("there is no display to show the sheet on; use bh.plotting.picture(state, 'sheet.png')")
+        raise PlotError("no display to show the sheet on; use bh.plotting.picture(state, 'sheet.png')")
     import pyvista as pv
 
     colouring = _colouring(state, colour, None)
@@ -122,7 +122,8 @@ def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
     aim = _camera(state, 4 / 3, None)
     _draw(plotter, state, colouring, 2.0 * aim.half_height / 900)
     if colouring is not None:
-        plotter.add_scalar_bar(title=f"{colour} energy density, N mm / mm^2", color=INK, n_labels=4, fmt="%.2g")
+        label = f"{colour} energy density, N mm / mm^2"
+        plotter.add_scalar_bar(title=label, color=INK, n_labels=4, fmt="%.2g")
     plotter.add_text(_energies(state), font_size=9, color=INK)
     aim.aim(plotter)
     return plotter.show(**options)
@@ -150,7 +151,7 @@ def curves(path: Path) -> Figure:
         axes.axvline(boundary, color="0.85", linewidth=1.0, zorder=0)
     for kind, values in shown.items():
         colour, dashes = CURVES[kind]
-        axes.plot(at, values, color=colour, linestyle=dashes, marker="o", markersize=3.0, linewidth=1.8, label=kind)
+        axes.plot(at, values, color=colour, linestyle=dashes, marker="o", markersize=3.0, label=kind)
     axes.set(xlabel="step + λ", ylabel="energy, N mm", xlim=(at[0], max(at[-1], at[0] + 1e-3)))
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(y=0.06)
@@ -161,11 +162,11 @@ def curves(path: Path) -> Figure:
 
 
 def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path") -> FilePath:
-    """Write every state as a VTU file and the collection `name`.pvd that ParaView plays, time = step + lambda.
+    """Write every state as a VTU file, and the collection `name`.pvd of them with time = step + lambda.
 
-    Point data are the displacement (mm) and the energy densities by kind averaged to nodes, cell data the energy
-    densities of the triangles (N mm / mm^2). The states lie in the folder `name` beside the collection; both
-    appear when all is written and replace what was there.
+    Point data are the displacement (mm) and the energy densities by kind averaged to nodes, cell data the
+    energy densities of the triangles (N mm / mm^2). The states lie in the folder `name` beside the collection;
+    both appear when all is written and replace what was there.
 
     Returns:
         the absolute path of the collection.
@@ -173,8 +174,6 @@ def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path"
     Raises:
         PlotError: a path without states, or a folder that cannot be written to.
     """
-    from meshes.io import write_mesh
-
     if not name or not name.replace("-", "").replace("_", "").isalnum():
         raise PlotError(f"series name '{name}' cannot be; use letters, digits, '-' and '_'")
     if len(path) == 0:
@@ -190,24 +189,24 @@ def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path"
             at_nodes |= {f"{kind}_energy_density": state.nodal_energy_density(kind) for kind in KINDS}
             at_cells = {f"{kind}_energy_density": state.energy_density[kind] for kind in KINDS}
             write_mesh(new / file, state.mesh, state.points, at_nodes, at_cells)
-            entries.append(f'    <DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{file}")}/>')
+            entries.append(f'    <DataSet timestep="{time:.17g}" part="0" file="{name}/{file}"/>')
         _swap(new, home / name)
         text = "\n".join(
             ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
              "  <Collection>", *entries, "  </Collection>", "</VTKFile>", ""]
         )  # fmt: skip
-        with _replacing(home / f"{name}.pvd") as temporary:
+        with replacing(home / f"{name}.pvd") as temporary:
             temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         raise PlotError(
-            f"series '{home / name}' cannot be written ({error.strerror}); choose a folder that you may write to"
+            f"'{home / name}' cannot be written ({error.strerror}); choose a folder that you may write to"
         ) from error
     finally:
         shutil.rmtree(new, ignore_errors=True)
     return (home / f"{name}.pvd").resolve()
 
 
-# --- what is drawn --------------------------------------------------------------------------------------------
+# --- what is drawn -----------------------------------------------------------------------------------------
 
 
 def _colouring(state: State, colour: str | None, top: float | None) -> Colouring | None:
@@ -240,7 +239,7 @@ def _number(value: float) -> str:
     if value == 0.0 or 1e-3 <= abs(value) < 1e5:
         return f"{value:.3g}" if abs(value) < 1e3 else f"{value:.0f}"
     mantissa, exponent = f"{value:.2e}".split("e")
-    return f"{mantissa} × 10{_superscript(int(exponent))}"
+    return f"{mantissa} \N{MULTIPLICATION SIGN} 10{_superscript(int(exponent))}"
 
 
 def _superscript(exponent: int) -> str:
@@ -318,11 +317,11 @@ def _tubes(plotter: Any, lines: Any, radius: float) -> None:
     plotter.add_mesh(joined.tube(radius=radius, n_sides=12, capping=True), color=INK, lighting=False)
 
 
-# --- where it is seen from ------------------------------------------------------------------------------------
+# --- where it is seen from ---------------------------------------------------------------------------------
 
 
 class Camera(NamedTuple):
-    """Parallel projection with z up: unit vectors of the picture in space, where it looks, half its height, mm."""
+    """Parallel projection with z up: the picture's unit vectors in space, its centre and half its height, mm."""
 
     across: Array
     up: Array
@@ -342,16 +341,17 @@ class Camera(NamedTuple):
 
 def _camera(state: State, aspect: float, view: tuple[float, float] | None) -> Camera:
     """The sheet fills the picture (`aspect` wide a height) but for a margin."""
-    across, up, back = axes = _axes(*(view or _view(state, aspect)))
-    to_picture = np.column_stack(axes)
+    across, up, back = _axes(*(view or _view(state, aspect)))
+    to_picture = np.column_stack((across, up, back))
     seen = state.points @ to_picture
     low, high = seen.min(axis=0), seen.max(axis=0)
-    half_height = 0.5 * 1.08 * max(float(high[0] - low[0]) / aspect, float(high[1] - low[1]))
-    return Camera(across, up, back, to_picture @ (0.5 * (low + high)), half_height, float(np.linalg.norm(high - low)))
+    width, height, _ = (high - low).tolist()
+    centre, depth = to_picture @ (0.5 * (low + high)), float(np.linalg.norm(high - low))
+    return Camera(across, up, back, centre, 0.54 * max(width / aspect, height), depth)
 
 
 def _view(state: State, aspect: float) -> tuple[float, float]:
-    """Azimuth and elevation, rad, from where most of the upper side is seen and the picture is well filled."""
+    """Azimuth and elevation, rad, from where most of the upper side is seen and the picture is filled."""
     triangles = state.points[state.mesh.triangles]
     doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(doubled, axis=1)
@@ -383,7 +383,7 @@ def _axes(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
     return across, np.cross(back, across), back
 
 
-# --- rendering ------------------------------------------------------------------------------------------------
+# --- rendering ---------------------------------------------------------------------------------------------
 
 
 def _render(state: State, colouring: Colouring | None, size: tuple[int, int], camera: Camera) -> Array:
@@ -409,7 +409,7 @@ def _render(state: State, colouring: Colouring | None, size: tuple[int, int], ca
 def _frame(
     image: Array, size: tuple[int, int], foot: int, title: str, label: str, colouring: Colouring | None
 ) -> Figure:
-    """The rendered sheet, `foot` pixels above the bottom, with a line of text above and a colour bar below."""
+    """The rendered sheet, `foot` pixels above the bottom, a line of text above it and a colour bar below."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -419,7 +419,7 @@ def _frame(
     unit = min(width / 1200, height / 900)
     figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor=PAPER)
     figure.figimage(image, 0, foot, origin="upper", zorder=-1)
-    text = {"color": INK, "fontsize": 13.5 * unit, "family": "DejaVu Sans"}
+    text: dict[str, Any] = {"color": INK, "fontsize": 13.5 * unit, "family": "DejaVu Sans"}
     if title:
         figure.text(0.03, 1.0 - 28 * unit / height, title.replace("$", r"\$"), ha="left", va="top", **text)
     if colouring is not None:
@@ -428,8 +428,9 @@ def _frame(
         scale = f"10{_superscript(power)} " if power else ""
         axes = figure.add_axes((0.03, 52 * unit / height, 0.36, 16 * unit / height))
         colours = ScalarMappable(Normalize(0.0, colouring.top / 10.0**power), colormaps[COLOURS])
-        bar = figure.colorbar(colours, cax=axes, orientation="horizontal", extend="max" if colouring.cut else "neither")
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        extend = "max" if colouring.cut else "neither"
+        figure.colorbar(colours, cax=axes, orientation="horizontal", extend=extend, drawedges=False)
+        axes.spines[:].set_visible(False)
         axes.tick_params(length=5.0 * unit, width=unit, color=INK, labelcolor=INK, labelsize=12.5 * unit)
         axes.locator_params(nbins=5)
         axes.set_title(f"{label}, {scale}N mm / mm²", loc="left", pad=8.0 * unit, **text)
@@ -461,7 +462,7 @@ def _window() -> str:
     if _has_display():
         return "vtkXOpenGLRenderWindow"
     raise PlotError(
-        "pictures need an OpenGL library to draw with; on Debian or Ubuntu: apt-get install libegl1 libgl1-mesa-dri"
+        "pictures need an OpenGL library; on Debian or Ubuntu: apt-get install libegl1 libgl1-mesa-dri"
     )
 
 
@@ -472,14 +473,15 @@ def _egl_works() -> bool:
     if egl is None:
         return False
     egl.eglGetProcAddress.restype = ctypes.c_void_p
-    query, platform = (egl.eglGetProcAddress(name) for name in (b"eglQueryDevicesEXT", b"eglGetPlatformDisplayEXT"))
+    query = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
+    platform = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
     if not (query and platform):
         return False
-    devices, count = (ctypes.c_void_p * 16)(), ctypes.c_int()
-    query_devices = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(query)
-    display_of = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)(platform)
-    egl.eglInitialize.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
-    egl.eglInitialize.restype = ctypes.c_uint
+    pointer, number = ctypes.c_void_p, ctypes.c_int
+    query_devices = ctypes.CFUNCTYPE(number, number, pointer, pointer)(query)
+    display_of = ctypes.CFUNCTYPE(pointer, number, pointer, pointer)(platform)
+    egl.eglInitialize.argtypes = (pointer, pointer, pointer)
+    devices, count = (pointer * 16)(), number()
     if not query_devices(16, devices, ctypes.byref(count)):
         return False
     device_platform = 0x313F  # EGL_PLATFORM_DEVICE_EXT
@@ -507,27 +509,6 @@ def _library(name: str) -> ctypes.CDLL | None:
         return ctypes.CDLL(name)
     except OSError:
         return None
-
-
-# --- files ----------------------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def _replacing(target: FilePath) -> Iterator[FilePath]:
-    """A temporary file in the same folder that takes the place of `target` once the block is through."""
-    if target.is_dir():
-        raise PlotError(f"'{target}' is a folder; name a file to write")
-    temporary = target.parent / f".{uuid.uuid4().hex}{target.suffix}"
-    try:
-        yield temporary
-        os.replace(temporary, target)
-    except OSError as error:
-        raise PlotError(
-            f"'{target}' cannot be written ({error.strerror}); choose an existing folder that you may write to"
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def _swap(new: FilePath, place: FilePath) -> None:

@@ -82,7 +82,9 @@ class _Builder:
     def hinges(self, crease: str) -> Ints:
         found = self.hinge_of_edge[self.mesh.topology.find_edges(self.mesh.crease_edges(crease))]
         if (found < 0).any():
-            raise ModelError(f"crease '{crease}' runs along the boundary, where nothing can fold; draw it inside")
+            raise ModelError(
+                f"crease '{crease}' runs along the boundary, where nothing can fold; draw it inside"
+            )
         return found
 
     def creases(self, name: str) -> tuple[Ints, Array, Array]:
@@ -137,7 +139,9 @@ class _Builder:
         spring = item.rest is not None or item.Lstar is not None or item.stiffness is not None
         if isinstance(item.by, str):
             if np.isnan(drawn).any():
-                raise ModelError(f"fold of crease '{item.crease}': the pattern gives no fold angles; use by = radians")
+                raise ModelError(
+                    f"fold of crease '{item.crease}': the pattern gives no fold angles; use by = radians"
+                )
             angle = math.pi - drawn
         elif item.by is not None:
             angle = math.pi - sense * self._per_edge(item, item.by, len(hinges))
@@ -148,7 +152,9 @@ class _Builder:
         if not spring:
             inside = (angle > 0.0) & (angle < 2.0 * math.pi)
             if not inside.all():
-                raise ModelError(f"fold of crease '{item.crease}' closes it completely; stay inside (0, 2 pi) rad")
+                raise ModelError(
+                    f"fold of crease '{item.crease}' closes it completely; stay inside (0, 2 pi) rad"
+                )
             self.law[hinges] = HELD
             self.held[hinges] = angle
             return

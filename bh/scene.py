@@ -1,7 +1,7 @@
 """Scene files: TOML to a `Model`, with errors that name the key, its value and what is allowed.
 
-Every error is a `SceneError` of one line. Keys are told as dotted paths; entries of [[steps]] and [[supports]]
-count from 0, so that `steps[0]` is the first step.
+Every error is a `SceneError` of one line. Keys are told as dotted paths; entries of [[steps]] and
+[[supports]] count from 0, so that `steps[0]` is the first step.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ LONGEST_FILE = 20_000_000  # bytes
 
 @dataclass(frozen=True)
 class Outputs:
-    """What `bh run` writes beside the result: pictures (PNG), the path (PVD, VTU), the folded sheet (FOLD)."""
+    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet (FOLD)."""
 
     pictures: bool = False
     vtu: bool = False

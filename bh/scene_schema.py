@@ -1,7 +1,8 @@
 """What a scene file may hold: one class a table, one field a key, its description what is allowed there.
 
-Descriptions are what a user reads behind "give ..." in an error, so they state unit and range. Values that only
-fit or fail together with others (a place, a width too large for its radius) are checked where they are used.
+Descriptions are what a user reads behind "give ..." in an error, so they state unit and range. Values that
+only fit or fail together with others (a place, a width too large for its radius) are checked where they are
+used.
 """
 
 from __future__ import annotations

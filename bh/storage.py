@@ -74,7 +74,9 @@ class PathFile:
             db = _connect(draft)
             with db:
                 db.executescript(SCHEMA)
-                db.executemany("INSERT INTO meta VALUES (?, ?)", [(k, json.dumps(v)) for k, v in meta.items()])
+                db.executemany(
+                    "INSERT INTO meta VALUES (?, ?)", [(k, json.dumps(v)) for k, v in meta.items()]
+                )
                 db.executemany(
                     "INSERT INTO arrays VALUES (?, ?, ?, ?)",
                     [
@@ -86,7 +88,9 @@ class PathFile:
             draft.replace(file)
             return cls(file, _connect(file))
         except (OSError, sqlite3.Error) as error:
-            raise PathFileError(f"cannot write '{file}' ({error}); choose a folder that can be written") from error
+            raise PathFileError(
+                f"cannot write '{file}' ({error}); choose a folder that can be written"
+            ) from error
 
     @classmethod
     def open(cls, file: FilePath) -> PathFile:
@@ -102,7 +106,9 @@ class PathFile:
             db = _connect(file)
             db.execute("SELECT count(*) FROM states").fetchone()
         except sqlite3.Error as error:
-            raise PathFileError(f"'{file}' is not a path file ({error}); give one that bh has written") from error
+            raise PathFileError(
+                f"'{file}' is not a path file ({error}); give one that bh has written"
+            ) from error
         return cls(file, db)
 
     def add(self, row: StateRow) -> None:
@@ -134,7 +140,10 @@ class PathFile:
 
     def arrays(self) -> dict[str, AnyArray]:
         rows = self._db.execute("SELECT name, dtype, shape, data FROM arrays")
-        return {name: np.frombuffer(data, dtype).reshape(json.loads(shape)).copy() for name, dtype, shape, data in rows}
+        return {
+            name: np.frombuffer(data, dtype).reshape(json.loads(shape)).copy()
+            for name, dtype, shape, data in rows
+        }
 
     def states(self) -> Iterator[StateRow]:
         rows = self._db.execute(

@@ -8,6 +8,18 @@ from meshes.pattern import Crease, CreasePattern
 from meshes.structured import structured
 
 __all__ = [
-    "Arc", "Crease", "CreasePattern", "FileFormatError", "InputError", "Line", "MeshError",
-    "PatternError", "Polyline", "SheetMesh", "annulus_sector", "full_annulus", "strip", "structured",
+    "Arc",
+    "Crease",
+    "CreasePattern",
+    "FileFormatError",
+    "InputError",
+    "Line",
+    "MeshError",
+    "PatternError",
+    "Polyline",
+    "SheetMesh",
+    "annulus_sector",
+    "full_annulus",
+    "strip",
+    "structured",
 ]

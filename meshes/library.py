@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from meshes.curves import Arc, Curve, Line, sample
+from meshes.curves import Arc, Array, Curve, Line, sample
 from meshes.errors import PatternError
 from meshes.pattern import Crease, CreasePattern, FoldKind
 
@@ -52,9 +52,7 @@ def annulus_sector(
     return _between_rails([Arc((0.0, 0.0), r, 0.0, angle) for r in radii], folds)
 
 
-def full_annulus(
-    radius: float | Sequence[float], width: float, folds: Folds = "mountain"
-) -> CreasePattern:
+def full_annulus(radius: float | Sequence[float], width: float, folds: Folds = "mountain") -> CreasePattern:
     """A whole annulus with concentric creases; arguments as for `annulus_sector`."""
     return _between_rails([Arc((0.0, 0.0), r, 0.0, 2.0 * math.pi) for r in _radii(radius, width)], folds)
 
@@ -65,7 +63,9 @@ def _radii(radius: float | Sequence[float], width: float) -> list[float]:
         _positive("radius", r)
     width = _positive("width", width)
     if not creases or sorted(set(creases)) != creases:
-        raise PatternError(f"radii {creases} do not rise; give the crease radii from the inside to the outside")
+        raise PatternError(
+            f"radii {creases} do not rise; give the crease radii from the inside to the outside"
+        )
     if creases[0] <= width:
         raise PatternError(
             f"width {width:g} mm reaches the centre of a crease of radius {creases[0]:g} mm; make it smaller"
@@ -75,7 +75,7 @@ def _radii(radius: float | Sequence[float], width: float) -> list[float]:
 
 def _between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
     count = len(rails) - 2
-    kinds: list[FoldKind] = [folds] * count if isinstance(folds, str) else list(folds)  # type: ignore[list-item]
+    kinds: list[FoldKind] = [folds] * count if isinstance(folds, str) else list(folds)
     if len(kinds) != count:
         raise PatternError(f"{len(kinds)} folds for {count} creases; give one word a crease, or one for all")
     names = ["crease"] if count == 1 else [f"crease-{i + 1}" for i in range(count)]
@@ -83,6 +83,7 @@ def _between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
         Crease(name, rail, kind) for name, rail, kind in zip(names, rails[1:-1], kinds, strict=True)
     )
     inner, outer = rails[0], rails[-1]
+    rings: tuple[Array, ...]
     edges: tuple[tuple[str, Curve], ...] = (("inner", inner), ("outer", outer))
     if inner.closed:
         rings = (sample(outer)[:-1], sample(inner)[:-1])

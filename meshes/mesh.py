@@ -61,7 +61,9 @@ class SheetMesh:
         set_(self, "triangles", _frozen(np.array(self.triangles, dtype=np.int64)))
         for name in ("edge_sets", "fold_angles"):
             dtype = np.int64 if name == "edge_sets" else float
-            frozen = {key: _frozen(np.array(value, dtype=dtype)) for key, value in getattr(self, name).items()}
+            frozen = {
+                key: _frozen(np.array(value, dtype=dtype)) for key, value in getattr(self, name).items()
+            }
             set_(self, name, MappingProxyType(frozen))
         for name in ("corners", "folds", "curves"):
             set_(self, name, MappingProxyType(dict(getattr(self, name))))

@@ -83,7 +83,9 @@ def _check_geometry(rings: Sequence[Array], creases: Sequence[Crease]) -> None:
             raise PatternError("a boundary ring needs at least three finite points")
     sheet = shapely.Polygon(rings[0], holes=list(rings[1:]))
     if not sheet.is_valid or sheet.area <= 0.0:
-        raise PatternError(f"the outline is not a simple polygon ({shapely.is_valid_reason(sheet)}); redraw it")
+        raise PatternError(
+            f"the outline is not a simple polygon ({shapely.is_valid_reason(sheet)}); redraw it"
+        )
     size = float(np.ptp(rings[0], axis=0).max())
     # chords of curved outlines cut the sheet short by up to the sampling tolerance
     grown = sheet.buffer(2e-3 + 1e-6 * size)

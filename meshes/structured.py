@@ -158,14 +158,14 @@ def _zip(below: Array, above: Array, row: int, node, closed: bool) -> list[tuple
     i = j = 0
     while i < cells_low or j < cells_high:
         # advance the side whose next edge has the smaller midpoint; ties cannot occur for shifted lines
-        advance_low = j == cells_high or (
-            i < cells_low and low[i] + low[i + 1] < high[j] + high[j + 1]
-        )
+        advance_low = j == cells_high or (i < cells_low and low[i] + low[i + 1] < high[j] + high[j + 1])
         if advance_low:
             triangles.append((node(row, i), node(row, (i + 1) % n if closed else i + 1), node(row + 1, j)))
             i += 1
         else:
-            triangles.append((node(row, i), node(row + 1, (j + 1) % m if closed else j + 1), node(row + 1, j)))
+            triangles.append(
+                (node(row, i), node(row + 1, (j + 1) % m if closed else j + 1), node(row + 1, j))
+            )
             j += 1
     return triangles
 

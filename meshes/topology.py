@@ -70,7 +70,9 @@ def build(triangles: Ints, nodes: int) -> Topology:
     bad = (triangles < 0) | (triangles >= nodes)
     if bad.any():
         row = int(np.argmax(bad.any(axis=1)))
-        raise MeshError(f"triangle {row} names a node outside 0..{nodes - 1}; mend its indices {triangles[row]}")
+        raise MeshError(
+            f"triangle {row} names a node outside 0..{nodes - 1}; mend its indices {triangles[row]}"
+        )
     if (triangles == np.roll(triangles, 1, axis=1)).any():
         row = int(np.argmax((triangles == np.roll(triangles, 1, axis=1)).any(axis=1)))
         raise MeshError(f"triangle {row} uses a node twice ({triangles[row]}); remove it")
@@ -79,11 +81,13 @@ def build(triangles: Ints, nodes: int) -> Topology:
     tail, head = np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)
     low, high = np.minimum(tail, head).ravel(), np.maximum(tail, head).ravel()
     keys = low * nodes + high
-    unique, first, inverse, counts = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
+    _, first, inverse, counts = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
     edges = np.column_stack((low[first], high[first]))
     if (counts > 2).any():
         a, b = edges[int(np.argmax(counts > 2))]
-        raise MeshError(f"edge {a}-{b} has {counts.max()} triangles (non-manifold); a sheet has one or two an edge")
+        raise MeshError(
+            f"edge {a}-{b} has {counts.max()} triangles (non-manifold); a sheet has one or two an edge"
+        )
 
     triangle_edges = inverse.reshape(triangles.shape)
     order = np.argsort(inverse, kind="stable")
@@ -96,7 +100,9 @@ def build(triangles: Ints, nodes: int) -> Topology:
     same = tails[half_1[inner]] == tails[half_2[inner]]
     if same.any():
         a, b = edges[inner[int(np.argmax(same))]]
-        raise MeshError(f"the triangles at edge {a}-{b} are oriented against each other; turn one of them round")
+        raise MeshError(
+            f"the triangles at edge {a}-{b} are oriented against each other; turn one of them round"
+        )
 
     # the lower-numbered triangle gives the direction; half-edge 3 t + k belongs to triangle t
     one, two = half_1[inner], half_2[inner]

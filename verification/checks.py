@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import Any
+
+from bh import Path
 
 
 @dataclass(frozen=True)
@@ -88,12 +90,17 @@ class CaseResult:
 class Context:
     """What a case may use: a folder for pictures, whether to be quick, and a place to tell its progress."""
 
-    folder: Path
+    folder: FilePath
     quick: bool
     tell: Callable[[str], None]
 
 
 Case = Callable[[Context], CaseResult]
+
+
+def cost_of(path: Path) -> dict[str, Any]:
+    """What a solved path cost, as keyword arguments of `Check`."""
+    return {"unknowns": path.unknowns, "iterations": path.iterations, "wall_time_s": path.wall_time_s}
 
 
 def line(label: str, x: list[float], y: list[float], style: str = "line") -> dict[str, Any]:

@@ -57,7 +57,8 @@ def run(context: Context) -> CaseResult:
         ),
         plot(
             "shear-after", "Diagonals by Eq. 3.4", "aspect ratio alpha", "deflection truss / sheet",
-            [line(name, x, r.tolist()) for name, r in corrected.items()] + [line("sheet", x, [1.0] * len(x), "reference")],
+            [line(name, x, r.tolist()) for name, r in corrected.items()]
+            + [line("sheet", x, [1.0] * len(x), "reference")],
             "The same with the stiffened diagonal.",
         ),
     ]  # fmt: skip
@@ -65,8 +66,8 @@ def run(context: Context) -> CaseResult:
     g2, g0, _ = _regression(alphas, settings["guided"])
     result.notes.append(
         f"The factor is the regression of the cantilevered truss (left nodes pinned, the force at the node where the "
-        f"diagonal ends, sheet deflection W / (G H t) without its bending) over alpha = 1, 2, ..., 20: {a2:.3f} alpha^2 "
-        f"+ {a0:.3f}, R^2 = {r2:.5f}. That deflection is alpha^2/2 + 1 + 3/(2 alpha^2), the last term being the chord; "
+        f"diagonal ends, sheet deflection W / (G H t) without its bending) over alpha = 1 to 20: {a2:.3f} "
+        f"alpha^2 + {a0:.3f}, R^2 = {r2:.5f}. That deflection is alpha^2/2 + 1 + 3/(2 alpha^2), the last term being the chord; "
         f"on a finer grid of alpha the constant falls to 1.17. With guided nodes only the diagonal works and the exact "
         f"factor is (alpha + 1/alpha)^2 / 2; its regression is {g2:.3f} alpha^2 + {g0:.3f}."
     )

@@ -85,15 +85,15 @@ def _rotate(H, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
         for j in range(n):
             for i in range(3):
                 row[i] = 0.0
-                for l in range(3):
-                    row[i] += frames[frame, i, l] * H[3 * p + l, j]
+                for c in range(3):
+                    row[i] += frames[frame, i, c] * H[3 * p + c, j]
             for i in range(3):
                 H[3 * p + i, j] = row[i]
         for j in range(n):
             for i in range(3):
                 row[i] = 0.0
-                for l in range(3):
-                    row[i] += frames[frame, i, l] * H[j, 3 * p + l]
+                for c in range(3):
+                    row[i] += frames[frame, i, c] * H[j, 3 * p + c]
             for i in range(3):
                 H[j, 3 * p + i] = row[i]
 
@@ -129,9 +129,22 @@ def _bar_matrix(x, a, b, k, s, H):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def tangent_values(
-    x, bars, k_bar, s_bar, bar_slots, hinges, k_hinge, s_hinge, hinge_slots, frame_of, frames, data, d_bar, g_hinge
-):  # type: ignore[no-untyped-def]
+def tangent_values(  # type: ignore[no-untyped-def]
+    x,
+    bars,
+    k_bar,
+    s_bar,
+    bar_slots,
+    hinges,
+    k_hinge,
+    s_hinge,
+    hinge_slots,
+    frame_of,
+    frames,
+    data,
+    d_bar,
+    g_hinge,
+):
     """Add the tangent, k g g^T + s Hessian of every element, to `data`; writes the gradients of all measures."""
     H = np.zeros((12, 12))
     B = np.zeros((6, 6))
@@ -247,7 +260,7 @@ class Pattern:
 
 def band_is_cheaper(n: int, bandwidth: int) -> bool:
     """Choice by the costs measured in `benchmarks/` (docs/decisions.md): a band factor costs n (b + 1)^2."""
-    return bandwidth <= 60 or n * (bandwidth + 1.0) ** 2 < 4.0e3 * n ** 1.35
+    return bandwidth <= 60 or n * (bandwidth + 1.0) ** 2 < 4.0e3 * n**1.35
 
 
 def build_pattern(number: Ints, groups: tuple[Ints, ...]) -> Pattern:
@@ -289,7 +302,10 @@ def _sparse_pattern(
     probe = sp.csc_matrix((np.full(len(unique), -1e-3), (row, column)), shape=(n, n))
     probe = sp.csc_matrix(probe + probe.T + 2.0 * n * sp.eye_array(n))
     permutation = splu(
-        probe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False}
+        probe,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True, "Equil": False},
     ).perm_c.astype(np.int64)
     # perm_c[old] = new
     new_row, new_column = permutation[row], permutation[column]

@@ -6,13 +6,11 @@ angle is imposed exactly is a hinge with a multiplier (its moment), in augmented
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.mechanics.assembly import (
     Pattern,
@@ -22,10 +20,10 @@ from bh.mechanics.assembly import (
     tangent_times,
     tangent_values,
 )
+from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
-from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness, sheet_bars
 from bh.model import Model
-from bh.program import HELD, SHEET, SPRING, StepProgram
+from bh.program import StepProgram
 from bh.solvers.matrices import ConstraintRows, FreeBodyMatrix, Matrix, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import Energy, State
@@ -35,65 +33,6 @@ from meshes.topology import Ints
 Array = NDArray[np.float64]
 LARGEST_TURN = 1.3  # rad that any hinge may turn in one increment before the driver mistrusts it
 ROUNDING = 8.0 * np.finfo(float).eps
-
-
-@dataclass(frozen=True, eq=False)
-class Elements:
-    """Element arrays of one step. Hinges are ordered: bending, spring creases, held creases.
-
-    `source` (h,) is the row of `mesh.topology.hinges` of each hinge.
-    """
-
-    bars: Ints
-    bar_length: Array
-    bar_stiffness: Array
-    hinges: Ints
-    source: Ints
-    hinge_stiffness: Array
-    rest: Ramp
-    couple: Ramp
-    bending: int
-    spring: int
-    held: int
-
-
-def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Elements:
-    """Element stiffness of a model in one step; `held_start` (m,) are the dihedral angles that the step begins with."""
-    mesh, sheet = model.mesh, model.sheet
-    topology = mesh.topology
-    points = mesh.points
-    edge_vector = points[topology.edges[:, 1]] - points[topology.edges[:, 0]]
-    lengths = np.linalg.norm(edge_vector, axis=1)
-    sides = topology.edge_triangles
-    areas = mesh.areas[sides[:, 0]] + np.where(sides[:, 1] >= 0, mesh.areas[sides[:, 1]], 0.0)
-    k_bar = sheet_bars(sheet.E, sheet.t, lengths, areas, mesh.spans)
-
-    hinge_length, hinge_area = lengths[topology.hinge_edges], areas[topology.hinge_edges]
-    groups = [np.flatnonzero(program.law == law) for law in (SHEET, SPRING, HELD)]
-    source = np.concatenate(groups)
-    reference = dihedral_angles(points, topology.hinges)
-    k_bend = bending_hinge_stiffness(sheet.E, sheet.t, hinge_length, hinge_area)
-    k_fold = folding_hinge_stiffness(program.stiffness, hinge_length)
-    # augmentation comparable to what the bars give a wing: it keeps the condition number and corrects in a step or two
-    gamma = 30.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
-    stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], gamma)
-    held_from = np.where(np.isnan(program.held.start), held_start, program.held.start)
-    law = program.law[source]
-
-    def ramp(bend: Array, spring: Array, held: Array) -> Array:
-        return np.where(law == SHEET, bend[source], np.where(law == SPRING, spring[source], held[source]))
-
-    rest = Ramp(
-        ramp(reference, program.rest.start, held_from), ramp(reference, program.rest.end, program.held.end)
-    )
-    scale = np.where(law == HELD, 0.0, hinge_length[source])
-    couple = Ramp(program.moment.start[source] * scale, program.moment.end[source] * scale)
-    return Elements(
-        bars=topology.edges, bar_length=lengths, bar_stiffness=k_bar,
-        hinges=np.ascontiguousarray(topology.hinges[source]), source=source,
-        hinge_stiffness=stiffness[source], rest=rest, couple=couple,
-        bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]),
-    )  # fmt: skip
 
 
 class BarsAndHingesSystem:
@@ -206,7 +145,9 @@ class BarsAndHingesSystem:
     @cached_property
     def _stiffest_hinge(self) -> float:
         """Largest stiffness over height of a wing, N / rad."""
-        heights = 2.0 * self.mesh.areas.min() / self._hinge_lengths if len(self._hinge_lengths) else np.ones(1)
+        heights = (
+            2.0 * self.mesh.areas.min() / self._hinge_lengths if len(self._hinge_lengths) else np.ones(1)
+        )
         return float((self.elements.hinge_stiffness / heights).max(initial=0.0))
 
     def _internal(self, x: Array, q: Array, lam: float) -> tuple[float, float, Array, Array]:
@@ -244,7 +185,7 @@ class BarsAndHingesSystem:
             matrix = pattern.matrix(data)
         if not e.held:
             return matrix
-        return MultiplierMatrix(matrix, self._constraint_rows(), e.hinge_stiffness[-e.held :])  # type: ignore[arg-type]
+        return MultiplierMatrix(matrix, self._constraint_rows(), e.hinge_stiffness[-e.held :])
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         e = self.elements
@@ -272,7 +213,15 @@ class BarsAndHingesSystem:
         if moving.any():
             bars = len(e.bars)
             tangent_times(
-                x, moving, e.bars, e.bar_stiffness, forces[:bars], e.hinges, e.hinge_stiffness, forces[bars:], out
+                x,
+                moving,
+                e.bars,
+                e.bar_stiffness,
+                forces[:bars],
+                e.hinges,
+                e.hinge_stiffness,
+                forces[bars:],
+                out,
             )
         rate = np.empty(self.size)
         rate[: self.primal] = self.to_local(out).ravel()[self.free]
@@ -302,7 +251,15 @@ class BarsAndHingesSystem:
             bars = len(e.bars)
             out = np.zeros_like(x)
             tangent_times(
-                x, moving, e.bars, e.bar_stiffness, forces[:bars], e.hinges, e.hinge_stiffness, forces[bars:], out
+                x,
+                moving,
+                e.bars,
+                e.bar_stiffness,
+                forces[:bars],
+                e.hinges,
+                e.hinge_stiffness,
+                forces[bars:],
+                out,
             )
             g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
             turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
@@ -321,7 +278,7 @@ class BarsAndHingesSystem:
 
     @cached_property
     def _pattern(self) -> Pattern:
-        groups = (self.elements.bars, self.elements.hinges)
+        groups: tuple[Ints, ...] = (self.elements.bars, self.elements.hinges)
         if self.constraints.rigid_body:
             groups += (self.mesh.triangles[self._ground_triangle][None, :],)
         return build_pattern(self.number, groups)
@@ -386,7 +343,13 @@ class BarsAndHinges:
         return BarsAndHingesSystem(model, program, start)
 
     def observe(
-        self, model: Model, system: BarsAndHingesSystem, q: Array, lam: float, step: int = 0, stable: bool | None = None
+        self,
+        model: Model,
+        system: BarsAndHingesSystem,
+        q: Array,
+        lam: float,
+        step: int = 0,
+        stable: bool | None = None,
     ) -> State:
         """Everything that can be read from the unknowns `q` at `lam`."""
         e, mesh = system.elements, system.mesh

@@ -60,9 +60,7 @@ def hinge_geometry(x, hinge, g):  # type: ignore[no-untyped-def]
     ex, ey, ez = ex / length, ey / length, ez / length
     m1x, m1y, m1z, u1x, u1y, u1z, h1, s1 = triangle_frame(x, a, j, k, 1.0)
     m2x, m2y, m2z, u2x, u2y, u2z, h2, s2 = triangle_frame(x, b, j, k, -1.0)
-    sine = (
-        ex * (m1y * m2z - m1z * m2y) + ey * (m1z * m2x - m1x * m2z) + ez * (m1x * m2y - m1y * m2x)
-    )
+    sine = ex * (m1y * m2z - m1z * m2y) + ey * (m1z * m2x - m1x * m2z) + ez * (m1x * m2y - m1y * m2x)
     cosine = m1x * m2x + m1y * m2y + m1z * m2z
     phi = math.pi - math.atan2(sine, cosine)
     g[0], g[1], g[2] = m1x / h1, m1y / h1, m1z / h1
@@ -86,21 +84,21 @@ def add_hinge_hessian(geometry, factor, H):  # type: ignore[no-untyped-def]
         c = 1.0 - s
         hh, hl, ll = factor / (h * h), factor / (h * length), factor * 0.5 / (length * length)
         for i in range(3):
-            for l in range(3):
-                S = u[i] * m[l] + m[i] * u[l]
-                em, me = e[i] * m[l], m[i] * e[l]
+            for k in range(3):
+                S = u[i] * m[k] + m[i] * u[k]
+                em, me = e[i] * m[k], m[i] * e[k]
                 wj, wk = c * hh * S, s * hh * S
                 if w == 0:  # blocks (j, a) and (k, a) lie below the diagonal: transposes of H_wj and H_wk
-                    H[3 + i, l] += wj + hl * me
-                    H[6 + i, l] += wk - hl * me
+                    H[3 + i, k] += wj + hl * me
+                    H[6 + i, k] += wk - hl * me
                 else:
-                    H[9 + i, 3 + l] += wj + hl * em
-                    H[9 + i, 6 + l] += wk - hl * em
-                H[6 + i, 3 + l] += (ll - s * c * hh) * S + hl * (c * me - s * em)
-                if l <= i:
-                    H[w + i, w + l] -= hh * S
-                    H[3 + i, 3 + l] -= (c * c * hh + ll) * S + c * hl * (me + em)
-                    H[6 + i, 6 + l] -= (s * s * hh + ll) * S - s * hl * (me + em)
+                    H[9 + i, 3 + k] += wj + hl * em
+                    H[9 + i, 6 + k] += wk - hl * em
+                H[6 + i, 3 + k] += (ll - s * c * hh) * S + hl * (c * me - s * em)
+                if k <= i:
+                    H[w + i, w + k] -= hh * S
+                    H[3 + i, 3 + k] -= (c * c * hh + ll) * S + c * hl * (me + em)
+                    H[6 + i, 6 + k] -= (s * s * hh + ll) * S - s * hl * (me + em)
 
 
 @njit(**OPTIONS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
@@ -16,17 +16,18 @@ def bar_stiffness(E: float, t: float, lengths: Array, areas: Array) -> Array:
     return E * areas * t / lengths**2
 
 
-def diagonal_factor(alpha: Array) -> Array:
+def diagonal_factor(alpha: ArrayLike) -> Array:
     """Factor alpha^2 / 2 + 5/4 by which diagonal bars are stiffened in shear (Eq. 3.4); alpha = H / W of its cell."""
-    return 0.5 * alpha**2 + 1.25
+    return 0.5 * np.asarray(alpha, dtype=float) ** 2 + 1.25
 
 
-def shear_exact_factor(alpha: Array) -> Array:
+def shear_exact_factor(alpha: ArrayLike) -> Array:
     """(alpha + 1 / alpha)^2 / 2: the factor with which a rectangle's diagonal has just the shear stiffness G = E / 2.
 
     Shear by gamma stretches the diagonal of a W x H cell by gamma W H / L; equating 1/2 k (gamma W H / L)^2 to
     1/2 G gamma^2 t W H gives k = E t L^2 / (2 W H), which is Eq. 3.3 times this factor.
     """
+    alpha = np.asarray(alpha, dtype=float)
     return 0.5 * (alpha + 1.0 / alpha) ** 2
 
 

@@ -73,7 +73,9 @@ class LoadControl:
     def limits(self, system: System) -> tuple[float, float]:
         """First and largest increment of lambda for a system."""
         if system.rotation > 0.0:
-            return min(1.0, self.first_rotation / system.rotation), min(1.0, self.largest_rotation / system.rotation)
+            return min(1.0, self.first_rotation / system.rotation), min(
+                1.0, self.largest_rotation / system.rotation
+            )
         return self.first, self.largest
 
     def follow(
@@ -107,7 +109,14 @@ class LoadControl:
                 if step < self.smallest:
                     outcome = "bifurcation" if solution.converged and solution.stable is False else "stalled"
                     yield Increment(
-                        here, outcome, iterations, solution.evaluation.imbalance, None, step, tuple(cuts), objection
+                        here,
+                        outcome,
+                        iterations,
+                        solution.evaluation.imbalance,
+                        None,
+                        step,
+                        tuple(cuts),
+                        objection,
                     )
                     return
                 continue
@@ -117,11 +126,20 @@ class LoadControl:
             growth = min(1.7, max(0.5, math.sqrt(self.goal / max(solution.iterations, 1))))
             step = min(largest, growth * taken if not cuts else min(growth, 1.0) * taken)
             yield Increment(
-                there, "reached", iterations, solution.evaluation.imbalance, solution.stable, step, tuple(cuts), note
+                there,
+                "reached",
+                iterations,
+                solution.evaluation.imbalance,
+                solution.stable,
+                step,
+                tuple(cuts),
+                note,
             )
             cuts, iterations = [], 0
 
-    def _objection(self, system: System, here: Point, solution: Solution, lam: float, left_saddle: bool) -> str:
+    def _objection(
+        self, system: System, here: Point, solution: Solution, lam: float, left_saddle: bool
+    ) -> str:
         if not solution.converged:
             return solution.reason
         if left_saddle:

@@ -34,7 +34,7 @@ class LinearResponse:
 
 
 def linear_response(system: LinearSystem, q: Array, lam: float = 0.0) -> LinearResponse:
-    """Linear response of `system` at (q, lam); raises `Indefinite` where the state is not stable."""
+    """Linear response of `system` at (q, lam); raises `IndefiniteError` where the state is not stable."""
     now = system.evaluate(q, lam)
     rate = system.control_rate(q, lam)
     dq = -system.tangent(q, lam, now.forces).factorise().solve(rate)

@@ -1,7 +1,7 @@
 """Symmetric matrices that factorise themselves: banded, sparse, with multipliers, and of a free body.
 
 A matrix knows how to solve with itself; the driver does not care how. `factorise` either returns a factor or raises
-`Indefinite`, which says how many eigenvalues are negative, so that the driver can shift or turn back.
+`IndefiniteError`, which says how many eigenvalues are negative, so that the driver can shift or turn back.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Indefinite(ArithmeticError):
+class IndefiniteError(ArithmeticError):
     """The matrix is not positive definite (for multipliers: not so on the constraint's null space).
 
     `negative` is the number of negative eigenvalues, or 1 where only their presence is known.
@@ -38,7 +38,7 @@ class Factor(Protocol):
 
 class Matrix(Protocol):
     def factorise(self, shift: float = 0.0) -> Factor:
-        """Factor of A + shift * diag(|A|); raises `Indefinite`."""
+        """Factor of A + shift * diag(|A|); raises `IndefiniteError`."""
         ...
 
     def __matmul__(self, x: Array) -> Array: ...
@@ -60,7 +60,7 @@ class BandMatrix:
             ab[0] += shift * np.maximum(np.abs(ab[0]), 1e-3 * np.abs(ab[0]).mean())
         factor, info = lapack.dpbtrf(ab, lower=1, overwrite_ab=1)
         if info != 0:
-            raise Indefinite(1)
+            raise IndefiniteError(1)
         return BandFactor(factor, self.order)
 
     def __matmul__(self, x: Array) -> Array:
@@ -114,14 +114,17 @@ class SparseMatrix:
             A = A + sp.diags_array(shift * np.maximum(diagonal, 1e-3 * diagonal.mean()), format="csc")
         try:
             factor = splu(
-                A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False}
+                A,
+                permc_spec="NATURAL",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True, "Equil": False},
             )
         except RuntimeError as singular:
-            raise Indefinite(1) from singular
+            raise IndefiniteError(1) from singular
         # with diagonal pivots U = D L^T, so the signs on the diagonal of U are the inertia (Sylvester)
         negative = int((factor.U.diagonal() <= 0.0).sum())
         if negative:
-            raise Indefinite(negative)
+            raise IndefiniteError(negative)
         return SparseFactor(factor, self.order)
 
     def __matmul__(self, x: Array) -> Array:
@@ -271,7 +274,9 @@ class MultiplierFactor:
         p = z = self.gamma * miss
         rho = float(miss @ z)
         for _ in range(self.most):
-            if rho == 0.0 or (np.abs(miss).max() <= goal and np.abs(z).max() <= self.tolerance * np.abs(y).max()):
+            if rho == 0.0 or (
+                np.abs(miss).max() <= goal and np.abs(z).max() <= self.tolerance * np.abs(y).max()
+            ):
                 break
             v = self.factor.solve(G.transpose_times(p))
             Sp = G.times(v)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import Factor, Indefinite, Matrix
+from bh.solvers.matrices import Factor, IndefiniteError, Matrix
 from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
@@ -107,11 +107,13 @@ class Newton:
         return Solution(q, now, self.careful, False, "iteration limit", careful=True)
 
     @staticmethod
-    def _finish(system: System, q: Array, lam: float, now: Evaluation, iterations: int, careful: bool) -> Solution:
+    def _finish(
+        system: System, q: Array, lam: float, now: Evaluation, iterations: int, careful: bool
+    ) -> Solution:
         try:
             system.tangent(q, lam, now.forces).factorise(NEUTRAL)
             stable = True
-        except Indefinite:
+        except IndefiniteError:
             stable = False
         return Solution(q, now, iterations, True, "", stable, careful)
 
@@ -127,7 +129,7 @@ def factorise_shifted(matrix: Matrix, shift: float, largest: float = 1e6) -> tup
     while shift <= largest:
         try:
             return matrix.factorise(shift), shift
-        except Indefinite:
+        except IndefiniteError:
             shift = NEUTRAL if shift == 0.0 else max(4.0 * shift, 1e-9)
     return None, shift
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import Indefinite, Matrix
+from bh.solvers.matrices import IndefiniteError, Matrix
 from bh.solvers.newton import Newton, Solution, factorise_shifted
 from bh.solvers.system import System
 
@@ -17,14 +17,14 @@ Array = NDArray[np.float64]
 def lowest_mode(
     matrix: Matrix, size: int, primal: int, iterations: int = 60, tolerance: float = 1e-6
 ) -> tuple[float, Array]:
-    """Rayleigh quotient and mode (size,) of the lowest eigenvalue of a symmetric matrix, multipliers (after `primal`) zero.
+    """Rayleigh quotient and mode (size,) of the lowest eigenvalue; multipliers (after `primal`) are zero in it.
 
     Inverse iteration with the shifted matrix K + s D (D = |diag K|), started from a fixed pseudo-random vector so that
     the same input gives the same mode. The mode has unit length and its largest component is positive.
     """
-    factor, shift = factorise_shifted(matrix, 0.0)
+    factor, _ = factorise_shifted(matrix, 0.0)
     if factor is None:
-        raise Indefinite(1)
+        raise IndefiniteError(1)
     mode = np.random.default_rng(20).normal(size=size)
     mode[primal:] = 0.0
     quotient = np.inf

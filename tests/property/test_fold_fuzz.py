@@ -114,7 +114,7 @@ def damaged(draw: st.DrawFn) -> dict:
         elif action == "swap" and isinstance(inside, list):
             inside[key], inside[-1] = inside[-1], inside[key]
         else:
-            inside[key] = draw(VALUES)
+            inside[key] = copy.deepcopy(draw(VALUES))  # a strategy may hand out one object twice
     return data
 
 

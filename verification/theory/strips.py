@@ -30,7 +30,10 @@ def four_point_compliance(E: float, L: float, H: float, t: float, arm: float) ->
 
 
 def in_plane_bending(E: float, L: float, H: float, t: float, displacement: float) -> float:
-    """1/2 (3 E I / L^3) u^2 with I = t H^3 / 12: Euler-Bernoulli cantilever; shear would lower it by 0.6 % at L / H = 10."""
+    """1/2 (3 E I / L^3) u^2 with I = t H^3 / 12: Euler-Bernoulli cantilever.
+
+    Shear would lower it by 0.6 % at L / H = 10.
+    """
     return 0.5 * 3.0 * E * (t * H**3 / 12.0) / L**3 * displacement**2
 
 

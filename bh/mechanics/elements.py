@@ -1,0 +1,76 @@
+"""Element arrays of a sheet of bars and hinges for one step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.actuation import Ramp
+from bh.mechanics.kinematics import dihedral_angles
+from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness, sheet_bars
+from bh.model import Model
+from bh.program import HELD, SHEET, SPRING, StepProgram
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Element arrays of one step. Hinges are ordered: bending, spring creases, held creases.
+
+    `source` (h,) is the row of `mesh.topology.hinges` of each hinge.
+    """
+
+    bars: Ints
+    bar_length: Array
+    bar_stiffness: Array
+    hinges: Ints
+    source: Ints
+    hinge_stiffness: Array
+    rest: Ramp
+    couple: Ramp
+    bending: int
+    spring: int
+    held: int
+
+
+def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Elements:
+    """Element stiffness of a model in one step; `held_start` (m,) are the dihedral angles that the step begins with."""
+    mesh, sheet = model.mesh, model.sheet
+    topology = mesh.topology
+    points = mesh.points
+    edge_vector = points[topology.edges[:, 1]] - points[topology.edges[:, 0]]
+    lengths = np.linalg.norm(edge_vector, axis=1)
+    sides = topology.edge_triangles
+    areas = mesh.areas[sides[:, 0]] + np.where(sides[:, 1] >= 0, mesh.areas[sides[:, 1]], 0.0)
+    k_bar = sheet_bars(sheet.E, sheet.t, lengths, areas, mesh.spans)
+
+    hinge_length, hinge_area = lengths[topology.hinge_edges], areas[topology.hinge_edges]
+    groups = [np.flatnonzero(program.law == law) for law in (SHEET, SPRING, HELD)]
+    source = np.concatenate(groups)
+    reference = dihedral_angles(points, topology.hinges)
+    k_bend = bending_hinge_stiffness(sheet.E, sheet.t, hinge_length, hinge_area)
+    k_fold = folding_hinge_stiffness(program.stiffness, hinge_length)
+    # augmentation comparable to what the bars give a wing: it keeps the condition number and corrects in a step or two
+    gamma = 30.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
+    stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], gamma)
+    held_from = np.where(np.isnan(program.held.start), held_start, program.held.start)
+    law = program.law[source]
+
+    def ramp(bend: Array, spring: Array, held: Array) -> Array:
+        return np.where(law == SHEET, bend[source], np.where(law == SPRING, spring[source], held[source]))
+
+    rest = Ramp(
+        ramp(reference, program.rest.start, held_from), ramp(reference, program.rest.end, program.held.end)
+    )
+    scale = np.where(law == HELD, 0.0, hinge_length[source])
+    couple = Ramp(program.moment.start[source] * scale, program.moment.end[source] * scale)
+    return Elements(
+        bars=topology.edges, bar_length=lengths, bar_stiffness=k_bar,
+        hinges=np.ascontiguousarray(topology.hinges[source]), source=source,
+        hinge_stiffness=stiffness[source], rest=rest, couple=couple,
+        bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]),
+    )  # fmt: skip

@@ -1,0 +1,34 @@
+"""Compile (or load from the cache) every kernel, so that a user's first run does not wait: `python -m bh.warm_up`."""
+
+from __future__ import annotations
+
+import math
+
+import meshes
+from bh.model import Model, Sheet
+from bh.path import trace
+from bh.solvers.linear import linear_response
+
+
+def warm_up() -> None:
+    """Fold a tiny sheet in every way that has kernels of its own."""
+    mesh = meshes.structured(meshes.annulus_sector(10.0, 1.0, 0.3), along=2)
+    sheet = Model(mesh, Sheet(E=1.0, t=0.1))
+    path = trace(sheet.fold("crease", to=math.pi - 0.1))
+    trace(
+        sheet.support("edge:start", "xyz")
+        .support("edge:end", [[0.0, 1.0, 1.0]])
+        .fold("crease", rest=3.0, Lstar=1.0)
+    )
+    system = path._system(0)
+    linear_response(system, path.records[0].q)
+    displaced = (
+        sheet.support("edge:start", "xyz").support("edge:inner", "z").displace("corner:outer-end", "z", 0.01)
+    )
+    system = trace(displaced)._system(0)
+    system.control_rate(system.start(), 0.0)
+
+
+if __name__ == "__main__":
+    warm_up()
+    print("kernels are compiled and cached")

@@ -1,0 +1,39 @@
+"""The `bh verify` command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def verify(
+    cases: Annotated[list[str] | None, typer.Argument(help="cases to run; all if none is named")] = None,
+    json: Annotated[Path | None, typer.Option("--json", help="write the records to this file")] = None,
+    results: Annotated[Path, typer.Option("--results", help="folder for records and pictures")] = Path(
+        "results"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="fewer points in every case")] = False,
+    listing: Annotated[bool, typer.Option("--list", help="list the cases and stop")] = False,
+) -> None:
+    """Check the solvers against closed forms and published numbers; exit code 1 if a check fails."""
+    from verification.cases import CASES
+    from verification.run import run, write_json
+
+    if listing:
+        for name in CASES:
+            typer.echo(name)
+        return
+    data = run(cases or None, results, quick, lambda text: typer.echo(text, err=True))
+    if json is not None:
+        write_json(json, {"checks": data["checks"], "versions": data["versions"]})
+    failed = [check for check in data["checks"] if check["passed"] is False]
+    for check in failed:
+        typer.echo(
+            f"failed: {check['case']} {check['quantity']} {check['params']} = {check['value']}", err=True
+        )
+    judged = sum(check["passed"] is not None for check in data["checks"])
+    typer.echo(f"{judged - len(failed)} of {judged} checks passed, {len(data['checks']) - judged} reported")
+    if failed:
+        raise typer.Exit(1)
