@@ -1,7 +1,7 @@
 """The `bh` command. Only here is anything printed, and only here does the program exit.
 
-Exit codes: 0 reached or done; 1 a path that ended early, or a check that failed; 2 bad input, told in one line;
-3 a fault of the program; 130 interrupted. Everything heavy is imported where it is needed: `bh --version` is quick.
+Exit codes: 0 reached, or done; 1 a path that ended early, or a check that failed; 2 bad input, told in one line;
+3 a fault of the program; 130 interrupted. What is heavy is imported where it is needed, so that `bh` starts fast.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,42 +20,33 @@ from bh.errors import InputError
 
 if TYPE_CHECKING:
     from bh.path import Path as Trace
-    from bh.run import Run
+    from bh.scene import Scene
 
 COMMANDS = "bh.commands"
-app = typer.Typer(
-    name="bh",
-    help="Bar-and-hinge simulation of sheets folded along curved creases.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
+    """Run a command line (without the program's name; by default that of the process); returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    own = words[: words.index("--")] if "--" in words else words
-    debug = "--debug" in own
-    if debug:  # wherever it stands
+    debug = "--debug" in (words[: words.index("--")] if "--" in words else words)
+    if debug:  # it may stand anywhere, also behind a command
         words.remove("--debug")
     try:
         code = app(args=words, prog_name="bh", standalone_mode=False)
         return code if isinstance(code, int) else 0
     except KeyboardInterrupt:
         return _fail("interrupted", 130, debug)
-    except BrokenPipeError:  # the reader of a pipe has gone; nothing is left to say
+    except BrokenPipeError:  # whoever read the output has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except InputError as error:
         return _fail(str(error), 2, debug)
     except Exception as error:
-        if hasattr(error, "format_message"):  # typer's usage errors
-            return _fail(f"{error.format_message()} See 'bh --help'.", 2, debug)
-        return _fail(
-            f"{type(error).__name__}: {error} (a fault of the program; --debug shows where)", 3, debug
-        )
+        if hasattr(error, "format_message"):  # how typer tells a wrong command line
+            return _fail(f"{error.format_message().rstrip('.')}; see 'bh --help'", 2, debug)
+        what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        return _fail(f"{what} (a fault of the program, please report it; --debug shows where)", 3, debug)
 
 
 def _fail(message: str, code: int, debug: bool) -> int:
@@ -63,3 +54,171 @@ def _fail(message: str, code: int, debug: bool) -> int:
         traceback.print_exc()
     typer.echo("bh: " + " ".join(message.split()), err=True)
     return code
+
+
+# --- commands -----------------------------------------------------------------------------------------------
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"bh {version('curved-crease-workbench')}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _options(
+    context: typer.Context,
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit."),
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show where an error comes from.")] = False,
+) -> None:
+    """Bar-and-hinge simulation of sheets folded along curved creases."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command()
+def run(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Output folder; default SCENE-out.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the states in the folder.")] = False,
+    pictures: Annotated[bool, typer.Option("--pictures", help="Draw the folded sheet (PNG).")] = False,
+    vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+) -> None:
+    """Solve a scene; writes path.bh and result.json into the output folder."""
+    from bh.run import UNFINISHED, extras, holds_states, solve
+    from bh.scene import load_scene
+
+    loaded = load_scene(scene)
+    folder = Path(f"{loaded.name}-out") if output is None else output
+    try:
+        path, names = solve(loaded, folder, resume=resume, progress=not quiet)
+    except KeyboardInterrupt:
+        how = (
+            f"go on with: bh run {scene} -o {folder} --resume" if holds_states(folder) else "nothing is kept"
+        )
+        typer.echo(f"bh: interrupted; {how}", err=True)
+        raise typer.Exit(130) from None
+    written = [folder / name for name in names]
+    for name, write in extras(path, loaded, folder, pictures, vtu).items():
+        try:
+            write()
+        except (InputError, ImportError, OSError) as error:
+            raise InputError(
+                f"the result is in '{folder}', but {name} could not be written: {error}"
+            ) from error
+        written.append(folder / name)
+    if not quiet:
+        _summary(path, loaded, written)
+    if path.outcome != "reached":
+        why = f" ({path.reason})" if path.reason else ""
+        kept = "; the finished result of an earlier run is kept" if names == UNFINISHED else ""
+        typer.echo(
+            f"bh: {scene}: step {len(path.steps)} of {len(loaded.model.steps)} ended early: {path.outcome}{why}; "
+            f"what was reached is in '{written[1]}'{kept}",
+            err=True,
+        )
+        raise typer.Exit(1)
+
+
+@app.command()
+def view(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="A path file, or the output folder of a run.")],
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw to a file; no window.")
+    ] = None,
+    vtu: Annotated[
+        Path | None, typer.Option("--vtu", metavar="DIR", help="Write all states for ParaView; no window.")
+    ] = None,
+    state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
+) -> None:
+    """Show a state of a solved path in a window, or draw it to a file."""
+    from bh.path import Path as Trace
+    from bh.run import path_file
+
+    file = path_file(path) if path.is_dir() else path
+    solved = Trace.load(file)
+    if not -len(solved) <= state < len(solved):
+        raise InputError(f"--state {state}: '{file}' has the states 0 to {len(solved) - 1}; -1 is the last")
+    import bh.plotting
+
+    if vtu is not None:
+        typer.echo(f"wrote {bh.plotting.export_series(solved, vtu)}")
+    if picture is not None:
+        bh.plotting.picture(solved[state], picture)
+        typer.echo(f"wrote {picture}")
+    if picture is None and vtu is None:
+        bh.plotting.show(solved[state])
+
+
+@app.command()
+def formulations() -> None:
+    """List the formulations that a scene can name."""
+    from bh.formulations import names
+
+    for name in names():
+        typer.echo(name)
+
+
+def _add_commands() -> None:
+    """Commands of other packages, by the entry-point group; none of them is imported before it is called."""
+    for entry in entry_points(group=COMMANDS):
+        settings = {
+            "ignore_unknown_options": True,
+            "allow_extra_args": True,
+            "allow_interspersed_args": False,
+        }
+        about = f"From the package {entry.value.split('.')[0]}; see 'bh {entry.name} --help'."
+        app.command(entry.name, help=about, add_help_option=False, context_settings=settings)(_proxy(entry))
+
+
+def _proxy(entry: EntryPoint) -> Callable[[typer.Context], Any]:
+    def call(context: typer.Context) -> Any:
+        try:
+            function = entry.load()
+        except (ImportError, AttributeError) as error:
+            raise InputError(
+                f"command '{entry.name}' is not available ({error}); install {entry.value}"
+            ) from error
+        own = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+        own.command(entry.name)(function)
+        code = own(args=context.args, prog_name=f"bh {entry.name}", standalone_mode=False)
+        raise typer.Exit(code if isinstance(code, int) else 0)
+
+    return call
+
+
+_add_commands()
+
+
+def _summary(path: Trace, scene: Scene, written: Sequence[Path]) -> None:
+    from math import degrees
+
+    energy, last = path[-1].energy, path[-1]
+    typer.echo(
+        f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
+        f"{path.unknowns} unknowns, {path.wall_time_s:.3g} s"
+    )
+    typer.echo(
+        f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
+        f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
+    )
+    creases = scene.model.mesh.creases
+    for crease in creases[:6]:
+        a = last.fold_angle(crease)
+        typer.echo(
+            f"fold angle of {crease}: {a.mean():.4f} rad ({degrees(a.mean()):.1f} degrees), "
+            f"{a.min():.4f} to {a.max():.4f}"
+        )
+    if len(creases) > 6:
+        typer.echo(f"and {len(creases) - 6} more creases")
+    typer.echo("files: " + " ".join(str(file) for file in written))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

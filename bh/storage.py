@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -70,7 +71,9 @@ class PathFile:
             raise PathFileError(f"'{file}' exists; resume it, remove it or choose another name")
         draft = file.with_name(file.name + ".part")
         try:
-            draft.unlink(missing_ok=True)
+            # the journal of a run that was killed must not be played back into the new file
+            for old in (draft, _journal(draft), _journal(file)):
+                old.unlink(missing_ok=True)
             db = _connect(draft)
             with db:
                 db.executescript(SCHEMA)
@@ -85,6 +88,7 @@ class PathFile:
                     ],
                 )
             db.close()
+            _journal(draft).unlink(missing_ok=True)
             draft.replace(file)
             return cls(file, _connect(file))
         except (OSError, sqlite3.Error) as error:
@@ -162,6 +166,8 @@ class PathFile:
         return {step: (outcome, reason) for step, outcome, reason in rows}
 
     def close(self) -> None:
+        with suppress(sqlite3.Error):  # takes the empty journal away; it is in nobody's way if that fails
+            self._db.execute("PRAGMA journal_mode = DELETE")
         self._db.close()
 
     def _guard(self) -> _Transaction:
@@ -184,6 +190,10 @@ class _Transaction:
             raise PathFileError(f"cannot write '{self.file}' ({failed}); is the disk full?") from failed
         if isinstance(error, sqlite3.Error):
             raise PathFileError(f"cannot write '{self.file}' ({error}); is the disk full?") from error
+
+
+def _journal(file: FilePath) -> FilePath:
+    return file.with_name(file.name + "-journal")
 
 
 def _connect(file: FilePath) -> sqlite3.Connection:

@@ -65,7 +65,8 @@ class Newton:
     def solve_boldly(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
         """Full steps with independent forces; gives up on an indefinite tangent or when it runs away."""
         now = system.evaluate(q, lam)
-        forces, least = now.forces if forces is None else forces, now.imbalance
+        forces = now.forces if forces is None else forces
+        least, before = now.imbalance, np.inf
         for iteration in range(self.bold):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=False)
@@ -73,8 +74,10 @@ class Newton:
             if factor is None:
                 return Solution(q, now, iteration, False, "indefinite tangent")
             dq = -factor.solve(now.residual)
+            if self._exhausted(system, now, before, dq):
+                return self._finish(system, q, lam, now, iteration, careful=False)
             forces = system.predicted_forces(now.forces, dq)
-            q = q + dq
+            q, before = q + dq, now.imbalance
             now = system.evaluate(q, lam)
             if not np.isfinite(now.energy) or now.imbalance > 1e8 * max(least, 1.0):
                 return Solution(q, now, iteration + 1, False, "diverged")
@@ -86,7 +89,7 @@ class Newton:
     def solve_carefully(self, system: System, q: Array, lam: float) -> Solution:
         """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns."""
         now = system.evaluate(q, lam)
-        shift = 0.0
+        shift, before = 0.0, np.inf
         for iteration in range(self.careful):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=True)
@@ -94,17 +97,32 @@ class Newton:
             factor, shift = factorise_shifted(matrix, shift)
             if factor is None:
                 return Solution(q, now, iteration, False, "singular tangent", careful=True)
-            step = line_search(system, q, lam, now, -factor.solve(now.residual))
+            dq = -factor.solve(now.residual)
+            if self._exhausted(system, now, before, dq):
+                return self._finish(system, q, lam, now, iteration, careful=True)
+            step = line_search(system, q, lam, now, dq)
             if step is None:
                 if shift > 1e3:
                     return Solution(q, now, iteration, False, "no descent", careful=True)
                 shift = max(10.0 * shift, 1e-4)
                 continue
+            before = now.imbalance
             q, now, length = step
             shift = 0.1 * shift if length > 0.5 else shift
         if now.imbalance <= self.tolerance:
             return self._finish(system, q, lam, now, self.careful, careful=True)
         return Solution(q, now, self.careful, False, "iteration limit", careful=True)
+
+    def _exhausted(self, system: System, now: Evaluation, before: float, dq: Array) -> bool:
+        """Nearly balanced, getting no better, and what energy the step could still gain is rounding.
+
+        So it is along a neutral mode, such as the phase of the waves of a buckled ring, whose tiny residual no step
+        can remove.
+        """
+        p = system.primal
+        gain = abs(float(now.residual[:p] @ dq[:p]))
+        stuck = 0.5 * before <= now.imbalance <= 100.0 * self.tolerance
+        return stuck and gain <= 1e-13 * abs(now.energy)
 
     @staticmethod
     def _finish(

@@ -50,7 +50,8 @@ def _ring() -> dict:
     ]
     edges = [[k * count + i, k * count + (i + 1) % count] for k in range(3) for i in range(count)]
     letters = ["B"] * count + ["V"] * count + ["B"] * count
-    return {"vertices_coords": sum(rings, []), "edges_vertices": edges, "edges_assignment": letters}
+    points = [point for ring in rings for point in ring]
+    return {"vertices_coords": points, "edges_vertices": edges, "edges_assignment": letters}
 
 
 def _polygons() -> dict:

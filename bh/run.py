@@ -1,0 +1,237 @@
+"""A scene solved into a folder: `path.bh` with every accepted state, `result.json`, and what else is asked for.
+
+A folder that holds a finished result keeps it until another run has reached its end, too: until then that run
+writes `path-unfinished.bh`, and `result-unfinished.json` if it ends early.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bh.describe import fingerprint
+from bh.errors import InputError
+from bh.model import Model
+from bh.path import Path as Trace
+from bh.path import trace
+from bh.progress import ProgressMeter
+from bh.scene import Scene
+from bh.storage import PathFile
+from meshes.io.export import replacing
+
+FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
+
+
+def solve(
+    scene: Scene, folder: Path, *, resume: bool = False, progress: bool | ProgressMeter = False
+) -> tuple[Trace, tuple[str, str]]:
+    """Trace a scene into a folder, which is made if need be.
+
+    Args:
+        resume: go on from the states in the folder.
+        progress: as for `bh.trace`.
+
+    Returns:
+        the path, and the names of the files that hold it and its result.
+
+    Raises:
+        InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
+            described; a folder that was made for the run is taken away again if nothing came of it.
+    """
+    names = _names(folder, scene.model, resume)
+    made = _make(folder)
+    file = folder / names[0]
+    if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
+        (folder / names[1]).unlink(missing_ok=True)
+    try:
+        path = trace(scene.model, progress=progress, file=file, resume=resume)
+    except (InputError, KeyboardInterrupt):
+        if not resume and not holds_states(file):
+            _take_back(file, made)
+        raise
+    if path.outcome == "reached":
+        if names == UNFINISHED:
+            _move(file, folder / FINISHED[0])
+        names = FINISHED
+    text = json.dumps(result(path, scene), indent=2, allow_nan=False) + "\n"
+    with replacing(folder / names[1]) as draft:
+        draft.write_text(text, encoding="utf-8")
+    if names == FINISHED:
+        for name in UNFINISHED:
+            (folder / name).unlink(missing_ok=True)
+    return path, names
+
+
+def path_file(folder: Path) -> Path:
+    """The path file in the output folder of a run.
+
+    Raises:
+        InputError: there is none.
+    """
+    for name, _ in (FINISHED, UNFINISHED):
+        if (folder / name).is_file():
+            return folder / name
+    raise InputError(f"there is no {FINISHED[0]} in '{folder}'; give the output folder of `bh run`")
+
+
+def holds_states(folder_or_file: Path) -> bool:
+    """True if a path file (or one in a folder) has a state to go on from."""
+    files = [folder_or_file]
+    if folder_or_file.is_dir():
+        files = [folder_or_file / name for name, _ in (UNFINISHED, FINISHED)]
+    for file in files:
+        with contextlib.suppress(InputError), contextlib.closing(PathFile.open(file)) as stored:
+            if next(stored.states(), None) is not None:
+                return True
+    return False
+
+
+def _names(folder: Path, model: Model, resume: bool) -> tuple[str, str]:
+    """Names of the path and the result that a run writes.
+
+    Raises:
+        InputError: there is nothing to resume.
+    """
+    if not resume:
+        return UNFINISHED if _is_finished(folder) else FINISHED
+    found = [names for names in (UNFINISHED, FINISHED) if (folder / names[0]).is_file()]
+    if not found:
+        raise InputError(f"there is no {FINISHED[0]} in '{folder}' to go on from; run without --resume")
+    wanted = fingerprint(model)
+    for names in found:
+        with contextlib.closing(PathFile.open(folder / names[0])) as file:
+            if file.meta().get("provenance", {}).get("input") == wanted:
+                return names
+    return found[0]  # of another scene, as `trace` will say
+
+
+def _is_finished(folder: Path) -> bool:
+    try:
+        result = json.loads((folder / FINISHED[1]).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(result, dict) and result.get("outcome") == "reached"
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make the folder and what is missing above it; returns what was made, the deepest last.
+
+    Raises:
+        InputError: it cannot be made or written to; then nothing is left behind.
+    """
+    made: list[Path] = []
+    try:
+        for place in (*reversed(folder.parents), folder):
+            if not place.exists():
+                place.mkdir()
+                made.append(place)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (OSError, ValueError) as error:
+        _take_back(None, made)
+        why = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"the output folder '{folder}' cannot be written ({why}); choose another with -o"
+        ) from error
+    return made
+
+
+def _take_back(file: Path | None, made: Sequence[Path]) -> None:
+    """Remove a file and the folders that were made for it, as far as nothing else is in them."""
+    with contextlib.suppress(OSError):
+        if file is not None:
+            file.unlink(missing_ok=True)
+        for place in reversed(made):
+            place.rmdir()
+
+
+def _move(file: Path, place: Path) -> None:
+    # a journal that a killed run left there belongs to the file that goes
+    place.with_name(place.name + "-journal").unlink(missing_ok=True)
+    os.replace(file, place)
+
+
+def result(path: Trace, scene: Scene) -> dict[str, Any]:
+    """The content of result.json; energies in N mm, angles in rad."""
+    mesh, last = scene.model.mesh, path[-1]
+    folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
+    steps = []
+    for number in range(len(scene.model.steps)):
+        records = [record for record in path.records if record.step == number]
+        tried = number < len(path.steps)
+        steps.append(
+            {
+                "outcome": path.steps[number].outcome if tried else "not tried",
+                "reason": path.steps[number].reason if tried else "an earlier step ended early",
+                "states": len(records),
+                "iterations": sum(record.iterations for record in records),
+            }
+        )
+    return {
+        "outcome": path.outcome,
+        "reason": path.reason,
+        "energy": {kind: _number(value) for kind, value in last.energy.as_dict().items()},
+        "fold_angle": {
+            crease: {"mean": _number(a.mean()), "min": _number(a.min()), "max": _number(a.max())}
+            for crease, a in folds.items()
+            if len(a)
+        },
+        "steps": steps,
+        "iterations": path.iterations,
+        "wall_time_s": path.wall_time_s,
+        "unknowns": path.unknowns,
+        "mesh": {
+            "nodes": len(mesh.points),
+            "triangles": len(mesh.triangles),
+            "aspect_ratio": _number(mesh.aspect_ratio),
+        },
+        "formulation": scene.model.formulation,
+        "versions": path.provenance["versions"],
+        "input": path.provenance["input"],
+        "scene": str(scene.source),
+    }
+
+
+def _number(value: float) -> float | None:
+    """A number that JSON can hold; there is none for nan."""
+    return float(value) if abs(value) < float("inf") else None
+
+
+def extras(
+    path: Trace, scene: Scene, folder: Path, pictures: bool, vtu: bool
+) -> dict[str, Callable[[], Any]]:
+    """What is written on request beside the result, by name (marked where a finished result is kept)."""
+    mark = "-unfinished" if path.outcome != "reached" and _is_finished(folder) else ""
+
+    def draw() -> None:
+        from bh.plotting import picture
+
+        picture(path[-1], folder / f"folded{mark}.png")
+
+    def series() -> None:
+        from bh.plotting import export_series
+
+        export_series(path, folder, f"path{mark}")
+
+    def fold() -> None:
+        from meshes.io import write_fold
+
+        mesh, last = scene.model.mesh, path[-1]
+        angles = np.zeros(len(mesh.topology.edges))
+        angles[mesh.topology.hinge_edges] = np.pi - last.dihedral_angles
+        frame = ("folded", last.points, angles)
+        write_fold(folder / f"folded{mark}.fold", mesh, frames=[frame], title=scene.name)
+
+    wanted = {
+        f"folded{mark}.png": (draw, pictures or scene.outputs.pictures),
+        f"path{mark}.pvd": (series, vtu or scene.outputs.vtu),
+        f"folded{mark}.fold": (fold, scene.outputs.fold),
+    }
+    return {name: write for name, (write, asked) in wanted.items() if asked}

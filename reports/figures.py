@@ -1,0 +1,251 @@
+"""Plots of a report as inline SVG, their data as CSV, and pictures as data links.
+
+Colours in the SVG are CSS variables of the page (`--ink`, `--soft`, `--rule`, `--s1` ... `--s8`), so that one plot
+serves light, dark and paper. The series take Okabe and Ito's colours, and markers and dashes of their own.
+"""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import math
+import re
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from meshes.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WIDTH, HEIGHT = 420, 300  # of a plot, CSS pixels where it is not scaled
+WIDEST = 1600  # of a picture, pixels
+# stand-ins for the CSS variables while matplotlib draws; no two may be equal
+INK, SOFT, RULE = "#010203", "#010204", "#010205"
+SERIES = tuple(f"#0a0b{number:02x}" for number in range(1, 9))
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+DASHES = ("none", "5,1.6", "1.4,1.4", "6,1.6,1.4,1.6", "9,2.5", "3,1.4", "8,1.6,1.4,1.6,1.4,1.6", "2.5,3")
+
+
+class ReportError(InputError):
+    """Stored results that cannot be reported, or a report that cannot be written."""
+
+
+class Axis(BaseModel):
+    """An axis: its label with the unit, and whether it is logarithmic."""
+
+    model_config = ConfigDict(strict=True)
+
+    label: str
+    log: bool = False
+
+
+class Series(BaseModel):
+    """A curve: `x` and `y` of equal length, null where there is no value."""
+
+    model_config = ConfigDict(strict=True)
+
+    label: str
+    x: list[float | None]
+    y: list[float | None]
+    style: Literal["line", "points", "reference"] = "line"
+
+
+class Plot(BaseModel):
+    """A plot as data."""
+
+    model_config = ConfigDict(strict=True)
+
+    id: str
+    title: str
+    kind: Literal["line"] = "line"
+    x: Axis
+    y: Axis
+    series: list[Series]
+    caption: str = ""
+
+    def coloured(self) -> list[tuple[int, Series]]:
+        """The series with the number of each one's colour; references have none (-1)."""
+        numbers, count = [], 0
+        for series in self.series:
+            numbers.append(-1 if series.style == "reference" else count % len(SERIES))
+            count += series.style != "reference"
+        return list(zip(numbers, self.series, strict=True))
+
+
+def svg(plot: Plot, prefix: str) -> str:
+    """The plot as an `<svg>` element to put into a page; every id in it begins with `prefix`.
+
+    Raises:
+        ReportError: a series has not as many x as y.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    settings: dict[str, Any] = {
+        "svg.fonttype": "none", "svg.hashsalt": prefix, "font.size": 12.0, "text.color": INK, "axes.edgecolor": SOFT,
+        "axes.labelcolor": INK, "axes.linewidth": 0.8, "xtick.color": SOFT, "ytick.color": SOFT, "grid.color": RULE,
+        "xtick.labelcolor": INK, "ytick.labelcolor": INK, "text.parse_math": False, "axes.unicode_minus": True,
+    }  # fmt: skip
+    with rc_context(settings):
+        figure = Figure(figsize=(WIDTH / 72.0, HEIGHT / 72.0), layout="constrained")
+        axes = figure.subplots()
+        _draw(axes, plot)
+        sink = io.StringIO()
+        nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        figure.savefig(sink, format="svg", transparent=True, metadata=nothing)
+    return _inline(sink.getvalue(), plot, prefix)
+
+
+def legend(plot: Plot) -> list[tuple[str, str]]:
+    """For every series a small `<svg>` swatch and its label."""
+    found = []
+    for number, series in plot.coloured():
+        colour = "var(--soft)" if number < 0 else f"var(--s{number + 1})"
+        dash = "4,3" if number < 0 else DASHES[number]
+        stroke = f'<path d="M1 7H29" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
+        mark = f'<path d="{_SHAPES[MARKERS[number]]}" fill="{colour}"/>' if number >= 0 else ""
+        parts = {"line": stroke + mark, "points": mark, "reference": stroke}[series.style]
+        swatch = f'<svg viewBox="0 0 30 14" width="30" height="14" aria-hidden="true">{parts}</svg>'
+        found.append((swatch, series.label))
+    return found
+
+
+def csv_link(rows: Iterable[Sequence[Any]]) -> str:
+    """A data link to `rows` as a CSV file."""
+    sink = io.StringIO()
+    csv.writer(sink, lineterminator="\n").writerows(rows)
+    return "data:text/csv;charset=utf-8;base64," + base64.b64encode(sink.getvalue().encode()).decode()
+
+
+def plot_rows(plot: Plot) -> list[tuple[Any, ...]]:
+    """The data behind a plot, one row a point under a row of titles."""
+    rows: list[tuple[Any, ...]] = [("series", plot.x.label, plot.y.label)]
+    for series in plot.series:
+        rows += [(series.label, x, y) for x, y in zip(series.x, series.y, strict=True)]
+    return rows
+
+
+def picture_link(file: Path) -> tuple[str, int, int]:
+    """A data link to a picture as WebP, its width and its height, pixels.
+
+    Raises:
+        ReportError: there is no such file, or it is not a picture.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(file) as image:
+            shown = image.convert("RGB")
+    except FileNotFoundError as error:
+        raise ReportError(f"picture '{file}' is missing; run `bh verify` again") from error
+    except (UnidentifiedImageError, OSError, ValueError) as error:
+        raise ReportError(f"picture '{file}' cannot be read; run `bh verify` again") from error
+    if shown.width > WIDEST:
+        shown = shown.resize((WIDEST, round(shown.height * WIDEST / shown.width)), Image.Resampling.LANCZOS)
+    sink = io.BytesIO()
+    shown.save(sink, "WEBP", quality=90, method=6)
+    return (
+        "data:image/webp;base64," + base64.b64encode(sink.getvalue()).decode(),
+        shown.width,
+        shown.height,
+    )
+
+
+# --- drawing --------------------------------------------------------------------------------------------------
+
+
+def _draw(axes: Axes, plot: Plot) -> None:
+    for number, series in plot.coloured():
+        if len(series.x) != len(series.y):
+            raise ReportError(
+                f"plot '{plot.id}', series '{series.label}': {len(series.x)} x for {len(series.y)} y; give pairs"
+            )
+        x, y = _values(series.x, plot.x.log), _values(series.y, plot.y.log)
+        if number < 0:
+            axes.plot(x, y, color=SOFT, linewidth=1.3, linestyle=(0, (4, 3)), zorder=1.5)
+            continue
+        dash = DASHES[number]
+        pattern: Any = "-" if dash == "none" else (0, tuple(float(part) for part in dash.split(",")))
+        look: dict[str, Any] = {"color": SERIES[number], "marker": MARKERS[number], "markeredgewidth": 0.0}
+        if series.style == "points":
+            axes.plot(x, y, linestyle="none", markersize=5.5, **look)
+        else:
+            size = 4.5 if len(x) <= 40 else 0.0
+            axes.plot(x, y, linestyle=pattern, linewidth=1.7, markersize=size, **look)
+    axes.set_xlabel(plot.x.label)
+    axes.set_ylabel(plot.y.label)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.tick_params(length=3.0, labelsize=11.0)
+    for axis, log, along in ((axes.xaxis, plot.x.log, "x"), (axes.yaxis, plot.y.log, "y")):
+        values = [v for s in plot.series for v in _values(getattr(s, along), log) if math.isfinite(v)]
+        if log and values:
+            _log_axis(axes, axis, along, min(values), max(values))
+
+
+def _values(values: Sequence[float | None], log: bool) -> list[float]:
+    """nan where there is nothing to draw."""
+    return [math.nan if v is None or (log and v <= 0.0) else float(v) for v in values]
+
+
+def _log_axis(axes: Axes, axis: Any, along: str, low: float, high: float) -> None:
+    """Ticks at powers of ten, and at 2 and 5 times them where the range is short."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    (axes.set_xscale if along == "x" else axes.set_yscale)("log")
+    decades = math.log10(high / low)
+    subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _power(value: float) -> str:
+    if 0.999e-3 <= value < 1.001e4:
+        return f"{value:g}"
+    exponent = math.floor(math.log10(value) + 1e-9)
+    mantissa = round(value / 10.0**exponent)
+    tens = "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return tens if mantissa == 1 else f"{mantissa}·{tens}"
+
+
+# --- SVG of a page --------------------------------------------------------------------------------------------
+
+_VARIABLES = {INK: "var(--ink)", SOFT: "var(--soft)", RULE: "var(--rule)"} | {
+    colour: f"var(--s{number + 1})" for number, colour in enumerate(SERIES)
+}
+_SHAPES = {
+    "o": "M12 7a3 3 0 1 0 6 0a3 3 0 1 0-6 0",
+    "s": "M12 4h6v6h-6z",
+    "^": "M15 3.5l3.5 6.5h-7z",
+    "D": "M15 3l4 4l-4 4l-4-4z",
+    "v": "M15 10.5l3.5-6.5h-7z",
+    "P": "M14 3.5h2v2.5h2.5v2h-2.5v2.5h-2v-2.5h-2.5v-2h2.5z",
+    "X": "M12.5 3.5l2.5 2l2.5-2l1 1l-2 2.5l2 2.5l-1 1l-2.5-2l-2.5 2l-1-1l2-2.5l-2-2.5z",
+    "*": "M15 2.5l1.2 3.2h3.3l-2.6 2.1l1 3.4l-2.9-2l-2.9 2l1-3.4l-2.6-2.1h3.3z",
+}
+
+
+def _inline(text: str, plot: Plot, prefix: str) -> str:
+    """matplotlib's file as an element: no prolog, no name spaces, ids of its own, the page's colours and font."""
+    body = text[text.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r"<!--.*?-->\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r'\bid="', f'id="{prefix}', body)
+    body = body.replace("url(#", f"url(#{prefix}").replace('xlink:href="#', f'href="#{prefix}')
+    body = re.sub(r"#0[1a]0[2b]0[1-8]", lambda found: _VARIABLES[found[0]], body)
+    body = re.sub(r"font(-family)?: ([^;\"]*?)'?DejaVu Sans[^;\"]*", r"font\1: \2var(--sans)", body)
+    inner = body[body.index(">") + 1 :]
+    named = ", ".join(series.label for series in plot.series)
+    what = f"{plot.y.label} against {plot.x.label}" + (f": {named}" if named else "")
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-labelledby="{prefix}t {prefix}d">'
+        f'<title id="{prefix}t">{escape(plot.title)}</title><desc id="{prefix}d">{escape(what)}</desc>{inner}'
+    ).strip()

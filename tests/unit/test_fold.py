@@ -1,0 +1,724 @@
+"""FOLD in and out, and triangles out through meshio."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import pathlib
+from collections.abc import Callable
+
+import meshio
+import numpy as np
+import pytest
+
+from meshes import FileFormatError, SheetMesh, annulus_sector, full_annulus, strip, structured
+from meshes.io import read_fold, write_fold, write_mesh
+from meshes.io.export import FORMATS
+
+PATTERNS = pathlib.Path(__file__).parents[3] / "shared" / "patterns"
+shared = pytest.mark.skipif(not PATTERNS.is_dir(), reason="the shared crease patterns are not here")
+
+SQUARE = {
+    "vertices_coords": [[0, 0], [2, 0], [2, 2], [0, 2], [1, 1]],
+    "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [4, 2], [1, 4], [4, 3]],
+    "edges_assignment": ["B", "B", "B", "B", "M", "M", "V", "F"],
+    "edges_foldAngle": [0, 0, 0, 0, -90, -60, 45, 0],
+    "faces_vertices": [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
+}
+
+Read = Callable[..., SheetMesh]
+
+
+@pytest.fixture
+def read(tmp_path: pathlib.Path) -> Read:
+    """Read a FOLD object; keys that are given override it, None deletes them."""
+
+    def from_object(data: dict | None = None, /, frame: int | None = None, **changes: object) -> SheetMesh:
+        whole = {key: value for key, value in ({**(data or {}), **changes}).items() if value is not None}
+        path = tmp_path / "sheet.fold"
+        path.write_text(json.dumps(whole))
+        return read_fold(path, frame)
+
+    return from_object
+
+
+def pairs(mesh: SheetMesh, name: str) -> list[list[int]]:
+    return mesh.edge_sets[name].tolist()
+
+
+def undirected(pairs: np.ndarray) -> set[tuple[int, int]]:
+    return {tuple(sorted(pair)) for pair in pairs.tolist()}
+
+
+def winding(mesh: SheetMesh) -> np.ndarray:
+    a, b, c = (mesh.points[mesh.triangles[:, k], :2] for k in range(3))
+    return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+
+
+class TestSets:
+    def test_assignments(self, read):
+        mesh = read(SQUARE)
+        assert mesh.kind == "imported"
+        assert mesh.points[:, :2].tolist() == SQUARE["vertices_coords"]
+        assert pairs(mesh, "crease:mountain") == [[0, 4], [4, 2]]
+        assert pairs(mesh, "crease:valley") == [[1, 4]]
+        assert pairs(mesh, "edge:flat") == [[4, 3]]
+        assert undirected(mesh.edge_sets["edge:boundary"]) == {(0, 1), (1, 2), (2, 3), (0, 3)}
+        assert dict(mesh.folds) == {"mountain": "mountain", "m1": "mountain", "valley": "valley", "v1": "valley"}
+        assert set(mesh.edge_sets) == {
+            "crease:mountain", "crease:m1", "crease:valley", "crease:v1", "edge:flat", "edge:boundary",
+        }  # fmt: skip
+
+    def test_fold_angles_are_mountain_positive_radians(self, read):
+        mesh = read(SQUARE)
+        np.testing.assert_allclose(mesh.fold_angles["m1"], np.radians([90.0, 60.0]), rtol=1e-15)
+        np.testing.assert_allclose(mesh.fold_angles["mountain"], np.radians([90.0, 60.0]), rtol=1e-15)
+        np.testing.assert_allclose(mesh.fold_angles["v1"], np.radians([-45.0]), rtol=1e-15)
+        assert not read(SQUARE, edges_foldAngle=None).fold_angles
+
+    def test_unknown_fold_angles_are_nan(self, read):
+        angles = read(SQUARE, edges_foldAngle=[0, 0, 0, 0, None, -60, 45, 0]).fold_angles["m1"]
+        assert np.isnan(angles).tolist() == [True, False]
+
+    def test_angles_stand_in_for_assignments(self, read):
+        mesh = read(SQUARE, edges_assignment=None)
+        assert pairs(mesh, "crease:mountain") == [[0, 4], [4, 2]]
+        assert pairs(mesh, "crease:valley") == [[1, 4]]
+        assert undirected(mesh.edge_sets["edge:unassigned"]) == {(3, 4)}
+
+    def test_unassigned_join_and_unlisted(self, read):
+        mesh = read(
+            SQUARE,
+            edges_vertices=SQUARE["edges_vertices"][4:7],
+            edges_assignment=["U", "J", "V"],
+            edges_foldAngle=None,
+        )
+        assert undirected(mesh.edge_sets["edge:unassigned"]) == {(0, 4), (3, 4)}  # one is not in the file at all
+        assert undirected(mesh.edge_sets["edge:join"]) == {(2, 4)}
+        assert len(mesh.edge_sets["edge:boundary"]) == 4
+
+    def test_cut_on_the_boundary_is_boundary(self, read):
+        mesh = read(SQUARE, edges_assignment=["C", "U", "J", "F", "M", "M", "V", "F"])
+        assert len(mesh.edge_sets["edge:boundary"]) == 4
+        assert not {"edge:unassigned", "edge:join"} & set(mesh.edge_sets)
+
+    def test_vertices_without_faces_are_dropped(self, read):
+        coords = [[7, 7], *SQUARE["vertices_coords"]]
+        mesh = read(
+            vertices_coords=coords,
+            faces_vertices=[[v + 1 for v in face] for face in SQUARE["faces_vertices"]],
+            edges_vertices=[[1, 5]],
+            edges_assignment=["M"],
+        )
+        assert mesh.points[:, :2].tolist() == SQUARE["vertices_coords"]
+        assert pairs(mesh, "crease:m1") == [[0, 4]]
+
+
+class TestChains:
+    def test_a_bend_is_passed_and_the_first_edge_gives_the_direction(self, read):
+        """A crease of three edges with corners, listed out of order and in mixed directions."""
+        mesh = read(
+            vertices_coords=[[0, 0], [3, 0], [3, 2], [0, 2], [0, 1], [1, 1.5], [2, 0.5], [3, 1]],
+            edges_vertices=[
+                [5, 6], [5, 4], [7, 6], [0, 1], [1, 7], [7, 2], [2, 3], [3, 4], [4, 0],
+            ],
+            edges_assignment=list("MMMBBBBBB"),
+        )  # fmt: skip
+        assert pairs(mesh, "crease:m1") == [[4, 5], [5, 6], [6, 7]]
+        assert "crease:m2" not in mesh.edge_sets
+
+    def test_straight_lines_go_through_a_crossing(self, read):
+        """Four mountains at a vertex: two straight lines, not four, however they are listed."""
+        coords = [[0, 0], [2, 0], [4, 0], [0, 2], [2, 2], [4, 2], [0, 4], [2, 4], [4, 4]]
+        rim = [[0, 1], [1, 2], [2, 5], [5, 8], [8, 7], [7, 6], [6, 3], [3, 0]]
+        mesh = read(
+            vertices_coords=coords,
+            edges_vertices=[[4, 1], [3, 4], [5, 4], [7, 4], *rim],
+            edges_assignment=["M"] * 4 + ["B"] * 8,
+            edges_foldAngle=[-1, -2, -3, -4] + [0] * 8,
+        )
+        assert pairs(mesh, "crease:m1") == [[7, 4], [4, 1]]
+        assert pairs(mesh, "crease:m2") == [[3, 4], [4, 5]]
+        assert pairs(mesh, "crease:mountain") == [[7, 4], [4, 1], [3, 4], [4, 5]]
+        np.testing.assert_allclose(np.degrees(mesh.fold_angles["mountain"]), [4, 1, 2, 3])
+        np.testing.assert_allclose(np.degrees(mesh.fold_angles["m2"]), [2, 3])
+
+    def test_three_creases_without_a_straight_pair_end_at_their_vertex(self, read):
+        mesh = read(
+            vertices_coords=[[0, 0], [4, 0], [2, 4], [2, 1]],
+            edges_vertices=[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
+            edges_assignment=list("BBBVVV"),
+        )
+        assert [name for name in mesh.creases if name != "valley"] == ["v1", "v2", "v3"]
+
+    def test_other_assignments_do_not_end_a_chain(self, read):
+        mesh = read(SQUARE)  # a valley and a flat edge meet the mountains at vertex 4
+        assert len(pairs(mesh, "crease:m1")) == 2
+
+    def test_closed_line(self, read):
+        mesh = read(_rings([1.0, 2.0, 3.0], "BMB", 6))
+        ring = mesh.edge_sets["crease:m1"]
+        assert len(ring) == 6
+        assert ring[:, 1].tolist() == np.roll(ring[:, 0], -1).tolist()
+
+
+class TestFaces:
+    @pytest.mark.parametrize("flips", [(), (0,), (1, 3), (0, 1, 2), (0, 1, 2, 3)])
+    def test_orientation_is_made_consistent(self, read, flips):
+        faces = [face[::-1] if i in flips else face for i, face in enumerate(SQUARE["faces_vertices"])]
+        mesh = read(SQUARE, faces_vertices=faces)
+        assert (winding(mesh) > 0).all()
+        assert mesh.areas.sum() == pytest.approx(4.0)
+
+    def test_orientation_in_space_follows_most_faces(self, read):
+        coords = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 1]]
+        up = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 1, 4], [4, 2, 1], [2, 3, 4], [3, 0, 4]])
+        assert (winding(up) > 0).all()
+        down = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 4, 1], [4, 2, 1], [2, 3, 4], [3, 4, 0]])
+        assert (winding(down) < 0).all()
+
+    @pytest.mark.parametrize("turn", range(4))
+    def test_a_quadrilateral_is_cut_along_its_shorter_diagonal(self, read, turn):
+        coords = [[0, 0], [3, 0], [4, 1], [0, 2]]  # 0-2 is 4.1 long, 1-3 is 3.6
+        mesh = read(vertices_coords=coords, faces_vertices=[np.roll(range(4), turn).tolist()])
+        assert undirected(mesh.edge_sets["edge:facet"]) == {(1, 3)}
+
+    @pytest.mark.parametrize("turn", range(4))
+    def test_of_equal_diagonals_the_one_at_the_smallest_number_is_taken(self, read, turn):
+        ring = np.roll([3, 1, 0, 2], turn).tolist()
+        coords = np.empty((4, 2))
+        coords[[3, 1, 0, 2]] = [[0, 0], [0.3, 0], [0.3, 0.1], [0, 0.1]]
+        mesh = read(vertices_coords=coords.tolist(), faces_vertices=[ring])
+        assert undirected(mesh.edge_sets["edge:facet"]) == {(0, 3)}
+
+    def test_a_concave_quadrilateral_is_cut_inside(self, read):
+        mesh = read(vertices_coords=[[0, 0], [4, 3], [0, 6], [1, 3]], faces_vertices=[[0, 1, 2, 3]])
+        assert undirected(mesh.edge_sets["edge:facet"]) == {(1, 3)}  # 0-2 runs outside
+        assert mesh.areas.sum() == pytest.approx(9.0)
+
+    def test_a_quadrilateral_in_space(self, read):
+        coords = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 1.5]]  # 0-2 is 2.83 long, 1-3 is 3.2
+        mesh = read(vertices_coords=coords, faces_vertices=[[0, 1, 2, 3]])
+        assert undirected(mesh.edge_sets["edge:facet"]) == {(0, 2)}
+
+    @pytest.mark.parametrize(
+        ("coords", "area"),
+        [
+            ([[0, 0], [1, 0], [3, 0], [1, 4]], 6.0),  # a triangle with a vertex on a side
+            ([[0, 0], [1, 0], [2, 0], [3, 0], [1.5, 4]], 6.0),
+            ([[0, 0], [3, 0], [2, 4 / 3], [1.5, 2], [0, 4], [0, 3], [0, 1]], 6.0),  # on two sides
+            ([[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [3, 3], [2, 3], [1, 3], [0, 3], [0, 2]], 9.0),
+            ([[0, 0], [4, 0], [4, 3], [3, 3], [3, 1], [1, 1], [1, 3], [0, 3]], 8.0),  # a U
+            ([[0.1, 0], [0.2, 1e-17], [0.3, -1e-17], [0.7, 0], [0.4, 0.5]], 0.15),  # straight but for rounding
+        ],
+    )
+    @pytest.mark.parametrize("tilted", [False, True])
+    def test_polygons(self, read, coords, area, tilted):
+        count = len(coords)
+        points = np.column_stack((coords, np.zeros(count)))
+        if tilted:  # into a plane through no axis
+            q, _ = np.linalg.qr(np.array([[1.0, 2.0, 3.0], [0.5, -1.0, 1.0], [2.0, 0.3, -1.0]]))
+            points = points @ q + [5.0, 6.0, 7.0]
+        mesh = read(vertices_coords=points.tolist(), faces_vertices=[list(range(count))])
+        assert len(mesh.triangles) == count - 2
+        assert mesh.areas.sum() == pytest.approx(area, rel=1e-12)
+        assert mesh.areas.min() > 1e-3
+        assert undirected(mesh.edge_sets["edge:boundary"]) == {
+            tuple(sorted((i, (i + 1) % count))) for i in range(count)
+        }
+        assert len(mesh.edge_sets["edge:facet"]) == count - 3
+
+    def test_triangles_between_curves_are_well_shaped(self, read):
+        """A crescent of 2 x 40 vertices: Delaunay triangles join neighbours across, no fans from one vertex."""
+        angle = np.linspace(0.0, 1.0, 40)
+        inner, outer = (np.column_stack((r * np.cos(angle), r * np.sin(angle))) for r in (10.0, 11.0))
+        coords = np.vstack((inner, outer[::-1]))
+        mesh = read(vertices_coords=coords.tolist(), faces_vertices=[list(range(79, -1, -1))])
+        assert np.bincount(mesh.triangles.ravel()).max() <= 5
+        across = mesh.points[mesh.topology.edges[:, 0]] - mesh.points[mesh.topology.edges[:, 1]]
+        assert np.linalg.norm(across, axis=1).max() < 1.2
+
+    def test_units(self, read):
+        sizes = {"mm": 1.0, "unit": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3, "nm": 1e-6}
+        for unit, size in sizes.items():
+            mesh = read(SQUARE, frame_unit=unit)
+            np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [2 * size, 2 * size, 0], rtol=1e-14)
+            assert mesh.areas.sum() == pytest.approx(4 * size**2)
+
+    def test_byte_order_mark(self, tmp_path):
+        path = tmp_path / "bom.fold"
+        path.write_bytes(b"\xef\xbb\xbf" + json.dumps(SQUARE).encode())
+        assert len(read_fold(path).triangles) == 4
+
+
+def _rings(radii: list[float], letters: str, count: int) -> dict:
+    """Concentric regular polygons, edges only."""
+    turn = 2 * math.pi / count
+    return {
+        "vertices_coords": [[r * math.cos(i * turn), r * math.sin(i * turn)] for r in radii for i in range(count)],
+        "edges_vertices": [
+            [k * count + i, k * count + (i + 1) % count] for k in range(len(radii)) for i in range(count)
+        ],
+        "edges_assignment": [letter for letter in letters for _ in range(count)],
+    }
+
+
+def _polygon_area(radius: float, count: int) -> float:
+    return 0.5 * count * radius**2 * math.sin(2 * math.pi / count)
+
+
+class TestEdgesOnly:
+    def test_the_same_as_with_faces(self, read):
+        mesh, other = read(SQUARE), read(SQUARE, faces_vertices=None)
+        assert undirected(other.topology.edges) == undirected(mesh.topology.edges)
+        for name in mesh.edge_sets:
+            assert undirected(other.edge_sets[name]) == undirected(mesh.edge_sets[name])
+        assert (winding(other) > 0).all()
+
+    def test_annulus_has_a_hole(self, read):
+        mesh = read(_rings([1.0, 2.0, 3.0, 4.0], "BMVB", 24))
+        assert mesh.areas.sum() == pytest.approx(_polygon_area(4.0, 24) - _polygon_area(1.0, 24))
+        assert len(mesh.edge_sets["edge:boundary"]) == 48
+        assert set(mesh.creases) == {"mountain", "m1", "valley", "v1"}
+        assert len(mesh.points) - len(mesh.topology.edges) + len(mesh.triangles) == 0
+
+    def test_a_disc_without_borders_has_none(self, read):
+        mesh = read(_rings([1.0, 2.0], "MU", 12))
+        assert mesh.areas.sum() == pytest.approx(_polygon_area(2.0, 12))
+
+    def test_a_sheet_inside_a_hole_is_a_second_sheet(self, read):
+        with pytest.raises(FileFormatError, match="one sheet"):
+            read(_rings([1.0, 2.0, 3.0], "BBB", 12))
+
+    @pytest.mark.parametrize(
+        ("changes", "words"),
+        [
+            ({"edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]]}, "edges 4 and 5 cross"),
+            ({"edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4]]}, "edge 4 (0-4) hangs loose"),
+            ({"edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 4]]}, "vertex 4 lies on edge 4 (0-2)"),
+            ({"edges_vertices": [[0, 1], [1, 2]]}, "hangs loose"),
+            ({"vertices_coords": [[0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 0], [1, 1, 0]]}, "no faces_vertices"),
+        ],
+    )
+    def test_not_plane(self, read, changes, words):
+        with pytest.raises(FileFormatError) as caught:
+            read({"vertices_coords": SQUARE["vertices_coords"], "edges_vertices": SQUARE["edges_vertices"]}, **changes)
+        assert words in str(caught.value)
+
+    def test_border_inside_the_sheet(self, read):
+        with pytest.raises(FileFormatError, match=r"edge 6 \(1-4\) is assigned B but does not part"):
+            read(SQUARE, faces_vertices=None, edges_assignment=list("BBBBMMBF"))
+
+
+class TestFrames:
+    FRAMES = (
+        {"frame_inherit": True, "frame_parent": 0, "vertices_coords": [[x, y, 1.0 * (x == y == 1)] for x, y in
+                                                                      SQUARE["vertices_coords"]]},
+        {"frame_inherit": True, "frame_parent": 1, "frame_unit": "cm", "edges_foldAngle": None},
+        {"vertices_coords": [[0, 0], [1, 0], [0, 1]], "faces_vertices": [[0, 1, 2]]},
+    )  # fmt: skip
+
+    def test_frames_count_from_the_key_frame(self, read):
+        file = {**SQUARE, "file_frames": list(self.FRAMES)}
+        assert read(file).flat
+        assert read(file, 0).flat
+        assert read(file, 1).points[4].tolist() == [1.0, 1.0, 1.0]
+        assert read(file, 3).areas.tolist() == [0.5]
+
+    def test_inheritance_of_the_inherited(self, read):
+        mesh = read({**SQUARE, "file_frames": list(self.FRAMES)}, 2)
+        assert mesh.points[4].tolist() == [10.0, 10.0, 10.0]
+        assert pairs(mesh, "crease:m1") == [[0, 4], [4, 2]]
+        assert not mesh.fold_angles  # null overrides what would be inherited
+
+    def test_default_is_the_first_frame_with_vertices(self, read):
+        mesh = read({"file_spec": 1.2, "file_frames": [{"frame_title": "empty"}, self.FRAMES[2]]})
+        assert mesh.areas.tolist() == [0.5]
+
+    @pytest.mark.parametrize(
+        ("frames", "frame", "words"),
+        [
+            ([], 1, "no frame 1; the file has frames 0 to 0"),
+            ([{}], -1, "no frame -1"),
+            ([{}], True, "no frame True"),
+            ([{}], "0", "no frame '0'"),
+            ([{}], 1, "vertices_coords"),
+            ([3], None, "file_frames[0] is 3"),
+            ({"a": 1}, None, "file_frames is an object"),
+            ([{"frame_inherit": True, "frame_parent": 1}], 1, "inherits from itself"),
+            (
+                [{"frame_inherit": True, "frame_parent": 2}, {"frame_inherit": True, "frame_parent": 1}],
+                1,
+                "inherits from itself",
+            ),
+            ([{"frame_inherit": True}], 1, "frame_parent of frame 1 is null"),
+            ([{"frame_inherit": True, "frame_parent": 5}], 1, "frame_parent of frame 1 is 5"),
+            ([{"frame_inherit": 1, "frame_parent": 0}], 1, "frame_inherit of frame 1 is 1"),
+            (
+                [{"frame_inherit": True, "frame_parent": 0, "edges_vertices": [[0, 1]]}],
+                1,
+                "edges_foldAngle has 8 entries for 1",
+            ),
+        ],
+    )
+    def test_wrong_frames(self, read, frames, frame, words):
+        with pytest.raises(FileFormatError) as caught:
+            read({**SQUARE, "file_frames": frames}, frame)
+        assert words in str(caught.value)
+
+
+TWO_D = SQUARE["vertices_coords"]
+BAD = {
+    "no vertices": ({"vertices_coords": None}, "no frame has vertices_coords"),
+    "empty vertices": ({"vertices_coords": []}, "vertices_coords"),
+    "vertices no list": ({"vertices_coords": "abc"}, 'vertices_coords is "abc"'),
+    "vertex no list": ({"vertices_coords": [*TWO_D[:4], 5]}, "vertices_coords[4] is 5"),
+    "one coordinate": ({"vertices_coords": [[0], *TWO_D[1:]]}, "vertices_coords[0] is a list of 1"),
+    "four coordinates": ({"vertices_coords": [[0] * 4, *TWO_D[1:]]}, "vertices_coords[0] is a list of 4"),
+    "text": ({"vertices_coords": [[0, "1"], *TWO_D[1:]]}, 'vertices_coords[0] holds "1"'),
+    "true": ({"vertices_coords": [[0, True], *TWO_D[1:]]}, "vertices_coords[0] holds true"),
+    "null": ({"vertices_coords": [[0, None], *TWO_D[1:]]}, "vertices_coords[0] holds null"),
+    "huge": ({"vertices_coords": [[0, 1e300], *TWO_D[1:]]}, "vertices_coords[0] holds 1e+300"),
+    "huge integer": ({"vertices_coords": [[0, 10**400], *TWO_D[1:]]}, "vertices_coords[0] holds 1000"),
+    "huge unit": ({"vertices_coords": [[0, 1e11], *TWO_D[1:]], "frame_unit": "m"}, "vertices_coords[0] holds"),
+    "unit": ({"frame_unit": "furlong"}, 'frame_unit "furlong" is not known; use one of unit, mm'),
+    "unit number": ({"frame_unit": 3}, "frame_unit 3"),
+    "edge range": ({"edges_vertices": [*SQUARE["edges_vertices"][:7], [4, 5]]}, "edges_vertices[7] is 5; use"),
+    "edge negative": ({"edges_vertices": [*SQUARE["edges_vertices"][:7], [4, -1]]}, "edges_vertices[7] is -1"),
+    "edge bool": ({"edges_vertices": [*SQUARE["edges_vertices"][:7], [4, True]]}, "edges_vertices[7] is true"),
+    "edge float": ({"edges_vertices": [*SQUARE["edges_vertices"][:7], [4, 3.0]]}, "edges_vertices[7] is 3.0"),
+    "edge loop": ({"edges_vertices": [*SQUARE["edges_vertices"][:7], [4, 4]]}, "joins vertex 4 to itself"),
+    "edge twice": ({"edges_vertices": [*SQUARE["edges_vertices"][:7], [4, 0]]}, "repeats edge 4"),
+    "edge of three": ({"edges_vertices": [*SQUARE["edges_vertices"][:7], [4, 0, 1]]}, "is a list of 3"),
+    "edge of no face": ({"edges_vertices": [*SQUARE["edges_vertices"][:7], [1, 3]]}, "edge 7 (1-3) is not a side"),
+    "assignments short": ({"edges_assignment": ["B"] * 7}, "edges_assignment has 7 entries for 8"),
+    "assignment letter": ({"edges_assignment": [*"BBBBMMV", "X"]}, 'edges_assignment[7] is "X"; use one of'),
+    "assignment word": ({"edges_assignment": [*"BBBBMMV", "MV"]}, 'edges_assignment[7] is "MV"'),
+    "assignment number": ({"edges_assignment": [*"BBBBMMV", 1]}, "edges_assignment[7] is 1"),
+    "assignment lines": ({"edges_assignment": [*"BBBBMMV", "a\nb\ud800"]}, r'is "a\nb\ud800"'),
+    "border inside": ({"edges_assignment": list("BBBBMMVB")}, "edge 7 (4-3) is assigned B but has a face on both"),
+    "crease outside": ({"edges_assignment": list("MBBBMMVF")}, "edge 0 (0-1) is assigned M but has a face on one"),
+    "cut inside": ({"edges_assignment": list("BBBBMMVC")}, "edge 7 (4-3) is a cut (C) inside"),
+    "angles short": ({"edges_foldAngle": [0]}, "edges_foldAngle has 1 entries for 8"),
+    "angle text": ({"edges_foldAngle": [0] * 7 + ["x"]}, 'edges_foldAngle[7] is "x"'),
+    "angle large": ({"edges_foldAngle": [0] * 7 + [181]}, "edges_foldAngle[7] is 181; give degrees"),
+    "face of two": ({"faces_vertices": [[0, 1]]}, "faces_vertices[0] is a list of 2"),
+    "face no list": ({"faces_vertices": [[0, 1, 4], {}]}, "faces_vertices[1] is an object"),
+    "face range": ({"faces_vertices": [[0, 1, 9]]}, "a vertex of faces_vertices[0] is 9; use a whole number from 0"),
+    "face slit": ({"faces_vertices": [[0, 1, 4, 1]]}, "faces_vertices[0] uses a vertex twice"),
+    "non-manifold": (
+        {"vertices_coords": [*TWO_D, [1, 1, 1]], "faces_vertices": [*SQUARE["faces_vertices"], [0, 4, 5]]},
+        "edge 4-0 belongs to 3 faces",
+    ),
+    "no faces or edges": (
+        {"edges_vertices": None, "edges_assignment": None, "edges_foldAngle": None, "faces_vertices": None},
+        "no faces_vertices and no edges_vertices",
+    ),
+    "assignments alone": ({"edges_vertices": None}, "for 0 edges_vertices"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_values(read, case):
+    changes, words = BAD[case]
+    with pytest.raises(FileFormatError) as caught:
+        read(SQUARE, **changes)
+    assert words in str(caught.value).replace("edge 0-4 belongs", "edge 4-0 belongs")
+    assert "sheet.fold" in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("coords", "faces", "words"),
+    [
+        ([[0, 0], [1, 1], [2, 2]], [[0, 1, 2]], "face 0 (vertices 0, 1, 2) has no area"),
+        ([[0, 0, 0], [1, 1, 1], [2, 2, 2], [0, 0, 1]], [[0, 1, 3], [2, 1, 0]], "face 1 (vertices 2, 1, 0) has no area"),
+        ([[0, 0], [0, 0], [2, 2], [0, 2]], [[0, 1, 2, 3]], "face 0 (vertices 0, 1, 2, 3) has no area"),
+        ([[0, 0], [0, 0], [0, 0]], [[0, 1, 2]], "no area"),
+        ([[0, 0], [2, 0], [0, 2], [2, 2.5]], [[0, 1, 2, 3]], "not a simple polygon"),
+        ([[0, 0], [2, 0], [2, 1], [1, 1], [1, 1], [0, 1]], [[0, 1, 2, 3, 4, 5]], "merge vertices"),
+        ([[0, 0], [2, 0], [2, 2], [0, 1.5]], [[0, 1, 2], [0, 3, 1]], "turned over (folded flat)"),
+        ([[0, 0], [1, 0], [0, 1], [5, 0], [6, 0], [5, 1]], [[0, 1, 2], [3, 4, 5]], "one sheet"),
+        ([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]], [[0, 1, 2], [0, 3, 4]], "one sheet"),
+        (  # a fan that turns twice round vertex 0
+            [[0, 0], *([math.cos(a), math.sin(a)] for a in np.arange(9) * 1.5)],
+            [[0, i, i + 1] for i in range(1, 9)],
+            "over each other",
+        ),
+        (  # a ring of triangles whose first and last touch in vertex 0 only
+            [[0, 0], [2, 0], [1, 1], [1, 3], [-1, 3], [-1, 1], [-2, 0], [-3, 5], [3, 5]],
+            [[0, 1, 2], [2, 1, 8], [2, 8, 3], [3, 8, 7], [3, 7, 4], [4, 7, 5], [5, 7, 6], [5, 6, 0]],
+            "at vertex 0 parts of the sheet touch",
+        ),
+        (  # a Moebius band of five triangles
+            [[math.cos(a), math.sin(a), 0.1 * i] for i, a in enumerate(np.arange(5) * 2 * math.pi / 5)],
+            [[i, (i + 1) % 5, (i + 2) % 5] for i in range(5)],
+            "one-sided band",
+        ),
+    ],
+)  # fmt: skip
+def test_bad_sheets(read, coords, faces, words):
+    with pytest.raises(FileFormatError) as caught:
+        read(vertices_coords=coords, faces_vertices=faces)
+    assert words in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "the file is empty"),
+        (b" \n\t", "the file is empty"),
+        (b"{", "this is not JSON"),
+        (b"\x89PNG\r\n", "byte 0 is not UTF-8"),
+        (b'{"a": "\xff"}', "byte 7 is not UTF-8"),
+        (b"[1, 2]", "the top of the file is a list of 2"),
+        (b"null", "the top of the file is null"),
+        (b"[" * 100_000, "nested too deeply"),
+        (b'{"vertices_coords": ' * 50_000, "nested too deeply"),
+        (b'{"vertices_coords": [[NaN, 0]]}', "NaN is not JSON"),
+        (b'{"vertices_coords": [[-Infinity, 0]]}', "-Infinity is not JSON"),
+        (b'{"vertices_coords": [[1e999, 0]]}', "holds Infinity"),
+        (b'{"vertices_coords": [[' + b"1" * 5000 + b", 0]]}", "this is not JSON"),
+        (b'{"file_spec": 1.2}', "no frame has vertices_coords"),
+    ],
+    ids=range(14),
+)
+def test_bad_files(tmp_path, content, words):
+    path = tmp_path / "bad.fold"
+    path.write_bytes(content)
+    with pytest.raises(FileFormatError) as caught:
+        read_fold(path)
+    assert words in str(caught.value)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert str(caught.value).isprintable()
+
+
+def test_no_file(tmp_path):
+    with pytest.raises(FileFormatError, match="folder"):
+        read_fold(tmp_path)
+    with pytest.raises(FileFormatError, match="No such file"):
+        read_fold(tmp_path / "absent.fold")
+    with pytest.raises(FileFormatError):
+        read_fold(tmp_path / "nul\0.fold")
+    odd = tmp_path / "two\nlines.fold"
+    odd.write_text("")
+    with pytest.raises(FileFormatError) as caught:
+        read_fold(odd)
+    assert str(caught.value).isprintable()
+
+
+@shared
+def test_shared_simple():
+    mesh = read_fold(PATTERNS / "simple.fold")
+    assert len(mesh.points) == 6
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 4, 1], [1, 5, 2]]
+    assert pairs(mesh, "crease:v1") == [[0, 2]]
+    assert undirected(mesh.edge_sets["crease:mountain"]) == {(0, 1), (1, 2)}
+    assert len(mesh.edge_sets["edge:boundary"]) == 6
+    assert not mesh.flat
+
+
+@shared
+def test_shared_square_twist():
+    mesh = read_fold(PATTERNS / "squaretwist.fold")
+    assert (len(mesh.points), len(mesh.triangles)) == (16, 18)
+    counts = {name: len(mesh.edge_sets[name]) for name in ("crease:mountain", "crease:valley", "edge:facet")}
+    assert counts == {"crease:mountain": 6, "crease:valley": 6, "edge:facet": 9}
+    assert len(mesh.edge_sets["edge:boundary"]) == 12
+    # the sign of every fold in space is as drawn: normals part at a mountain, so its far wing lies below
+    normals = np.cross(*(mesh.points[mesh.triangles[:, k]] - mesh.points[mesh.triangles[:, 0]] for k in (1, 2)))
+    topology = mesh.topology
+    for name, sign in (("crease:mountain", -1), ("crease:valley", 1)):
+        for edge in topology.find_edges(mesh.edge_sets[name]):
+            hinge = topology.hinges[topology.hinge_edges.tolist().index(edge)]
+            height = normals[topology.edge_triangles[edge, 0]] @ (mesh.points[hinge[3]] - mesh.points[hinge[1]])
+            assert height * sign > 0
+
+
+class TestWriteFold:
+    def mesh(self) -> SheetMesh:
+        return structured(annulus_sector([60, 80], 10, 1.2, ["mountain", "valley"]), along=5, rows=2)
+
+    def test_the_file(self, tmp_path):
+        mesh = self.mesh()
+        path = tmp_path / "out.fold"
+        write_fold(path, mesh, title="A sheet")
+        data = json.loads(path.read_text())
+        assert data["file_spec"] == 1.2
+        assert data["file_title"] == "A sheet"
+        assert data["frame_classes"] == ["creasePattern"]
+        assert data["frame_unit"] == "mm"
+        assert {len(row) for row in data["vertices_coords"]} == {2}
+        assert data["edges_vertices"] == mesh.topology.edges.tolist()
+        assert data["faces_vertices"] == mesh.triangles.tolist()
+        assert [data["edges_assignment"].count(letter) for letter in "MV"] == [6, 6]  # 4 whole cells and 2 half ones
+        assert data["edges_assignment"].count("B") == int((mesh.topology.edge_triangles[:, 1] < 0).sum())
+        assert "edges_foldAngle" not in data
+        assert os.listdir(tmp_path) == ["out.fold"]
+
+    def test_states(self, tmp_path):
+        mesh = self.mesh()
+        angles = np.linspace(-1.0, 1.0, len(mesh.topology.edges))
+        lifted = mesh.points + [0.0, 0.0, 1.0] * mesh.points[:, :1] ** 2 / 50.0
+        path = tmp_path / "out.fold"
+        write_fold(path, mesh, frames=[("flat", mesh.points, None), ("lifted", lifted, angles)])
+        data = json.loads(path.read_text())
+        first, second = data["file_frames"]
+        assert (first["frame_title"], first["frame_classes"]) == ("flat", ["foldedForm"])
+        assert (first["frame_inherit"], first["frame_parent"]) == (True, 0)
+        assert "edges_foldAngle" not in first
+        np.testing.assert_allclose(second["edges_foldAngle"], -np.degrees(angles), rtol=1e-15)
+        np.testing.assert_array_equal(read_fold(path, 2).points, lifted)
+        np.testing.assert_array_equal(read_fold(path, 1).points, mesh.points)
+        crease = read_fold(path, 2).fold_angles["m1"]
+        at = mesh.topology.find_edges(mesh.edge_sets["crease:crease-1"])
+        np.testing.assert_allclose(crease, angles[at], rtol=1e-14)
+
+    def test_drawn_angles(self, tmp_path, read):
+        mesh = read(SQUARE)
+        write_fold(tmp_path / "out.fold", mesh)
+        again = read_fold(tmp_path / "out.fold")
+        for name in mesh.creases:
+            np.testing.assert_allclose(again.fold_angles[name], mesh.fold_angles[name], rtol=1e-15)
+
+    def test_partly_unknown_angles(self, tmp_path, read):
+        write_fold(tmp_path / "out.fold", read(SQUARE, edges_foldAngle=[0, 0, 0, 0, None, -60, 45, 0]))
+        angles = json.loads((tmp_path / "out.fold").read_text())["edges_foldAngle"]
+        assert angles.count(None) == 1
+
+    def test_unassigned_and_join_survive(self, tmp_path, read):
+        write_fold(tmp_path / "out.fold", read(SQUARE, edges_assignment=list("BBBBUJVF")))
+        again = read_fold(tmp_path / "out.fold")
+        assert undirected(again.edge_sets["edge:unassigned"]) == {(0, 4)}
+        assert undirected(again.edge_sets["edge:join"]) == {(2, 4)}
+
+    def test_a_folded_mesh(self, tmp_path):
+        mesh = self.mesh()
+        folded = SheetMesh(mesh.points + [0, 0, 1] * mesh.points[:, :1] ** 2, mesh.triangles)
+        write_fold(tmp_path / "out.fold", folded)
+        assert json.loads((tmp_path / "out.fold").read_text())["frame_classes"] == ["foldedForm"]
+        np.testing.assert_array_equal(read_fold(tmp_path / "out.fold").points, folded.points)
+
+    def test_wrong_states(self, tmp_path):
+        mesh = self.mesh()
+        for points, angles in (
+            (mesh.points[1:], None),
+            (mesh.points[:, :2], None),
+            (np.full_like(mesh.points, np.nan), None),
+            (mesh.points, np.zeros(3)),
+            ("abc", None),
+        ):
+            with pytest.raises(FileFormatError, match=r"state 0 .\"bent\".*give"):
+                write_fold(tmp_path / "out.fold", mesh, frames=[("bent", points, angles)])
+        assert os.listdir(tmp_path) == []
+
+
+def _write_any(kind: str, path: pathlib.Path, mesh: SheetMesh) -> None:
+    if kind == "fold":
+        write_fold(path, mesh)
+    else:
+        write_mesh(path.with_suffix(".vtu"), mesh)
+
+
+@pytest.mark.parametrize("kind", ["fold", "vtu"])
+class TestPlaces:
+    """Where files go: whole or not at all."""
+
+    def mesh(self) -> SheetMesh:
+        return structured(strip(10, 4, [2]), along=3)
+
+    def test_no_folder(self, tmp_path, kind):
+        with pytest.raises(FileFormatError, match=r"cannot be written .*existing folder"):
+            _write_any(kind, tmp_path / "absent" / f"out.{kind}", self.mesh())
+
+    def test_a_folder_in_its_place(self, tmp_path, kind):
+        (tmp_path / f"out.{kind}").mkdir()
+        with pytest.raises(FileFormatError, match="folder or device"):
+            _write_any(kind, tmp_path / f"out.{kind}", self.mesh())
+        assert os.listdir(tmp_path) == [f"out.{kind}"]
+
+    def test_a_failure_keeps_the_old_file(self, tmp_path, kind, monkeypatch):
+        path = tmp_path / f"out.{kind}"
+        path.write_text("old")
+
+        def full(*_: object) -> None:
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr("meshes.io.export.os.replace", full)
+        with pytest.raises(FileFormatError, match="No space left"):
+            _write_any(kind, path, self.mesh())
+        assert path.read_text() == "old"
+        assert os.listdir(tmp_path) == [path.name]
+
+    def test_a_link_stays_a_link(self, tmp_path, kind):
+        (tmp_path / "real").mkdir()
+        link = tmp_path / f"out.{kind}"
+        link.symlink_to(tmp_path / "real" / f"out.{kind}")
+        _write_any(kind, link, self.mesh())
+        assert link.is_symlink()
+        assert (tmp_path / "real" / f"out.{kind}").is_file()
+
+    def test_bad_path(self, tmp_path, kind):
+        with pytest.raises(FileFormatError):
+            _write_any(kind, tmp_path / f"nul\0.{kind}", self.mesh())
+
+
+class TestWriteMesh:
+    def mesh(self) -> SheetMesh:
+        return structured(full_annulus(20, 5), along=12)
+
+    @pytest.mark.parametrize("suffix", FORMATS)
+    def test_formats(self, tmp_path, suffix, capfd):
+        mesh = self.mesh()
+        path = tmp_path / f"out{suffix.upper()}"
+        write_mesh(path, mesh)
+        assert capfd.readouterr() == ("", "")  # libraries do not print
+        assert os.listdir(tmp_path) == [path.name]
+        with np.errstate(over="ignore"):  # meshio's STL reader
+            back = meshio.read(path, file_format=FORMATS[suffix][0])
+        corners = back.points[np.vstack([block.data for block in back.cells if block.type == "triangle"])]
+        np.testing.assert_allclose(corners, mesh.points[mesh.triangles], atol=1e-12)
+
+    @pytest.mark.parametrize("suffix", [suffix for suffix, (_, fields) in FORMATS.items() if fields])
+    def test_fields(self, tmp_path, suffix, capfd):
+        mesh = self.mesh()
+        points = mesh.points + np.array([0.0, 0.0, 3.0])
+        fields = {"u": points, "pair": points[:, :2], "number": np.arange(len(points)), "high": points[:, 0] > 0}
+        cells = {"area": mesh.areas}
+        path = tmp_path / f"out{suffix}"
+        write_mesh(path, mesh, points, fields, cells)
+        assert capfd.readouterr() == ("", "")
+        back = meshio.read(path, file_format=FORMATS[suffix][0])
+        np.testing.assert_allclose(back.points, points)
+        np.testing.assert_allclose(back.point_data["u"], points)
+        np.testing.assert_allclose(back.point_data["pair"][:, :2], points[:, :2])
+        np.testing.assert_array_equal(back.point_data["number"].ravel(), np.arange(len(points)))
+        np.testing.assert_array_equal(back.point_data["high"].ravel(), points[:, 0] > 0)
+        np.testing.assert_allclose(np.ravel(back.cell_data["area"][0]), mesh.areas)
+
+    @pytest.mark.parametrize(
+        ("name", "arguments", "words"),
+        [
+            ("out.xyz", {}, "suffix '.xyz' is not known; use one of .vtu, .vtk"),
+            ("out", {}, "suffix '' is not known"),
+            ("out.stl", {"node_fields": {"a": np.zeros(36)}}, ".stl files hold no fields"),
+            ("out.vtu", {"node_fields": {"a": np.zeros(3)}}, "node field 'a' has shape (3,); give (36,)"),
+            ("out.vtu", {"node_fields": {"a": np.zeros((36, 3, 3))}}, "node field 'a' has shape (36, 3, 3)"),
+            ("out.vtu", {"node_fields": {"a": 1.0}}, "node field 'a' has shape ()"),
+            ("out.vtu", {"cell_fields": {"b": np.zeros(36)}}, "cell field 'b' has shape (36,); give (48,)"),
+            ("out.vtu", {"cell_fields": {"b": ["x"] * 48}}, "cell field 'b' is not an array of numbers"),
+            ("out.vtu", {"cell_fields": {"b": [[1], [1, 2]]}}, "cell field 'b' is not an array of numbers"),
+            ("out.vtu", {"cell_fields": {"b": np.zeros(48, complex)}}, "cell field 'b' is not an array of numbers"),
+            ("out.vtk", {"node_fields": {"a b": np.zeros(36)}}, "spaces in field names"),
+            ("out.vtu", {"points": np.zeros((3, 3))}, "points"),
+            ("out.vtu", {"points": np.full((36, 3), np.inf)}, "finite"),
+        ],
+    )
+    def test_errors(self, tmp_path, name, arguments, words):
+        with pytest.raises(FileFormatError) as caught:
+            write_mesh(tmp_path / name, self.mesh(), **arguments)
+        assert words in str(caught.value)
+        assert str(caught.value).isprintable()
+        assert os.listdir(tmp_path) == []
