@@ -153,7 +153,10 @@ def view(
         bh.plotting.picture(solved[state], picture)
         typer.echo(f"wrote {picture}")
     if picture is None and vtu is None:
-        bh.plotting.show(solved[state])
+        try:
+            bh.plotting.show(solved[state])
+        except InputError as error:
+            raise InputError(f"{error}, or bh view {path} --picture sheet.png") from error
 
 
 @app.command()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
@@ -23,7 +24,7 @@ from bh.progress import ProgressMeter, meter
 from bh.solvers.continuation import Increment, LoadControl, Point, point
 from bh.solvers.trace import Walk, walk
 from bh.state import State
-from bh.storage import PathFile, StateRow
+from bh.storage import PathFile, StateRow, reading
 
 Array = NDArray[np.float64]
 
@@ -152,17 +153,13 @@ class Path:
             PathFileError: no such file, or not a path file.
         """
         source = PathFile.open(FilePath(file))
-        try:
+        with closing(source), reading(FilePath(file)):
             meta = source.meta()
             path = cls(rebuild(meta["model"], source.arrays()), meta["provenance"])
             for row in source.states():
                 path.records.append(_record(row))
             ends = source.steps()
             path.steps = [StepOutcome(*ends[step]) for step in sorted(ends)]
-        except KeyError as missing:
-            raise PathFileError(f"'{file}' has no {missing}; give a file that bh has written") from missing
-        finally:
-            source.close()
         return path
 
     def _row(self, index: int, record: Record) -> StateRow:

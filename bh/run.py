@@ -23,7 +23,7 @@ from bh.path import Path as Trace
 from bh.path import trace
 from bh.progress import ProgressMeter
 from bh.scene import Scene
-from bh.storage import PathFile
+from bh.storage import PathFile, reading
 from meshes.io.export import replacing
 
 FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
@@ -87,7 +87,11 @@ def holds_states(folder_or_file: Path) -> bool:
     if folder_or_file.is_dir():
         files = [folder_or_file / name for name, _ in (UNFINISHED, FINISHED)]
     for file in files:
-        with contextlib.suppress(InputError), contextlib.closing(PathFile.open(file)) as stored:
+        with (
+            contextlib.suppress(InputError),
+            contextlib.closing(PathFile.open(file)) as stored,
+            reading(file),
+        ):
             if next(stored.states(), None) is not None:
                 return True
     return False
@@ -106,8 +110,9 @@ def _names(folder: Path, model: Model, resume: bool) -> tuple[str, str]:
         raise InputError(f"there is no {FINISHED[0]} in '{folder}' to go on from; run without --resume")
     wanted = fingerprint(model)
     for names in found:
-        with contextlib.closing(PathFile.open(folder / names[0])) as file:
-            if file.meta().get("provenance", {}).get("input") == wanted:
+        place = folder / names[0]
+        with contextlib.closing(PathFile.open(place)) as file, reading(place):
+            if file.meta()["provenance"]["input"] == wanted:
                 return names
     return found[0]  # of another scene, as `trace` will say
 

@@ -17,7 +17,7 @@ import numpy as np
 from bh.actuation import Actuation, Fold, Moment
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
-from bh.formulations import names
+from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
 from bh.program import program
 from bh.scene_schema import (
@@ -125,7 +125,7 @@ def _scene(text: str, folder: Path) -> Scene:
         if key not in data:
             raise SceneError(f"{key} is missing; add a table {'[[steps]]' if key == 'steps' else f'[{key}]'}")
     sheet = read_table(SheetTable, data["sheet"], "sheet")
-    formulation = _formulation(read_table(ModelTable, data.get("model", {}), "model").formulation)
+    name = _formulation(read_table(ModelTable, data.get("model", {}), "model").formulation)
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
@@ -134,8 +134,8 @@ def _scene(text: str, folder: Path) -> Scene:
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
-        creases={name: _crease(item, f"creases.{name}") for name, item in creases.items()},
-        formulation=formulation,
+        creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
+        formulation=name,
     )
     _check(model)
     return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold))
@@ -286,8 +286,8 @@ def _check(model: Model) -> None:
         if isinstance(support, Support):
             with within(f"supports[{i}].at"):
                 select(mesh, support.at)
-    for i, step in enumerate(model.steps):
-        for item in step:
+    for i, actuations in enumerate(model.steps):
+        for item in actuations:
             key = type(item).__name__.lower()
             if isinstance(item, Fold | Moment):
                 if item.crease != "all":
@@ -297,12 +297,16 @@ def _check(model: Model) -> None:
                 with within(f"steps[{i}].{key}.at"):
                     select(mesh, item.at)
     try:
-        program(model)
+        steps = program(model)
     except InputError:
         for i in range(len(model.steps)):  # the first step that the sheet cannot take
             with within(f"steps[{i}]"):
                 program(replace(model, steps=model.steps[: i + 1]))
         raise
+    for i, step in enumerate(steps):
+        if step.constraints.rigid_body and step.force.end.any():  # forces on a free sheet have to balance
+            with within(f"steps[{i}]"):
+                formulation(model.formulation).system(model, step, None)
 
 
 def _tuple(value: Any) -> Any:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.describe import AnyArray
-from bh.errors import PathFileError
+from bh.errors import InputError, PathFileError
 
 Array = NDArray[np.float64]
 SCHEMA = """
@@ -71,8 +71,7 @@ class PathFile:
             raise PathFileError(f"'{file}' exists; resume it, remove it or choose another name")
         draft = file.with_name(file.name + ".part")
         try:
-            # the journal of a run that was killed must not be played back into the new file
-            for old in (draft, _journal(draft), _journal(file)):
+            for old in (draft, _journal(draft)):
                 old.unlink(missing_ok=True)
             db = _connect(draft)
             with db:
@@ -88,7 +87,9 @@ class PathFile:
                     ],
                 )
             db.close()
-            _journal(draft).unlink(missing_ok=True)
+            # the journal of a run that was killed must not be played back into the new file
+            for journal in (_journal(draft), _journal(file)):
+                journal.unlink(missing_ok=True)
             draft.replace(file)
             return cls(file, _connect(file))
         except (OSError, sqlite3.Error) as error:
@@ -106,13 +107,9 @@ class PathFile:
         file = FilePath(file)
         if not file.is_file():
             raise PathFileError(f"there is no path file '{file}'; check the name")
-        try:
+        with reading(file):
             db = _connect(file)
             db.execute("SELECT count(*) FROM states").fetchone()
-        except sqlite3.Error as error:
-            raise PathFileError(
-                f"'{file}' is not a path file ({error}); give one that bh has written"
-            ) from error
         return cls(file, db)
 
     def add(self, row: StateRow) -> None:
@@ -190,6 +187,17 @@ class _Transaction:
             raise PathFileError(f"cannot write '{self.file}' ({failed}); is the disk full?") from failed
         if isinstance(error, sqlite3.Error):
             raise PathFileError(f"cannot write '{self.file}' ({error}); is the disk full?") from error
+
+
+@contextmanager
+def reading(file: FilePath) -> Iterator[None]:
+    """Damaged files are told in one line, whatever comes up while they are read."""
+    try:
+        yield
+    except InputError as error:
+        raise PathFileError(f"'{file}': {error}") from error
+    except (sqlite3.Error, KeyError, TypeError, ValueError) as error:
+        raise PathFileError(f"'{file}' is not a path file ({error}); give one that bh has written") from error
 
 
 def _journal(file: FilePath) -> FilePath:

@@ -119,7 +119,7 @@ class SheetMesh:
             return pairs[np.sort(np.unique(pairs, return_index=True)[1])]
         if at.startswith("node:"):
             text = at.removeprefix("node:")
-            if text.isdigit() and int(text) < len(self.points):
+            if text.isdecimal() and len(text) < 19 and int(text) < len(self.points):
                 return np.array([int(text)])
             raise MeshError(f"'{at}' is not a node of the mesh; use node:0 to node:{len(self.points) - 1}")
         places = [*self.corners, *self.edge_sets, "node:N", "all"]

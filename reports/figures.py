@@ -108,11 +108,13 @@ def legend(plot: Plot) -> list[tuple[str, str]]:
     for number, series in plot.coloured():
         colour = "var(--soft)" if number < 0 else f"var(--s{number + 1})"
         dash = "4,3" if number < 0 else DASHES[number]
-        stroke = f'<path d="M1 7H29" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
+        stroke = (
+            f'<path d="M1 7H29" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
+        )
         mark = f'<path d="{_SHAPES[MARKERS[number]]}" fill="{colour}"/>' if number >= 0 else ""
         parts = {"line": stroke + mark, "points": mark, "reference": stroke}[series.style]
         swatch = f'<svg viewBox="0 0 30 14" width="30" height="14" aria-hidden="true">{parts}</svg>'
-        found.append((swatch, series.label))
+        found.append((swatch, markup(series.label)))
     return found
 
 
@@ -178,8 +180,8 @@ def _draw(axes: Axes, plot: Plot) -> None:
         else:
             size = 4.5 if len(x) <= 40 else 0.0
             axes.plot(x, y, linestyle=pattern, linewidth=1.7, markersize=size, **look)
-    axes.set_xlabel(plot.x.label)
-    axes.set_ylabel(plot.y.label)
+    axes.set_xlabel(typeset(plot.x.label))
+    axes.set_ylabel(typeset(plot.y.label))
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(True, linewidth=0.7)
     axes.set_axisbelow(True)
@@ -212,7 +214,7 @@ def _power(value: float) -> str:
         return f"{value:g}"
     exponent = math.floor(math.log10(value) + 1e-9)
     mantissa = round(value / 10.0**exponent)
-    tens = "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    tens = "10" + superscript(exponent)
     return tens if mantissa == 1 else f"{mantissa}·{tens}"
 
 
@@ -233,19 +235,45 @@ _SHAPES = {
 }
 
 
+_GREEK = {"alpha": "α", "theta": "θ", "kappa": "κ", "lambda": "λ", "phi": "φ", "psi": "ψ", "pi": "π"}
+_SUBSCRIPT = re.compile(r"(?<![\w&])([A-Za-zα-ω])_([A-Za-z0-9]{1,3})(?!\w)")
+
+
+def typeset(text: str) -> str:
+    """Plain text as a printer would set it: Greek letters for their names, raised powers."""
+    text = re.sub(rf"(?<![A-Za-z])({'|'.join(_GREEK)})(?![A-Za-z])", lambda found: _GREEK[found[0]], text)
+    return re.sub(r"\^(\d+)(?![\d.])", lambda found: superscript(int(found[1])), text)
+
+
+def markup(text: str) -> str:
+    """`typeset` text as HTML, with subscripts."""
+    return _SUBSCRIPT.sub(r"\1<sub>\2</sub>", escape(typeset(text), quote=False))
+
+
+def superscript(number: int) -> str:
+    return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
 def _inline(text: str, plot: Plot, prefix: str) -> str:
     """matplotlib's file as an element: no prolog, no name spaces, ids of its own, the page's colours and font."""
     body = text[text.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
-    body = re.sub(r"<!--.*?-->\s*", "", body, flags=re.DOTALL)
-    body = re.sub(r'\bid="', f'id="{prefix}', body)
-    body = body.replace("url(#", f"url(#{prefix}").replace('xlink:href="#', f'href="#{prefix}')
+    body = body[body.index(">") + 1 :]
+    body = re.sub(r"<(metadata|style)\b.*?</\1>|<!--.*?-->", "", body, flags=re.DOTALL)
+    body = body.replace('xlink:href="#', 'href="#')
+    used = set(re.findall(r'(?:url\(|href=")#([^")]+)', body))
+    body = re.sub(
+        r' id="([^"]+)"', lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", body
+    )
+    body = body.replace("url(#", f"url(#{prefix}").replace('href="#', f'href="#{prefix}')
     body = re.sub(r"#0[1a]0[2b]0[1-8]", lambda found: _VARIABLES[found[0]], body)
-    body = re.sub(r"font(-family)?: ([^;\"]*?)'?DejaVu Sans[^;\"]*", r"font\1: \2var(--sans)", body)
-    inner = body[body.index(">") + 1 :]
+    body = re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", body)
+    lowered = r'\1<tspan dy=".3em" font-size="75%">\2</tspan><tspan dy="-.225em">&#8203;</tspan>'
+    body = re.sub(r"(?<=>)[^<>]+(?=</text>)", lambda found: _SUBSCRIPT.sub(lowered, found[0]), body)
+    body = re.sub(r"\s*\n\s*", " ", body)
     named = ", ".join(series.label for series in plot.series)
-    what = f"{plot.y.label} against {plot.x.label}" + (f": {named}" if named else "")
+    what = typeset(f"{plot.y.label} against {plot.x.label}" + (f": {named}" if named else ""))
     return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-labelledby="{prefix}t {prefix}d">'
-        f'<title id="{prefix}t">{escape(plot.title)}</title><desc id="{prefix}d">{escape(what)}</desc>{inner}'
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" stroke-linejoin="round" role="img" '
+        f'aria-labelledby="{prefix}t {prefix}d"><title id="{prefix}t">{escape(typeset(plot.title))}</title>'
+        f'<desc id="{prefix}d">{escape(what)}</desc>{body}'
     ).strip()

@@ -1,0 +1,35 @@
+"""The `bh report` command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def report(
+    quick: Annotated[bool, typer.Option("--quick", help="fewer points in every case")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="page to write [default: RESULTS/report.html]")
+    ] = None,
+    results: Annotated[Path, typer.Option("--results", help="folder for records and pictures")] = Path(
+        "results"
+    ),
+    reuse: Annotated[
+        bool, typer.Option("--reuse", help="show the results that are there, run nothing")
+    ] = False,
+) -> None:
+    """Run the verification cases and show what they found as one HTML page."""
+    from reports.build import build, read
+
+    page = results / "report.html" if out is None else out
+    if not reuse:
+        from verification.run import run
+
+        run(None, results, quick, lambda text: typer.echo(text, err=True))
+    written = build(results, page)
+    checks = read(results / "checks.json").checks
+    judged = [check.passed for check in checks if check.passed is not None]
+    typer.echo(f"{sum(judged)} of {len(judged)} checks passed, {len(checks) - len(judged)} reported")
+    typer.echo(f"report: {written}")
