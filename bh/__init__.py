@@ -27,6 +27,8 @@ _HOME = {
     "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
 }  # fmt: skip
 
+_SUBMODULES = ("plotting",)
+
 __all__ = [
     "CreaseLaw", "Displace", "Energy", "Fold", "Force", "InputError", "LoadControl", "Model", "ModelError", "Moment",
     "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "load_scene", "trace",
@@ -38,6 +40,8 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(_HOME[name]), name)
         globals()[name] = value
         return value
+    if name in _SUBMODULES:
+        return import_module(f"bh.{name}")
     if name == "__version__":
         from importlib.metadata import version
 

@@ -93,8 +93,8 @@ def picture(
         raise PlotError(f"picture size {width} x {height} cannot be; give 160 x 120 to 8000 x 8000 pixels")
     colouring = _colouring(state, colour, top)
     title = _energies(state) if caption is True else (caption or "")
-    unit = min(width / 1200, height / 900)
-    head, foot = int(60 * unit) if title else 0, int(110 * unit) if colouring is not None else 0
+    unit = _unit(width, height)
+    head, foot = int(64 * unit) if title else 0, int(118 * unit) if colouring is not None else 0
     inner = height - head - foot
     image = _render(state, colouring, (width, inner), _camera(state, width / inner, camera))
     figure = _frame(image, (width, height), foot, title, f"{colour} energy density", colouring)
@@ -416,25 +416,30 @@ def _frame(
     from matplotlib.figure import Figure
 
     width, height = size
-    unit = min(width / 1200, height / 900)
+    unit = _unit(width, height)
     figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor=PAPER)
     figure.figimage(image, 0, foot, origin="upper", zorder=-1)
-    text: dict[str, Any] = {"color": INK, "fontsize": 13.5 * unit, "family": "DejaVu Sans"}
+    text: dict[str, Any] = {"color": INK, "fontsize": 16.0 * unit, "family": "DejaVu Sans"}
     if title:
         figure.text(0.03, 1.0 - 28 * unit / height, title.replace("$", r"\$"), ha="left", va="top", **text)
     if colouring is not None:
         power = int(np.floor(np.log10(colouring.top)))
         power = power if not -2 <= power <= 2 else 0
         scale = f"10{_superscript(power)} " if power else ""
-        axes = figure.add_axes((0.03, 52 * unit / height, 0.36, 16 * unit / height))
+        axes = figure.add_axes((0.03, 56 * unit / height, 0.36, 16 * unit / height))
         colours = ScalarMappable(Normalize(0.0, colouring.top / 10.0**power), colormaps[COLOURS])
         extend = "max" if colouring.cut else "neither"
         figure.colorbar(colours, cax=axes, orientation="horizontal", extend=extend, drawedges=False)
         axes.spines[:].set_visible(False)
-        axes.tick_params(length=5.0 * unit, width=unit, color=INK, labelcolor=INK, labelsize=12.5 * unit)
+        axes.tick_params(length=5.0 * unit, width=unit, color=INK, labelcolor=INK, labelsize=15.0 * unit)
         axes.locator_params(nbins=5)
         axes.set_title(f"{label}, {scale}N mm / mm²", loc="left", pad=8.0 * unit, **text)
     return figure
+
+
+def _unit(width: int, height: int) -> float:
+    """Size of texts: 1 in a picture of 1200 x 900 pixels, still to be read in small ones."""
+    return max(min(width / 1200, height / 500), 0.5)
 
 
 @contextlib.contextmanager

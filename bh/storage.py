@@ -93,6 +93,8 @@ class PathFile:
             draft.replace(file)
             return cls(file, _connect(file))
         except (OSError, sqlite3.Error) as error:
+            with suppress(OSError):
+                draft.unlink(missing_ok=True)
             raise PathFileError(
                 f"cannot write '{file}' ({error}); choose a folder that can be written"
             ) from error

@@ -91,8 +91,8 @@ def _check_geometry(rings: Sequence[Array], creases: Sequence[Crease]) -> None:
     grown = sheet.buffer(2e-3 + 1e-6 * size)
     lines = []
     for crease in creases:
-        points = sample(crease.curve)
-        if not np.all(np.isfinite(points)) or crease.curve.length <= 0.0:
+        # before sampling: an arc of radius 0 or nan cannot be sampled
+        if not 0.0 < crease.curve.length < np.inf or not np.all(np.isfinite(points := sample(crease.curve))):
             raise PatternError(f"crease '{crease.name}' has no length; give it two distinct finite points")
         line = shapely.LineString(points)
         if not line.is_simple:

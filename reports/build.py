@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -213,6 +214,7 @@ def build(results_folder: Path, out_file: Path) -> Path:
     failed = [item for case in cases for item in case.checks if item[1].passed is False]
     page = environment.get_template("report.html").render(
         results=results,
+        date=_date(results.date),
         cases=cases,
         machine=_machine(results.machine),
         style=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
@@ -303,37 +305,46 @@ def _machine(machine: str | dict[str, Any]) -> list[tuple[str, str]]:
     return [(key, "unknown" if value is None else str(value)) for key, value in machine.items()]
 
 
+def _date(text: str) -> str:
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return text
+    zone = {None: "", timedelta(0): " UTC"}.get(moment.utcoffset(), f" {moment:%z}")
+    return f"{moment.day} {moment:%B %Y, %H:%M}{zone}"
+
+
 # --- figures in words ------------------------------------------------------------------------------------------
 
 
-def number(value: float | None, digits: int = 5) -> str:
-    """A number with so many significant digits, trailing zeros only where they are digits of an inexact number."""
+def number(value: float | None, digits: int = 5, full: bool = False) -> str:
+    """A number with so many significant digits; without trailing zeros where it is exact, unless in `full`."""
     if value is None:
-        return "–"
+        return "\N{EN DASH}"
     if not math.isfinite(value):
-        return "not a number" if math.isnan(value) else ("∞" if value > 0 else "−∞")
+        return "not a number" if math.isnan(value) else ("∞" if value > 0 else "\N{MINUS SIGN}∞")
     if value == 0.0:
         return "0"
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-    exact = float(f"{mantissa}e{exponent}") == value
+    short = not full and float(f"{mantissa}e{exponent}") == value
     power = int(exponent)
     if -4 <= power < 6:
         text = f"{value:,.{max(digits - 1 - power, 0)}f}".replace(",", "\u2009")
         tail = ""
     else:
-        text, tail = mantissa, "\u2009×\u200910" + superscript(power)  # noqa: RUF001
-    if exact and "." in text:
+        text, tail = mantissa, "\u2009\N{MULTIPLICATION SIGN}\u200910" + superscript(power)
+    if short and "." in text:
         text = text.rstrip("0").rstrip(".")
-    return text.replace("-", "−") + tail  # noqa: RUF001
+    return text.replace("-", "\N{MINUS SIGN}") + tail
 
 
 def share(value: float | None, check: Check) -> str:
     """An error or tolerance: in percent where it is relative and not tiny, else as a number with the unit."""
     if value is None or not math.isfinite(value):
         return number(value)
-    if check.reference == 0.0 or check.reference is None:
-        return f"{number(value, 2)} {check.unit}".strip()
-    return f"{number(100.0 * value, 2)} %" if value == 0.0 or abs(value) >= 1e-5 else number(value, 2)
+    if not check.reference:
+        return f"{number(value, 2)}\u00a0{check.unit}".strip()
+    return f"{number(100.0 * value, 2)}\u00a0%" if abs(value) >= 1e-5 else number(value, 2)
 
 
 def seconds(value: float | None) -> str:
@@ -341,10 +352,10 @@ def seconds(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return number(value)
     if value < 1.0:
-        return f"{number(1e3 * value, 2)} ms"
+        return f"{number(1e3 * value, 2)}\u00a0ms"
     if value < 90.0:
-        return f"{number(value, 2 if value < 10.0 else 3)} s"
-    return f"{int(value // 60)} min {int(value % 60)} s"
+        return f"{number(value, 2 if value < 10.0 else 3)}\u00a0s"
+    return f"{int(value // 60)}\u00a0min\u00a0{int(value % 60)}\u00a0s"
 
 
 def _params(params: dict[str, Any]) -> str:

@@ -29,6 +29,7 @@ WIDEST = 1600  # of a picture, pixels
 INK, SOFT, RULE = "#010203", "#010204", "#010205"
 SERIES = tuple(f"#0a0b{number:02x}" for number in range(1, 9))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+REFERENCE_DASHES = ("4,3", "1.2,1.8", "8,2.5", "8,2,1.2,2")
 DASHES = ("none", "5,1.6", "1.4,1.4", "6,1.6,1.4,1.6", "9,2.5", "3,1.4", "8,1.6,1.4,1.6,1.4,1.6", "2.5,3")
 
 
@@ -69,13 +70,16 @@ class Plot(BaseModel):
     series: list[Series]
     caption: str = ""
 
-    def coloured(self) -> list[tuple[int, Series]]:
-        """The series with the number of each one's colour; references have none (-1)."""
-        numbers, count = [], 0
+    def dressed(self) -> list[tuple[int, str, Series]]:
+        """The series with the number of each one's colour (-1 for references, which are grey) and its dashes."""
+        found, counts = [], {True: 0, False: 0}
         for series in self.series:
-            numbers.append(-1 if series.style == "reference" else count % len(SERIES))
-            count += series.style != "reference"
-        return list(zip(numbers, self.series, strict=True))
+            grey = series.style == "reference"
+            dashes = REFERENCE_DASHES if grey else DASHES
+            number = counts[grey] % len(dashes)
+            counts[grey] += 1
+            found.append((-1 if grey else number, dashes[number], series))
+        return found
 
 
 def svg(plot: Plot, prefix: str) -> str:
@@ -87,7 +91,7 @@ def svg(plot: Plot, prefix: str) -> str:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    settings: dict[str, Any] = {
+    settings: Any = {
         "svg.fonttype": "none", "svg.hashsalt": prefix, "font.size": 12.0, "text.color": INK, "axes.edgecolor": SOFT,
         "axes.labelcolor": INK, "axes.linewidth": 0.8, "xtick.color": SOFT, "ytick.color": SOFT, "grid.color": RULE,
         "xtick.labelcolor": INK, "ytick.labelcolor": INK, "text.parse_math": False, "axes.unicode_minus": True,
@@ -103,15 +107,14 @@ def svg(plot: Plot, prefix: str) -> str:
 
 
 def legend(plot: Plot) -> list[tuple[str, str]]:
-    """For every series a small `<svg>` swatch and its label."""
+    """For every series a small `<svg>` swatch and its label, both HTML."""
     found = []
-    for number, series in plot.coloured():
+    for number, dash, series in plot.dressed():
         colour = "var(--soft)" if number < 0 else f"var(--s{number + 1})"
-        dash = "4,3" if number < 0 else DASHES[number]
         stroke = (
             f'<path d="M1 7H29" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
         )
-        mark = f'<path d="{_SHAPES[MARKERS[number]]}" fill="{colour}"/>' if number >= 0 else ""
+        mark = "" if number < 0 else f'<path d="{_SHAPES[MARKERS[number]]}" fill="{colour}"/>'
         parts = {"line": stroke + mark, "points": mark, "reference": stroke}[series.style]
         swatch = f'<svg viewBox="0 0 30 14" width="30" height="14" aria-hidden="true">{parts}</svg>'
         found.append((swatch, markup(series.label)))
@@ -163,23 +166,26 @@ def picture_link(file: Path) -> tuple[str, int, int]:
 
 
 def _draw(axes: Axes, plot: Plot) -> None:
-    for number, series in plot.coloured():
+    dressed = plot.dressed()
+    last = max((number for number, _, _ in dressed), default=0)
+    for number, dash, series in dressed:
         if len(series.x) != len(series.y):
             raise ReportError(
                 f"plot '{plot.id}', series '{series.label}': {len(series.x)} x for {len(series.y)} y; give pairs"
             )
         x, y = _values(series.x, plot.x.log), _values(series.y, plot.y.log)
-        if number < 0:
-            axes.plot(x, y, color=SOFT, linewidth=1.3, linestyle=(0, (4, 3)), zorder=1.5)
-            continue
-        dash = DASHES[number]
         pattern: Any = "-" if dash == "none" else (0, tuple(float(part) for part in dash.split(",")))
+        if number < 0:
+            axes.plot(x, y, color=SOFT, linewidth=1.3, linestyle=pattern, zorder=1.5)
+            continue
         look: dict[str, Any] = {"color": SERIES[number], "marker": MARKERS[number], "markeredgewidth": 0.0}
+        # the first are the widest, so that one shows beneath another that lies on it
+        extra = (last - number) / max(last, 1)
         if series.style == "points":
-            axes.plot(x, y, linestyle="none", markersize=5.5, **look)
+            axes.plot(x, y, linestyle="none", markersize=5.0 + 2.0 * extra, **look)
         else:
-            size = 4.5 if len(x) <= 40 else 0.0
-            axes.plot(x, y, linestyle=pattern, linewidth=1.7, markersize=size, **look)
+            size = 4.2 + 2.0 * extra if len(x) <= 40 else 0.0
+            axes.plot(x, y, linestyle=pattern, linewidth=1.5 + 1.5 * extra, markersize=size, **look)
     axes.set_xlabel(typeset(plot.x.label))
     axes.set_ylabel(typeset(plot.y.label))
     axes.spines[["top", "right"]].set_visible(False)
@@ -188,8 +194,8 @@ def _draw(axes: Axes, plot: Plot) -> None:
     axes.tick_params(length=3.0, labelsize=11.0)
     for axis, log, along in ((axes.xaxis, plot.x.log, "x"), (axes.yaxis, plot.y.log, "y")):
         values = [v for s in plot.series for v in _values(getattr(s, along), log) if math.isfinite(v)]
-        if log and values:
-            _log_axis(axes, axis, along, min(values), max(values))
+        if values:
+            _scale(axes, axis, along, log, min(values), max(values))
 
 
 def _values(values: Sequence[float | None], log: bool) -> list[float]:
@@ -197,16 +203,33 @@ def _values(values: Sequence[float | None], log: bool) -> list[float]:
     return [math.nan if v is None or (log and v <= 0.0) else float(v) for v in values]
 
 
-def _log_axis(axes: Axes, axis: Any, along: str, low: float, high: float) -> None:
-    """Ticks at powers of ten, and at 2 and 5 times them where the range is short."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+def _scale(axes: Axes, axis: Any, along: str, log: bool, low: float, high: float) -> None:
+    """Scale and ticks of an axis with values from `low` to `high`."""
+    from matplotlib.ticker import (
+        FuncFormatter,
+        LogLocator,
+        MaxNLocator,
+        NullFormatter,
+        NullLocator,
+        ScalarFormatter,
+    )
 
-    (axes.set_xscale if along == "x" else axes.set_yscale)("log")
-    decades = math.log10(high / low)
-    subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0,)
-    axis.set_major_locator(LogLocator(subs=subs, numticks=8))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
-    axis.set_minor_formatter(NullFormatter())
+    if log:
+        (axes.set_xscale if along == "x" else axes.set_yscale)("log")
+    if log and high > 6.0 * low:
+        subs = (1.0, 2.0, 5.0) if high < 150.0 * low else (1.0,)
+        axis.set_major_locator(LogLocator(subs=subs, numticks=8))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
+        axis.set_minor_formatter(NullFormatter())
+        return
+    middle, span = 0.5 * (low + high), 0.005 * max(abs(low), abs(high))
+    if along == "y" and high - low < span:  # rounding is not to look like a trend
+        axes.set_ylim(middle - span, middle + span)
+    axis.set_major_locator(MaxNLocator(6))
+    axis.set_minor_locator(NullLocator())
+    formatter = ScalarFormatter(useOffset=False)
+    formatter.set_powerlimits((-5, 7))
+    axis.set_major_formatter(formatter)
 
 
 def _power(value: float) -> str:
@@ -235,14 +258,24 @@ _SHAPES = {
 }
 
 
-_GREEK = {"alpha": "α", "theta": "θ", "kappa": "κ", "lambda": "λ", "phi": "φ", "psi": "ψ", "pi": "π"}
-_SUBSCRIPT = re.compile(r"(?<![\w&])([A-Za-zα-ω])_([A-Za-z0-9]{1,3})(?!\w)")
+_GREEK = {
+    "alpha": "\N{GREEK SMALL LETTER ALPHA}",
+    "theta": "θ",
+    "kappa": "κ",
+    "lambda": "λ",
+    "nu": "\N{GREEK SMALL LETTER NU}",
+    "phi": "φ",
+    "psi": "ψ",
+    "pi": "π",
+}
+_SUBSCRIPT = re.compile(r"(?<![\w&])([A-Za-z\u03b1-\u03c9])_([A-Za-z0-9]{1,3})(?!\w)")
 
 
 def typeset(text: str) -> str:
-    """Plain text as a printer would set it: Greek letters for their names, raised powers."""
+    """Plain text as a printer would set it: Greek letters for their names, raised powers, no bad breaks."""
     text = re.sub(rf"(?<![A-Za-z])({'|'.join(_GREEK)})(?![A-Za-z])", lambda found: _GREEK[found[0]], text)
-    return re.sub(r"\^(\d+)(?![\d.])", lambda found: superscript(int(found[1])), text)
+    text = re.sub(r"\^(-?\d+)(?!\d|\.\d)", lambda found: superscript(int(found[1])), text)
+    return re.sub(r"(?<=\d) (?=%)| (?== )|(?<= =) ", "\u00a0", text)
 
 
 def markup(text: str) -> str:

@@ -259,8 +259,13 @@ class Pattern:
 
 
 def band_is_cheaper(n: int, bandwidth: int) -> bool:
-    """Choice by the costs measured in `benchmarks/` (docs/decisions.md): a band factor costs n (b + 1)^2."""
-    return bandwidth <= 60 or n * (bandwidth + 1.0) ** 2 < 4.0e3 * n**1.35
+    """Choice between LAPACK's band and SuperLU by their measured costs, unless the band would not fit into memory.
+
+    Seconds on the developers' machine: 2.6e-11 n (b + 1)^2 for the band, 1.5e-7 n^1.45 for SuperLU with its inertia
+    (docs/decisions.md has the table).
+    """
+    fits = 8 * n * (bandwidth + 1) < 2e9
+    return fits and 2.6e-11 * n * (bandwidth + 1.0) ** 2 < 1.5e-7 * n**1.45
 
 
 def build_pattern(number: Ints, groups: tuple[Ints, ...]) -> Pattern:
