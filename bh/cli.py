@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bh.errors import InputError
-
 if TYPE_CHECKING:
     from bh.path import Path as Trace
     from bh.scene import Scene
@@ -40,13 +38,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # whoever read the output has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except InputError as error:
-        return _fail(str(error), 2, debug)
     except Exception as error:
-        if hasattr(error, "format_message"):  # how typer tells a wrong command line
-            return _fail(f"{error.format_message().rstrip('.')}; see 'bh --help'", 2, debug)
-        what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        return _fail(f"{what} (a fault of the program, please report it; --debug shows where)", 3, debug)
+        return _explain(error, debug)
+
+
+def _explain(error: Exception, debug: bool) -> int:
+    from bh.errors import InputError
+
+    if isinstance(error, InputError):
+        return _fail(str(error), 2, debug)
+    if hasattr(error, "format_message"):  # how typer tells a wrong command line
+        return _fail(f"{error.format_message().rstrip('.')}; see 'bh --help'", 2, debug)
+    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return _fail(f"{what} (a fault of the program, please report it; --debug shows where)", 3, debug)
 
 
 def _fail(message: str, code: int, debug: bool) -> int:
@@ -91,6 +95,7 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Solve a scene; writes path.bh and result.json into the output folder."""
+    from bh.errors import InputError
     from bh.run import UNFINISHED, extras, holds_states, solve
     from bh.scene import load_scene
 
@@ -138,6 +143,7 @@ def view(
     state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
 ) -> None:
     """Show a state of a solved path in a window, or draw it to a file."""
+    from bh.errors import InputError
     from bh.path import Path as Trace
     from bh.run import path_file
 
@@ -182,6 +188,8 @@ def _add_commands() -> None:
 
 def _proxy(entry: EntryPoint) -> Callable[[typer.Context], Any]:
     def call(context: typer.Context) -> Any:
+        from bh.errors import InputError
+
         try:
             function = entry.load()
         except (ImportError, AttributeError) as error:

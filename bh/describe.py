@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bh.actuation import Actuation, Displace, Fold, Force, Moment
 from bh.errors import PathFileError
-from bh.model import CreaseLaw, Model, Sheet
+from bh.model import CreaseLaw, ElementStiffness, Model, Sheet
 from bh.supports import RigidBody, Support
 from meshes import Arc, Line, Polyline, SheetMesh
 from meshes.curves import Curve
@@ -35,11 +35,14 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
     arrays: dict[str, AnyArray] = {"points": mesh.points, "triangles": mesh.triangles}
     if mesh.spans is not None:
         arrays["spans"] = mesh.spans
+    if model.stiffness is not None:
+        arrays |= {"stiffness/bars": model.stiffness.bars, "stiffness/hinges": model.stiffness.hinges}
     arrays |= {f"edges/{name}": pairs for name, pairs in mesh.edge_sets.items()}
     arrays |= {f"angles/{name}": angles for name, angles in mesh.fold_angles.items()}
     data = {
         "format": FORMAT,
         "formulation": model.formulation,
+        "green": model.stiffness is not None and model.stiffness.green,
         "sheet": _plain(model.sheet),
         "mesh": {
             "corners": dict(mesh.corners),
@@ -82,6 +85,9 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             steps=tuple(tuple(_untagged(item, ACTUATIONS) for item in step) for step in data["steps"]),
             creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
             formulation=data["formulation"],
+            stiffness=ElementStiffness(arrays["stiffness/bars"], arrays["stiffness/hinges"], data["green"])
+            if "stiffness/bars" in arrays
+            else None,
         )
     except (KeyError, TypeError) as missing:
         raise PathFileError(f"the stored model is incomplete ({missing}); solve again") from missing

@@ -7,10 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from bh.actuation import Actuation, Displace, Fold, Force, Moment
 from bh.errors import ModelError
 from bh.supports import RigidBody, Support
 from meshes import SheetMesh
+from meshes.topology import Ints
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,29 @@ class CreaseLaw:
         return sheet.bending_stiffness(nu=0.0) / self.Lstar
 
 
+@dataclass(frozen=True, eq=False)
+class ElementStiffness:
+    """Given stiffness of every element, in place of what the sheet would give.
+
+    Attributes:
+        bars: (e,) axial stiffness of the bar on every edge of `mesh.topology.edges`, N/mm.
+        green: bars measure Green's strain, energy 1/2 k L^2 e^2 with e = (l^2 - L^2) / (2 L^2), in place of l - L.
+        hinges: (m,) rotational stiffness of every hinge of `mesh.topology.hinges` (total, not a length), N mm / rad.
+    """
+
+    bars: NDArray[np.float64]
+    hinges: NDArray[np.float64]
+    green: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("bars", "hinges"):
+            values = np.array(getattr(self, name), dtype=float)
+            if not (np.isfinite(values).all() and (values >= 0.0).all()):
+                raise ModelError(f"stiffness of {name} must be finite and not negative")
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
+
+
 @dataclass(frozen=True)
 class Model:
     """A sheet with supports, creases and steps of actuation (frozen; the methods return changed copies).
@@ -79,6 +106,7 @@ class Model:
         steps: each a tuple of actuations that act together; steps run one after another.
         creases: laws of spring creases. A crease with no law and no fold is ordinary sheet.
         formulation: name of a registered formulation.
+        stiffness: given element stiffness (bars and hinges only), or None to derive it from the sheet.
     """
 
     mesh: SheetMesh
@@ -87,6 +115,57 @@ class Model:
     steps: tuple[tuple[Actuation, ...], ...] = ()
     creases: Mapping[str, CreaseLaw] = field(default_factory=dict)
     formulation: str = "bars-and-hinges"
+    stiffness: ElementStiffness | None = None
+
+    @classmethod
+    def from_arrays(
+        cls,
+        points: ArrayLike,
+        triangles: ArrayLike,
+        bars: ArrayLike,
+        bar_stiffness: ArrayLike,
+        bending_hinges: ArrayLike,
+        bending_stiffness: ArrayLike,
+        folding_hinges: ArrayLike,
+        folding_stiffness: ArrayLike,
+        supports: ArrayLike = (),
+        green: bool = False,
+    ) -> Model:
+        """A bar-and-hinge problem given as plain arrays, as other codes hand it over.
+
+        Args:
+            points: (n, 3) nodes, mm; triangles: (t, 3).
+            bars: (b, 2) node pairs and their stiffness (b,), N/mm; every edge of the mesh must have one.
+            bending_hinges, folding_hinges: (m, 2) or (m, 4) rows that begin with the two nodes of the edge, and their
+                stiffness (m,), N mm / rad. The folding hinges become the crease "fold", at rest flat.
+            supports: (s, 4) rows node, x, y, z with 1 for a direction that is held.
+            green: bars measure Green's strain; see `ElementStiffness`.
+
+        Raises:
+            ModelError, MeshError: arrays that do not fit together.
+        """
+        mesh = SheetMesh(np.asarray(points), np.asarray(triangles))
+        topology = mesh.topology
+        k_bar = _on_edges(mesh, "bars", bars, bar_stiffness)
+        if np.isnan(k_bar).any():
+            a, b = topology.edges[int(np.argmax(np.isnan(k_bar)))]
+            raise ModelError(f"edge {a}-{b} has no bar; give every edge of the triangles one")
+        k_bend = _on_edges(mesh, "bending hinges", bending_hinges, bending_stiffness)
+        k_fold = _on_edges(mesh, "folding hinges", folding_hinges, folding_stiffness)
+        creased = np.flatnonzero(~np.isnan(k_fold))
+        k_hinge = np.nan_to_num(np.where(np.isnan(k_fold), k_bend, k_fold))[topology.hinge_edges]
+        mesh = replace(mesh, edge_sets={"crease:fold": topology.edges[creased]}, folds={"fold": "mountain"})
+        # the sheet only sets the scale of forces here; a mean bar stiffness stands for E t
+        model = cls(
+            mesh, Sheet(E=float(np.mean(k_bar)), t=1.0), stiffness=ElementStiffness(k_bar, k_hinge, green)
+        )
+        if len(creased):
+            model = model.crease("fold", stiffness=1.0)
+        for node, *held in np.asarray(supports, dtype=np.int64).reshape(-1, 4).tolist():
+            letters = "".join(axis for axis, on in zip("xyz", held, strict=True) if on)
+            if letters:
+                model = model.support([node], letters)
+        return model
 
     def support(self, at: str | Sequence[int], fix: str | Sequence[Sequence[float]] = "xyz") -> Model:
         """Hold nodes; at "rigid-body" take out what rigid motions are left (see `bh.supports`)."""
@@ -119,3 +198,21 @@ class Model:
     def displace(self, at: str | Sequence[int], direction: str | Sequence[float], by: float) -> Model:
         """Add a step with prescribed displacements; see `bh.Displace`."""
         return self.step(Displace(at, direction, by))
+
+
+def _on_edges(mesh: SheetMesh, what: str, rows: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:
+    """(e,) values of the edges that `rows` begin with, nan elsewhere."""
+    pairs = np.asarray(rows, dtype=np.int64)
+    stiffness = np.asarray(values, dtype=float)
+    out: NDArray[np.float64] = np.full(len(mesh.topology.edges), np.nan)
+    if pairs.size == 0:
+        return out
+    if pairs.ndim != 2 or pairs.shape[1] < 2 or stiffness.shape != (len(pairs),):
+        raise ModelError(
+            f"{what}: {pairs.shape} rows do not fit {stiffness.shape} stiffness values; give one a row"
+        )
+    edges: Ints = mesh.topology.find_edges(pairs[:, :2])
+    if len(np.unique(edges)) != len(edges):
+        raise ModelError(f"{what}: an edge is named twice; give every edge one stiffness")
+    out[edges] = stiffness
+    return out

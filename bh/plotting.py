@@ -116,16 +116,24 @@ def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
     if not _has_display():
         raise PlotError("no display to show the sheet on; use bh.plotting.picture(state, 'sheet.png')")
     import pyvista as pv
+    from matplotlib.font_manager import findfont
 
     colouring = _colouring(state, colour, None)
     plotter = pv.Plotter(window_size=[1200, 900], title="bh")
-    aim = _camera(state, 4 / 3, None)
-    _draw(plotter, state, colouring, 2.0 * aim.half_height / 900)
+    near = _camera(state, 4 / 3, None)
+    # room for the texts
+    camera = near._replace(
+        half_height=1.22 * near.half_height, centre=near.centre - 0.08 * near.half_height * near.up
+    )
+    sheet = _draw(plotter, state, colouring, 2.0 * camera.half_height / 900)
     if colouring is not None:
-        label = f"{colour} energy density, N mm / mm^2"
-        plotter.add_scalar_bar(title=label, color=INK, n_labels=4, fmt="%.2g")
-    plotter.add_text(_energies(state), font_size=9, color=INK)
-    aim.aim(plotter)
+        plotter.add_scalar_bar(
+            f"{colour} energy density, N mm / mm^2\n", mapper=sheet.mapper, color=INK, n_labels=3, fmt="%.2g",
+            position_x=0.03, position_y=0.03, width=0.34, height=0.08, title_font_size=18, label_font_size=16,
+        )  # fmt: skip
+    # VTK's own fonts have neither Greek letters nor raised digits
+    plotter.add_text(_energies(state), font_size=9, color=INK, font_file=findfont("DejaVu Sans"))
+    camera.aim(plotter)
     return plotter.show(**options)
 
 
@@ -268,8 +276,8 @@ def _panels(state: State) -> Any:
     return surface
 
 
-def _draw(plotter: Any, state: State, colouring: Colouring | None, pixel: float) -> None:
-    """Sheet, mesh edges, boundary and creases; `pixel` is how many mm one is wide."""
+def _draw(plotter: Any, state: State, colouring: Colouring | None, pixel: float) -> Any:
+    """Sheet (which is returned), mesh edges, boundary and creases; `pixel` is how many mm one is wide."""
     surface = _panels(state).compute_normals(
         cell_normals=False, split_vertices=False, consistent_normals=False, auto_orient_normals=False
     )
@@ -293,6 +301,7 @@ def _draw(plotter: Any, state: State, colouring: Colouring | None, pixel: float)
     for crease in state.mesh.creases:
         _tubes(plotter, _lines(state, state.mesh.crease_edges(crease)), 2.3 * pixel)
     plotter.set_background(PAPER)
+    return drawn
 
 
 def _shades_of_edges() -> Any:

@@ -56,6 +56,7 @@ def solve(
         if not resume and not holds_states(file):
             _take_back(file, made)
         raise
+    clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
     if path.outcome == "reached":
         if names == UNFINISHED:
             _move(file, folder / FINISHED[0])
@@ -63,7 +64,7 @@ def solve(
     text = json.dumps(result(path, scene), indent=2, allow_nan=False) + "\n"
     with replacing(folder / names[1]) as draft:
         draft.write_text(text, encoding="utf-8")
-    if names == FINISHED:
+    if names == FINISHED and clear:
         for name in UNFINISHED:
             (folder / name).unlink(missing_ok=True)
     return path, names

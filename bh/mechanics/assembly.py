@@ -24,11 +24,19 @@ Ints = NDArray[np.int64]
 BAR_ENTRIES, HINGE_ENTRIES, GROUND_ENTRIES = 21, 78, 45  # lower triangles of 6 x 6, 12 x 12 and 9 x 9
 
 
+@njit(inline="always", **OPTIONS)
+def elongation(length, rest_length, green):  # type: ignore[no-untyped-def]
+    """l - L (Eq. 3.1), or with Green's strain (l^2 - L^2) / (2 L); both in mm, alike to first order."""
+    if green:
+        return 0.5 * (length * length - rest_length * rest_length) / rest_length
+    return length - rest_length
+
+
 @njit(**OPTIONS)
-def nodal_forces(x, bars, rest_length, k_bar, hinges, k_hinge, rest, couple, f, s_bar, s_hinge):  # type: ignore[no-untyped-def]
+def nodal_forces(x, bars, rest_length, k_bar, green, hinges, k_hinge, rest, couple, f, s_bar, s_hinge):  # type: ignore[no-untyped-def]
     """Energy (N mm) and the mean size of element forces (N); adds the gradient of the energy to `f` (n, 3).
 
-    Writes the force of each bar, k (l - L), and the moment of each hinge, k (phi - rest) + couple.
+    Writes the force of each bar, k times its elongation (see `elongation`), and the moment of each hinge, k (phi - rest) + couple.
     """
     g = np.empty(12)
     energy, size, count = 0.0, 0.0, 0
@@ -36,12 +44,12 @@ def nodal_forces(x, bars, rest_length, k_bar, hinges, k_hinge, rest, couple, f, 
         a, b = bars[i, 0], bars[i, 1]
         d0, d1, d2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-        stretch = length - rest_length[i]
+        stretch = elongation(length, rest_length[i], green)
         s = k_bar[i] * stretch
         s_bar[i] = s
         energy += 0.5 * s * stretch
         size += s * s
-        s /= length
+        s /= rest_length[i] if green else length
         f[a, 0] -= s * d0
         f[a, 1] -= s * d1
         f[a, 2] -= s * d2
@@ -110,15 +118,20 @@ def _scatter(H, n, slots, data):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _bar_matrix(x, a, b, k, s, H):  # type: ignore[no-untyped-def]
-    """k d d^T + s / l (1 - d d^T) of one bar into the lower triangle of H (6, 6); d into the returned tuple."""
+def _bar_matrix(x, a, b, rest_length, k, s, green, H):  # type: ignore[no-untyped-def]
+    """k g g^T + s Hessian of one bar into the lower triangle of H (6, 6); returns the gradient g of its elongation.
+
+    With d the unit vector along the bar: g = d and Hessian (1 - d d^T) / l; with Green's strain g = d l / L and 1 / L.
+    """
     d0, d1, d2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
     length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-    d = (d0 / length, d1 / length, d2 / length)
-    across = s / length
+    across = s / (rest_length if green else length)
+    scale = 1.0 / (rest_length if green else length)
+    d = (d0 * scale, d1 * scale, d2 * scale)
+    along = k if green else k - across
     for i in range(3):
         for j in range(3):
-            value = (k - across) * d[i] * d[j]
+            value = along * d[i] * d[j]
             if i == j:
                 value += across
             H[3 + i, j] = -value
@@ -132,7 +145,9 @@ def _bar_matrix(x, a, b, k, s, H):  # type: ignore[no-untyped-def]
 def tangent_values(  # type: ignore[no-untyped-def]
     x,
     bars,
+    rest_length,
     k_bar,
+    green,
     s_bar,
     bar_slots,
     hinges,
@@ -150,7 +165,7 @@ def tangent_values(  # type: ignore[no-untyped-def]
     B = np.zeros((6, 6))
     turned = len(frames) > 0
     for i in range(len(bars)):
-        d = _bar_matrix(x, bars[i, 0], bars[i, 1], k_bar[i], s_bar[i], B)
+        d = _bar_matrix(x, bars[i, 0], bars[i, 1], rest_length[i], k_bar[i], s_bar[i], green, B)
         d_bar[i, 0], d_bar[i, 1], d_bar[i, 2] = d[0], d[1], d[2]
         if turned:
             _rotate(B, bars[i], frame_of, frames)
@@ -168,13 +183,13 @@ def tangent_values(  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def tangent_times(x, v, bars, k_bar, s_bar, hinges, k_hinge, s_hinge, out):  # type: ignore[no-untyped-def]
+def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge, s_hinge, out):  # type: ignore[no-untyped-def]
     """Add tangent times v (n, 3) to out (n, 3), all in global axes and with no support left out."""
     H = np.zeros((12, 12))
     B = np.zeros((6, 6))
     g = np.empty(12)
     for i in range(len(bars)):
-        _bar_matrix(x, bars[i, 0], bars[i, 1], k_bar[i], s_bar[i], B)
+        _bar_matrix(x, bars[i, 0], bars[i, 1], rest_length[i], k_bar[i], s_bar[i], green, B)
         _multiply(B, bars[i], v, out)
     for i in range(len(hinges)):
         geometry = hinge_geometry(x, hinges[i], g)

@@ -156,7 +156,7 @@ class BarsAndHingesSystem:
         f = np.zeros_like(x)
         forces = np.empty(len(e.bars) + len(e.hinges))
         energy, size = nodal_forces(
-            x, e.bars, e.bar_length, e.bar_stiffness, e.hinges, e.hinge_stiffness,
+            x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, e.hinge_stiffness,
             e.rest.at(lam), self._couple(q, lam), f, forces[: len(e.bars)], forces[len(e.bars) :],
         )  # fmt: skip
         return energy, size, f, forces
@@ -173,7 +173,7 @@ class BarsAndHingesSystem:
         x = self.positions(q, lam)
         data = np.zeros(pattern.size)
         tangent_values(
-            x, e.bars, e.bar_stiffness, forces[:bars], pattern.slots[0], e.hinges, e.hinge_stiffness, forces[bars:],
+            x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0], e.hinges, e.hinge_stiffness, forces[bars:],
             pattern.slots[1], self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge,
         )  # fmt: skip
         matrix: Matrix
@@ -216,7 +216,9 @@ class BarsAndHingesSystem:
                 x,
                 moving,
                 e.bars,
+                e.bar_length,
                 e.bar_stiffness,
+                e.green,
                 forces[:bars],
                 e.hinges,
                 e.hinge_stiffness,
@@ -254,7 +256,9 @@ class BarsAndHingesSystem:
                 x,
                 moving,
                 e.bars,
+                e.bar_length,
                 e.bar_stiffness,
+                e.green,
                 forces[:bars],
                 e.hinges,
                 e.hinge_stiffness,
@@ -358,7 +362,7 @@ class BarsAndHinges:
         phi = dihedral_angles(x, e.hinges)
         turn = phi - e.rest.at(lam)
         s_bar, s_hinge = forces[: len(e.bars)], forces[len(e.bars) :]
-        stretch = 0.5 * s_bar**2 / e.bar_stiffness
+        stretch = 0.5 * s_bar**2 / np.maximum(e.bar_stiffness, 1e-300)
         bend = slice(0, e.bending)
         spring = slice(e.bending, e.bending + e.spring)
         by_hinge = 0.5 * e.hinge_stiffness * turn**2

@@ -35,6 +35,7 @@ class Elements:
     bending: int
     spring: int
     held: int
+    green: bool = False
 
 
 def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Elements:
@@ -54,6 +55,9 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Ele
     reference = dihedral_angles(points, topology.hinges)
     k_bend = bending_hinge_stiffness(sheet.E, sheet.t, hinge_length, hinge_area)
     k_fold = folding_hinge_stiffness(program.stiffness, hinge_length)
+    if model.stiffness is not None:
+        k_bar = model.stiffness.bars
+        k_bend = k_fold = model.stiffness.hinges
     # augmentation comparable to what the bars give a wing: it keeps the condition number and corrects in a step or two
     gamma = 30.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
     stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], gamma)
@@ -73,4 +77,5 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Ele
         hinges=np.ascontiguousarray(topology.hinges[source]), source=source,
         hinge_stiffness=stiffness[source], rest=rest, couple=couple,
         bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]),
+        green=model.stiffness is not None and model.stiffness.green,
     )  # fmt: skip

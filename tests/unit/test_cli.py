@@ -1,0 +1,398 @@
+"""The `bh` command: what it writes, prints and returns."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bh.progress
+from bh.cli import app, main
+from bh.path import Path as Trace
+
+BIN = Path(sys.executable).parent / "bh"
+SECTOR = """
+[pattern]
+kind = "annulus_sector"
+radius = 100.0
+width = 10.0
+angle = 0.5
+[sheet]
+E = 4000.0
+t = 0.1
+[mesh]
+along = 6
+"""
+GOOD = SECTOR + '[[steps]]\nfold = { crease = "crease", to = 2.0 }\n'
+TWO_STEPS = GOOD + '[[steps]]\nfold = { crease = "crease", to = 1.0 }\n'
+# a dead couple that ten turns of the soft crease could not balance
+EARLY = (
+    SECTOR
+    + """
+[creases.crease]
+stiffness = 0.1
+[[steps]]
+fold = { crease = "crease", rest = 3.0 }
+[[steps]]
+moment = { crease = "crease", to = 5.0 }
+[[steps]]
+moment = { crease = "crease", to = 0.0 }
+"""
+)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "good.toml").write_text(GOOD)
+    (tmp_path / "two.toml").write_text(TWO_STEPS)
+    (tmp_path / "early.toml").write_text(EARLY)
+    return tmp_path
+
+
+def result(file):
+    return json.loads(Path(file).read_text(encoding="utf-8"))
+
+
+def test_run_writes_path_and_result(here, capsys):
+    assert main(["run", "good.toml", "-o", "deep/out"]) == 0
+    assert sorted(os.listdir("deep/out")) == ["path.bh", "result.json"]
+    data = result("deep/out/result.json")
+    assert data["outcome"] == "reached"
+    assert data["reason"] == ""
+    assert set(data["energy"]) == {"stretching", "bending", "folding", "total"}
+    assert data["energy"]["total"] == pytest.approx(
+        sum(data["energy"][k] for k in ("stretching", "bending", "folding"))
+    )
+    assert data["fold_angle"]["crease"] == pytest.approx(dict.fromkeys(("mean", "min", "max"), np.pi - 2.0))
+    path = Trace.load("deep/out/path.bh")
+    assert data["steps"] == [
+        {"outcome": "reached", "reason": "", "states": len(path), "iterations": path.iterations}
+    ]
+    assert data["iterations"] == path.iterations > 0
+    assert data["wall_time_s"] == path.wall_time_s > 0.0
+    assert data["unknowns"] == path.unknowns > 0
+    mesh = path.model.mesh
+    assert data["mesh"] == {
+        "nodes": len(mesh.points), "triangles": len(mesh.triangles), "aspect_ratio": mesh.aspect_ratio,
+    }  # fmt: skip
+    assert {"python", "numpy", "scipy", "curved-crease-workbench"} <= set(data["versions"])
+    assert data["input"] == path.provenance["input"]
+    assert data["scene"] == "good.toml"
+    assert data["energy"] == path[-1].energy.as_dict()
+    out, err = capsys.readouterr()
+    assert err == ""
+    for word in (
+        "reached",
+        "N mm",
+        "fold angle of crease: 1.1416 rad",
+        "deep/out/result.json",
+        "deep/out/path.bh",
+    ):
+        assert word in out
+
+
+def test_default_folder_and_quiet(here, capsys):
+    assert main(["run", "good.toml", "--quiet"]) == 0
+    assert (here / "good-out" / "result.json").is_file()
+    assert capsys.readouterr() == ("", "")
+
+
+def test_no_aspect_ratio_is_null(here):
+    text = Path(__file__).parents[2].joinpath("examples", "miura.toml").read_text()
+    (here / "miura.toml").write_text(text)
+    (here / "miura.fold").write_bytes(
+        Path(__file__).parents[2].joinpath("examples", "miura.fold").read_bytes()
+    )
+    assert main(["run", "miura.toml", "-q"]) == 0
+    data = result("miura-out/result.json")
+    assert data["mesh"]["aspect_ratio"] is None
+    assert {"mountain", "valley"} <= set(data["fold_angle"])
+
+
+def test_path_that_ends_early(here, capsys):
+    assert main(["run", "early.toml", "-o", "out", "--quiet"]) == 1
+    data = result("out/result.json")
+    assert data["outcome"] == data["steps"][1]["outcome"] != "reached"
+    assert data["reason"] == data["steps"][1]["reason"] != ""
+    assert [step["outcome"] for step in data["steps"]] == ["reached", data["outcome"], "not tried"]
+    assert len(Trace.load("out/path.bh")) == sum(step["states"] for step in data["steps"])
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert f"early.toml: step 2 of 3 ended early: {data['outcome']} ({data['reason']})" in err
+    assert "out/result.json" in err
+
+
+def test_a_finished_result_is_never_lost(here, capsys):
+    assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
+    kept = {name: (here / "out" / name).read_bytes() for name in ("path.bh", "result.json")}
+
+    def still_kept():
+        return all((here / "out" / name).read_bytes() == content for name, content in kept.items())
+
+    assert main(["run", "early.toml", "-o", "out", "-q"]) == 1
+    assert still_kept()
+    assert "earlier run is kept" in capsys.readouterr().err
+    assert result("out/result-unfinished.json")["steps"][0]["outcome"] == "reached"
+    (here / "bad.toml").write_text(GOOD + "typo = 1\n")
+    assert main(["run", "bad.toml", "-o", "out"]) == 2
+    assert still_kept()
+    # the next run that reaches its end takes the place
+    assert main(["run", "two.toml", "-o", "out", "-q"]) == 0
+    assert sorted(os.listdir("out")) == ["path.bh", "result.json"]
+    assert result("out/result.json")["scene"] == "two.toml"
+    assert len(Trace.load("out/path.bh").steps) == 2
+
+
+def test_an_early_end_is_replaced(here):
+    assert main(["run", "early.toml", "-o", "out", "-q"]) == 1
+    assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
+    assert result("out/result.json")["outcome"] == "reached"
+    assert sorted(os.listdir("out")) == ["path.bh", "result.json"]
+
+
+# --- killed and resumed ------------------------------------------------------------------------------------------
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+import bh
+from bh.run import solve
+
+class Kill:
+    states = 0
+    def update(self, *_):
+        self.states += 1
+        if self.states == int(sys.argv[2]):
+            os.kill(os.getpid(), signal.SIGKILL)
+    def close(self, outcome):
+        pass
+
+solve(bh.load_scene("two.toml"), Path("out"), resume=sys.argv[1] == "resume", progress=Kill())
+"""
+
+
+def killed(how, states):
+    done = subprocess.run([sys.executable, "-c", KILLED, how, str(states)], capture_output=True, timeout=120)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    return len(Trace.load("out/path.bh"))
+
+
+def test_killed_run_resumes_with_nothing_lost(here):
+    assert main(["run", "two.toml", "-o", "whole", "-q"]) == 0
+    assert killed("new", 2) == 3  # the start, and two increments
+    assert not (here / "out" / "result.json").exists()
+    steps = result("whole/result.json")["steps"]
+    assert killed("resume", steps[0]["states"] - 1) > steps[0]["states"]  # now in the second step
+    assert main(["run", "two.toml", "-o", "out", "--resume", "-q"]) == 0
+    whole, resumed = result("whole/result.json"), result("out/result.json")
+    assert resumed["energy"] == pytest.approx(whole["energy"], rel=1e-12, abs=0.0)
+    assert resumed["fold_angle"]["crease"] == pytest.approx(whole["fold_angle"]["crease"], rel=1e-12)
+    assert resumed["steps"] == whole["steps"]
+    assert np.array_equal(Trace.load("out/path.bh")[-1].points, Trace.load("whole/path.bh")[-1].points)
+    assert sorted(os.listdir("out")) == ["path.bh", "result.json"]
+
+
+def test_resume_of_a_complete_run_rewrites_its_result(here):
+    assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
+    first = result("out/result.json")
+    (here / "out" / "result.json").unlink()
+    assert main(["run", "good.toml", "-o", "out", "--resume", "-q"]) == 0
+    assert result("out/result.json") == first
+
+
+def test_resume_finds_the_run_that_was_begun_beside_a_finished_one(here, monkeypatch, capsys):
+    assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
+    interrupt_after(2, monkeypatch)
+    assert main(["run", "two.toml", "-o", "out"]) == 130
+    assert "bh run two.toml -o out --resume" in capsys.readouterr().err
+    monkeypatch.undo()
+    monkeypatch.chdir(here)
+    assert result("out/result.json")["scene"] == "good.toml"
+    assert main(["run", "good.toml", "-o", "out", "--resume", "-q"]) == 0
+    assert main(["run", "two.toml", "-o", "out", "--resume", "-q"]) == 0
+    assert result("out/result.json")["scene"] == "two.toml"
+    assert sorted(os.listdir("out")) == ["path.bh", "result.json"]
+
+
+@pytest.mark.parametrize(
+    ("prepare", "told"),
+    [
+        (lambda out: None, "no path.bh in 'out'"),
+        (lambda out: out.mkdir(), "no path.bh in 'out'"),
+        (lambda out: (out.mkdir(), (out / "path.bh").write_text("?" * 5000)), "not a path file"),
+        (lambda out: main(["run", "two.toml", "-o", "out", "-q"]), "another model"),
+    ],
+    ids=["no folder", "no path", "garbage", "another scene"],
+)
+def test_resume_of_what_cannot_be_resumed(here, capsys, prepare, told):
+    prepare(here / "out")
+    before = sorted(here.rglob("*"))
+    assert main(["run", "good.toml", "-o", "out", "--resume"]) == 2
+    err = capsys.readouterr().err
+    assert told in err
+    assert err.count("\n") == 1
+    assert sorted(here.rglob("*")) == before
+
+
+def interrupt_after(states, monkeypatch):
+    class Interrupting:
+        seen = 0
+
+        def update(self, *_):
+            self.seen += 1
+            if self.seen == states:
+                raise KeyboardInterrupt
+
+        def close(self, outcome):
+            pass
+
+    monkeypatch.setattr(bh.progress, "Bar", Interrupting)
+
+
+def test_interrupt_says_how_to_go_on(here, monkeypatch, capsys):
+    interrupt_after(1, monkeypatch)
+    assert main(["run", "good.toml", "-o", "out"]) == 130
+    err = capsys.readouterr().err
+    assert err == "bh: interrupted; go on with: bh run good.toml -o out --resume\n"
+    assert main(["run", "good.toml", "-o", "out", "--resume", "-q"]) == 0
+    assert result("out/result.json")["outcome"] == "reached"
+
+
+# --- requests ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Pictures and series are told of, not made; `tests` of plotting make them."""
+    import bh.plotting
+
+    calls = []
+    monkeypatch.setattr(
+        bh.plotting, "picture", lambda state, file, **_: calls.append(("picture", state.lam, file))
+    )
+    monkeypatch.setattr(
+        bh.plotting, "export_series", lambda path, folder, *name: calls.append(("series", str(folder)))
+    )
+    monkeypatch.setattr(bh.plotting, "show", lambda state, **_: calls.append(("show", state.lam)))
+    return calls
+
+
+def test_pictures_and_series_on_request(here, drawn, capsys):
+    assert main(["run", "good.toml", "-o", "out"]) == 0
+    assert drawn == []
+    assert main(["run", "good.toml", "-o", "out", "--pictures", "--vtu"]) == 0
+    assert drawn == [("picture", 1.0, Path("out/folded.png")), ("series", "out")]
+    assert "out/folded.png out/path.pvd" in capsys.readouterr().out
+    drawn.clear()
+    (here / "asks.toml").write_text(GOOD + "[outputs]\npictures = true\nfold = true\n")
+    assert main(["run", "asks.toml", "-o", "out", "-q"]) == 0
+    assert drawn == [("picture", 1.0, Path("out/folded.png"))]
+    folded = result("out/folded.fold")["file_frames"][0]
+    angles = [angle for angle in folded["edges_foldAngle"] if angle and angle < -60.0]
+    assert np.degrees(2.0 - np.pi) == pytest.approx(np.array(angles))  # mountain folds are negative in FOLD
+
+
+def test_picture_that_fails_leaves_the_result(here, monkeypatch, capsys):
+    import bh.plotting
+
+    def fail(*_, **__):
+        raise ImportError("libGL is missing")
+
+    monkeypatch.setattr(bh.plotting, "picture", fail)
+    assert main(["run", "good.toml", "-o", "out", "--pictures"]) == 2
+    assert "the result is in 'out', but folded.png could not be written: libGL" in capsys.readouterr().err
+    assert result("out/result.json")["outcome"] == "reached"
+
+
+def test_view(here, drawn, capsys):
+    assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
+    assert main(["view", "out"]) == 0
+    assert main(["view", "out/path.bh", "--state", "0", "--picture", "flat.png"]) == 0
+    assert main(["view", "out", "--vtu", "series"]) == 0
+    assert drawn == [("show", 1.0), ("picture", 0.0, Path("flat.png")), ("series", "series")]
+    assert main(["view", "out", "--state", "99"]) == 2
+    assert "--state 99: 'out/path.bh' has the states 0 to" in capsys.readouterr().err
+
+
+# --- the command itself ------------------------------------------------------------------------------------------
+
+
+def test_version_formulations_and_help(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("bh 0.")
+    assert main(["formulations"]) == 0
+    assert "bars-and-hinges\n" in capsys.readouterr().out
+    for words in (["--help"], []):
+        assert main(words) == 0
+        out = capsys.readouterr().out
+        assert all(f"\n  {name} " in out for name in ("run", "view", "formulations", "verify", "report"))
+
+
+def test_starts_fast_and_light():
+    heavy = "numpy", "numba", "pydantic", "pyvista", "scipy", "matplotlib", "shapely"
+    check = f"import sys, bh.cli; sys.exit(' '.join(m for m in {heavy} if m in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", check], capture_output=True, text=True).stderr.strip() == ""
+    times = []
+    for _ in range(3):
+        began = time.perf_counter()
+        done = subprocess.run([BIN, "--version"], capture_output=True, text=True, check=True)
+        times.append(time.perf_counter() - began)
+    assert done.stdout.startswith("bh ")
+    assert min(times) < 1.0  # 0.15 s on an idle machine
+
+
+def test_commands_of_other_packages(monkeypatch, capsys):
+    from bh.cli import _proxy
+
+    def check(cases: list[str], fast: bool = False, level: int = 3) -> None:
+        """Check the cases."""
+        print(cases, fast, level)
+        if level == 7:
+            raise bh.errors.InputError("level 7 cannot be; use 3")
+
+    working = EntryPoint("check", "package.command:check", "bh.commands")
+    monkeypatch.setattr(EntryPoint, "load", lambda self: check)
+    settings = {"ignore_unknown_options": True, "allow_extra_args": True, "allow_interspersed_args": False}
+    commands = list(app.registered_commands)
+    app.command("check", add_help_option=False, context_settings=settings)(_proxy(working))
+    try:
+        assert main(["check", "one", "--fast", "two", "--level", "4"]) == 0
+        assert capsys.readouterr().out == "['one', 'two'] True 4\n"
+        assert main(["check", "--help"]) == 0
+        assert "Check the cases." in capsys.readouterr().out
+        assert main(["check", "one", "--level", "7"]) == 2
+        assert capsys.readouterr().err == "bh: level 7 cannot be; use 3\n"
+        assert main(["check", "one", "--slow"]) == 2
+        assert "--slow" in capsys.readouterr().err
+
+        def broken(self):
+            raise ImportError("no module of that name")
+
+        monkeypatch.setattr(EntryPoint, "load", broken)
+        assert main(["--version"]) == 0
+        capsys.readouterr()
+        assert main(["check", "one"]) == 2
+        assert "command 'check' is not available (no module of that name)" in capsys.readouterr().err
+    finally:
+        app.registered_commands[:] = commands
+
+
+def test_a_fault_of_the_program_is_told_as_such(here, monkeypatch, capsys):
+    import bh.run
+
+    def fail(*_, **__):
+        raise RuntimeError("a\nfault")
+
+    monkeypatch.setattr(bh.run, "solve", fail)
+    assert main(["run", "good.toml"]) == 3
+    err = capsys.readouterr().err
+    assert err.startswith("bh: RuntimeError: a fault (a fault of the program")
+    assert err.count("\n") == 1
