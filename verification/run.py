@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
 import time
@@ -72,7 +73,18 @@ def write_json(file: Path, data: Any) -> None:
     """
     draft = file.with_name(file.name + ".part")
     try:
-        draft.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        draft.write_text(json.dumps(_finite(data), indent=1, allow_nan=False) + "\n", encoding="utf-8")
         draft.replace(file)
     except OSError as error:
         raise InputError(f"cannot write '{file}' ({error.strerror}); choose another place") from error
+
+
+def _finite(data: Any) -> Any:
+    """The data with null for every number that is not finite; JSON has no other word for it."""
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    if isinstance(data, float) and not math.isfinite(data):
+        return None
+    return data

@@ -72,6 +72,10 @@ class BarsAndHingesSystem:
     def rotation(self) -> float:
         return self.program.rotation
 
+    @cached_property
+    def energy_scale(self) -> float:
+        return 0.5 * float(self.elements.hinge_stiffness.sum())
+
     def start(self) -> Array:
         """Unknowns of the state that the step begins with."""
         q = np.zeros(self.size)

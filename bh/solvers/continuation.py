@@ -153,7 +153,7 @@ class LoadControl:
         power = system.power(solution.q, lam)
         work = 0.5 * (here.power + power) * (lam - here.lam)
         size = max(abs(here.power), abs(power)) * (lam - here.lam)
-        noise = 1e-9 * max(abs(here.energy), abs(solution.evaluation.energy))
+        noise = 1e-9 * max(abs(here.energy), abs(solution.evaluation.energy)) + 1e-15 * system.energy_scale
         if abs(gained - work) > self.work_mismatch * size + noise:
             return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
         return ""

@@ -65,6 +65,11 @@ class System(Protocol):
         ...
 
     @property
+    def energy_scale(self) -> float:
+        """Stiffness times one radian squared over all hinges, penalties included, N mm; 1e-15 of it is rounding."""
+        ...
+
+    @property
     def rotation(self) -> float:
         """Largest change of an imposed or rest angle while lambda runs from 0 to 1, rad."""
         ...

@@ -470,7 +470,7 @@ def _halves(xy: Array, xyz: Array, vertices: list[int]) -> list[list[int]]:
 
 
 def _delaunay(polygon: Any, xy: Array, count: int) -> list[list[int]]:
-    """`count` constrained Delaunay triangles of a polygon with corners `xy`."""
+    """`count` constrained Delaunay triangles of a polygon with corners `xy`; none is flat on a straight side."""
     import shapely
 
     corner = {tuple(point): i for i, point in enumerate(xy.tolist())}
@@ -480,37 +480,7 @@ def _delaunay(polygon: Any, xy: Array, count: int) -> list[list[int]]:
         raise FileFormatError("cannot be cut into triangles; merge vertices in one place or give triangles")
     if sum(_fullness(xy, triangle) for triangle in triangles) < 0.0:
         triangles = [triangle[::-1] for triangle in triangles]
-    # vertices on straight sides may have left triangles without area: these go as sides are turned
-    at = {(t[i - 1], t[i]): number for number, t in enumerate(triangles) for i in range(3)}
-    todo = sorted(side for side in at if side[0] < side[1])
-    for _ in range(100 * count * count):
-        if not todo:
-            break
-        a, b = todo.pop()
-        if (a, b) not in at or (b, a) not in at:
-            continue
-        one, two = at[a, b], at[b, a]
-        c, d = (next(v for v in triangles[t] if v not in (a, b)) for t in (one, two))
-        if not _turns(xy, a, b, c, d):
-            continue
-        del at[a, b], at[b, a]
-        triangles[one], triangles[two] = [a, d, c], [d, b, c]
-        for number in (one, two):
-            t = triangles[number]
-            at.update({(t[i - 1], t[i]): number for i in range(3)})
-        todo += [(a, d), (d, b), (b, c), (c, a)]
     return triangles
-
-
-def _turns(xy: Array, a: int, b: int, c: int, d: int) -> bool:
-    """Whether c-d is better than a-b between triangles abc and bad: angles at c and d exceed pi in sum."""
-    ca, cb, da, db = (complex(*(xy[q] - xy[p])) for p, q in ((c, a), (c, b), (d, a), (d, b)))
-    if not (ca and cb and da and db):
-        return False
-    product = (cb / ca) * (da / db)  # its argument is the sum of both angles
-    if product.imag >= -1e-9 * abs(product):
-        return False
-    return _fullness(xy, [a, d, c]) > 0.0 and _fullness(xy, [d, b, c]) > 0.0
 
 
 # --- the sheet ------------------------------------------------------------------------------------

@@ -189,13 +189,13 @@ COMMON = {
 
 
 @given(changed_scenes())
-@settings(max_examples=6000, **COMMON)
+@settings(max_examples=300, **COMMON)
 def test_changed_values(folder, scene):
     scene_or_one_line(text_of(scene), folder)
 
 
 @given(st.sampled_from(SCENES), st.data())
-@settings(max_examples=3000, **COMMON)
+@settings(max_examples=150, **COMMON)
 def test_changed_characters(folder, scene, data):
     text = text_of(scene)
     for _ in range(data.draw(st.integers(1, 4))):
@@ -210,6 +210,6 @@ def test_changed_characters(folder, scene, data):
 
 
 @given(st.text(max_size=60))
-@settings(max_examples=2000, **COMMON)
+@settings(max_examples=50, **COMMON)
 def test_any_text(folder, text):
     scene_or_one_line(text, folder)

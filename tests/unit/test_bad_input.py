@@ -88,7 +88,7 @@ CASES = [
     ("whole turn", {"pattern": BASE["pattern"].replace("0.5", "6.2832")}, ["pattern.angle", "full_annulus"]),
     ("angle in degrees", {"pattern": BASE["pattern"].replace("0.5", "45")}, ["pattern.angle = 45", "not degrees"]),
     ("crease off the sheet", {"pattern": STRIP + "creases = [25.0]\n"}, ["pattern", "[25.0] leave the sheet"]),
-    ("crossing creases", {"pattern": STRIP + "creases = [5.0, 5.0]\n"}, ["pattern", "[5.0, 5.0]"]),
+    ("two creases in one place", {"pattern": STRIP + "creases = [5.0, 5.0]\n"}, ["pattern", "[5.0, 5.0]"]),
     ("fold word", {"pattern": BASE["pattern"] + 'fold = "up"\n'}, ['pattern.fold = "up"', "mountain"]),
     ("folds too many", {"pattern": BASE["pattern"] + 'fold = ["mountain", "valley"]\n'}, ["pattern", "2 folds for 1"]),
     # --- sheet
@@ -209,6 +209,13 @@ FOLD_CASES = [
     ("three faces an edge",
      {**SQUARE, "vertices_coords": [*SQUARE["vertices_coords"], [5, 5, 5]],
       "faces_vertices": [[0, 1, 2], [0, 2, 3], [0, 2, 4]]}, ["edge 0-2", "non-manifold"]),
+    ("creases that cross",
+     {**SQUARE, "faces_vertices": [], "edges_vertices": [*SQUARE["edges_vertices"], [1, 3]],
+      "edges_assignment": [*SQUARE["edges_assignment"], "V"]}, ["edges 4 and 5 cross"]),
+    ("crease off the sheet",
+     {**SQUARE, "faces_vertices": [], "vertices_coords": [*SQUARE["vertices_coords"], [20, 5]],
+      "edges_vertices": [*SQUARE["edges_vertices"], [1, 4]],
+      "edges_assignment": [*SQUARE["edges_assignment"], "V"]}, ["edge 5", "hangs loose"]),
     ("no area", {**SQUARE, "vertices_coords": [[0, 0], [5, 5], [10, 10], [0, 10]]}, ["sheet.fold", "area"]),
 ]  # fmt: skip
 

@@ -128,6 +128,17 @@ class TestChains:
         assert pairs(mesh, "crease:m1") == [[4, 5], [5, 6], [6, 7]]
         assert "crease:m2" not in mesh.edge_sets
 
+    def test_a_chain_that_starts_in_its_middle(self, read):
+        """The first edge of the file has two neighbours behind it and one ahead."""
+        mesh = read(
+            vertices_coords=[[0, 0], [4, 0], [4, 2], [0, 2], [0, 1], [1, 1.5], [2, 0.5], [3, 1.5], [4, 1]],
+            edges_vertices=[
+                [6, 7], [4, 5], [8, 7], [5, 6], [0, 1], [1, 8], [8, 2], [2, 3], [3, 4], [4, 0],
+            ],
+            edges_assignment=list("VVVVBBBBBB"),
+        )  # fmt: skip
+        assert pairs(mesh, "crease:v1") == [[4, 5], [5, 6], [6, 7], [7, 8]]
+
     def test_straight_lines_go_through_a_crossing(self, read):
         """Four mountains at a vertex: two straight lines, not four, however they are listed."""
         coords = [[0, 0], [2, 0], [4, 0], [0, 2], [2, 2], [4, 2], [0, 4], [2, 4], [4, 4]]
@@ -173,9 +184,9 @@ class TestFaces:
 
     def test_orientation_in_space_follows_most_faces(self, read):
         coords = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 1]]
-        up = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 1, 4], [4, 2, 1], [2, 3, 4], [3, 0, 4]])
+        up = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 4, 1], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
         assert (winding(up) > 0).all()
-        down = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 4, 1], [4, 2, 1], [2, 3, 4], [3, 4, 0]])
+        down = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 1, 4], [4, 2, 1], [2, 4, 3], [3, 4, 0]])
         assert (winding(down) < 0).all()
 
     @pytest.mark.parametrize("turn", range(4))

@@ -335,7 +335,11 @@ def test_numbers_have_sensible_digits() -> None:
     assert number(9.99999, 3) == "10.0"
     assert number(None) == "–"  # noqa: RUF001
     assert number(math.nan) == "not a number"
-    assert (seconds(0.0012), seconds(4.31), seconds(200.0)) == ("1.2 ms", "4.3 s", "3 min 20 s")
+    assert (seconds(0.0012), seconds(4.31), seconds(200.0)) == (
+        "1.2\u00a0ms",
+        "4.3\u00a0s",
+        "3\u00a0min\u00a020\u00a0s",
+    )
 
 
 def test_errors_are_shares_of_the_reference(tmp_path: Path) -> None:
@@ -343,8 +347,8 @@ def test_errors_are_shares_of_the_reference(tmp_path: Path) -> None:
 
     against_one = Check.model_validate(record("a", "b", 1.0, unit="mm", reference=2.0))
     against_zero = Check.model_validate(record("a", "b", 1.0, unit="mm", reference=0.0))
-    assert share(0.028, against_one) == "2.8 %"
-    assert share(0.028, against_zero) == "0.028 mm"
+    assert share(0.028, against_one) == "2.8\u00a0%"
+    assert share(0.028, against_zero) == "0.028\u00a0mm"
 
 
 def test_text_is_typeset() -> None:

@@ -1,0 +1,330 @@
+"""Every kind of system: derivatives that belong together, band and sparse alike, free bodies, imposed angles."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import bh
+import meshes
+from bh import Displace, Fold, Force, Model, Moment, Sheet, trace
+from bh.formulations import formulation
+from bh.mechanics import assembly
+from bh.mechanics.bars_and_hinges import BarsAndHingesSystem
+from bh.program import program
+from bh.solvers.linear import linear_response
+from bh.solvers.matrices import FreeBodyMatrix, MultiplierMatrix
+from verification.derivatives import differences
+
+Array = NDArray[np.float64]
+SHEET = Sheet(E=4000.0, t=0.2)
+DIAGONAL = (1.0, 1.0, 0.0)
+
+
+def sector(along: int = 5, **how: Any) -> meshes.SheetMesh:
+    return meshes.structured(meshes.annulus_sector(40.0, 8.0, 0.6), along=along, **how)
+
+
+def two_creases() -> meshes.SheetMesh:
+    return meshes.structured(meshes.annulus_sector((40.0, 50.0), 8.0, 0.6, ("mountain", "valley")), along=5)
+
+
+def clamped(mesh: meshes.SheetMesh) -> Model:
+    return Model(mesh, SHEET).support("edge:start", "xyz").support("corner:inner-end", "z")
+
+
+def balanced(mesh: meshes.SheetMesh, size: float) -> tuple[Force, Force]:
+    """Two dead forces that pull the corners of the inner edge apart, in equilibrium by symmetry also when folded."""
+    a, b = (mesh.corners[f"corner:inner-{end}"] for end in ("start", "end"))
+    pull = size * (mesh.points[b] - mesh.points[a]) / np.linalg.norm(mesh.points[b] - mesh.points[a])
+    return Force([a], each=tuple(-pull)), Force([b], each=tuple(pull))
+
+
+def kinds() -> dict[str, Model]:
+    mesh, pair = sector(), two_creases()
+    oblique = (
+        Model(mesh, SHEET)
+        .support("corner:inner-start", [[1.0, 2.0, 0.5], [0.0, 1.0, -1.0], [1.0, 0.0, 0.0]])
+        .support("edge:outer", [[0.2, 0.1, 1.0]])
+        .support("corner:outer-end", [[1.0, -1.0, 0.3], [1.0, 1.0, 0.0]])
+    )
+    return {
+        "free, spring crease": Model(mesh, SHEET).fold("crease", rest=2.3, Lstar=8.0),
+        "free, held crease": Model(mesh, SHEET).fold("crease", to=2.3),
+        "free, moment": Model(mesh, SHEET).crease("crease", stiffness=0.4, rest=3.0).moment("crease", 0.2),
+        "free, forces": Model(mesh, SHEET).step(Fold("crease", to=2.6), *balanced(mesh, 0.01)),
+        "free, all z held": Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
+        .fold("crease", rest=2.0, Lstar=20.0),
+        "point and rigid body": Model(mesh, SHEET).support("corner:outer-end", "xyz").support("rigid-body")
+        .fold("crease", to=2.5),
+        "supported, spring crease": clamped(mesh).fold("crease", rest=2.3, Lstar=8.0),
+        "supported, held crease": clamped(mesh).fold("crease", to=3.9),
+        "supported, no fold": clamped(mesh).force("edge:end", total=(0.0, 0.02, 0.05)),
+        "oblique, spring crease": oblique.fold("crease", rest=2.3, Lstar=8.0),
+        "oblique, held crease": oblique.fold("crease", to=2.3),
+        "displaced": clamped(mesh).displace("corner:outer-end", "z", 0.4),
+        "displaced obliquely, held crease": clamped(mesh)
+        .step(Fold("crease", to=2.8), Displace("corner:outer-end", DIAGONAL, 0.3)),
+        "everything": clamped(pair).step(
+            Fold("crease-1", rest=2.5, Lstar=5.0), Fold("crease-2", to=3.6), Force("edge:end", each=(0.0, 0.001, 0.002))
+        ),
+        "several steps": clamped(pair)
+        .step(Fold("crease-1", rest=2.6, Lstar=5.0), Moment("crease-1", 0.05))
+        .step(Fold("crease-2", to=3.5), Moment("crease-1", -0.05), Force("edge:end", each=(0.0, 0.0, 0.002)))
+        .displace("corner:outer-end", DIAGONAL, 0.1),
+        "2 rows, alternating": Model(sector(4, rows=2, kind="alternating"), SHEET).fold("crease", to=2.5),
+    }  # fmt: skip
+
+
+KINDS = kinds()
+HELD = [name for name in KINDS if "held" in name or "everything" in name]
+FREE = ["free, spring crease", "free, held crease", "free, moment", "free, forces", "2 rows, alternating"]
+
+
+@cache
+def solved(name: str) -> bh.Path:
+    path = trace(KINDS[name])
+    assert path.outcome == "reached", f"{name}: {path.outcome}, {path.reason}"
+    return path
+
+
+def systems(name: str) -> list[tuple[BarsAndHingesSystem, Array, float]]:
+    """System, unknowns and lambda of the last state of every step."""
+    path = solved(name)
+    last = {record.step: record for record in path.records}
+    return [(path._system(step), record.q, record.lam) for step, record in last.items()]
+
+
+def disturbed(system: BarsAndHingesSystem, q: Array, seed: int) -> Array:
+    rng = np.random.default_rng(seed)
+    held = system.size - system.primal
+    return q + np.concatenate((0.05 * rng.normal(size=system.primal), 0.1 * rng.normal(size=held)))
+
+
+def dense(matrix: Any, n: int) -> Array:
+    return np.column_stack([matrix @ column for column in np.eye(n)])
+
+
+# --------------------------------------------------------------------------------------- derivatives
+
+
+def control_is_quadratic(system: BarsAndHingesSystem) -> bool:
+    """Dead loads alone give a power that does not depend on lambda."""
+    return bool(np.abs(system.elements.rest.rate).max() > 0.0 or np.abs(system.prescribed_rate).max() > 0.0)
+
+
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_derivatives(name: str, seed: int) -> None:
+    """Residual = d energy, tangent = d residual, and the same for lambda; away from equilibrium."""
+    for system, q, lam in systems(name):
+        errors = differences(system, disturbed(system, q, seed), 0.37 * lam, np.random.default_rng(seed))
+        assert set(errors) == {"residual", "tangent", "control rate", "power", "control stiffness"}
+        if not control_is_quadratic(system):
+            errors.pop("control stiffness")  # zero: no relative error
+            assert system.control_stiffness(q, lam) == 0.0
+        assert max(errors.values()) < 1e-7, errors
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_tangent_is_symmetric(name: str) -> None:
+    for system, q, lam in systems(name):
+        q = disturbed(system, q, 3)
+        A = dense(system.tangent(q, lam, system.evaluate(q, lam).forces), system.size)
+        assert np.abs(A - A.T).max() <= 1e-14 * np.abs(A).max()
+        assert (
+            np.linalg.matrix_rank(A[: system.primal, : system.primal]) > system.primal // 2
+        )  # there is something
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_energy_is_that_of_the_state(name: str) -> None:
+    """Potential at equilibrium = elastic energy of the state less the work of the dead loads."""
+    path = solved(name)
+    for record, state in zip(path.records, path, strict=True):
+        system = path._system(record.step)
+        e = system.elements
+        turn = state.dihedral_angles[e.source] - e.rest.at(record.lam)
+        loads = float(e.couple.at(record.lam) @ turn)
+        loads -= float(np.vdot(system.force.at(record.lam), state.points - state.mesh.points))
+        potential = system.evaluate(record.q, record.lam).energy
+        size = abs(state.energy.total) + abs(loads)
+        assert potential == pytest.approx(state.energy.total + loads, rel=1e-9, abs=1e-9 * size + 1e-20)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_predicted_forces_are_first_order(name: str) -> None:
+    """Halving the increment quarters the error of the predicted element forces."""
+    for system, q, lam in systems(name):
+        now = system.evaluate(q, lam)
+        system.tangent(q, lam, now.forces)
+        v = np.random.default_rng(4).normal(size=system.size)
+        errors = []
+        for step in (2e-3, 1e-3):
+            ahead = system.predicted_forces(now.forces, step * v)
+            errors.append(float(np.abs(ahead - system.evaluate(q + step * v, lam).forces).max()))
+        assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_states_are_in_equilibrium(name: str) -> None:
+    """Every accepted state satisfies its equations, and says whether it is stable."""
+    path = solved(name)
+    for record in path.records:
+        system = path._system(record.step)
+        now = system.evaluate(record.q, record.lam)
+        assert now.imbalance <= 1e-8
+        size = np.sqrt(np.mean(now.forces[: len(system.elements.bars)] ** 2)) + 1e-9
+        assert np.abs(now.residual[: system.primal]).max() <= 1e-6 * size
+        assert np.abs(now.residual[system.primal :]).max(initial=0.0) < 1e-9  # rad
+        assert record.stable in ((True, None) if record.lam == 0.0 else (True,))
+
+
+# --------------------------------------------------------------------------------------- band and sparse
+
+
+@pytest.fixture(params=["band", "sparse"])
+def storage(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setattr(assembly, "band_is_cheaper", lambda n, bandwidth: request.param == "band")
+    return str(request.param)
+
+
+def other(monkeypatch: pytest.MonkeyPatch, banded: bool) -> None:
+    monkeypatch.setattr(assembly, "band_is_cheaper", lambda n, bandwidth: banded)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = KINDS[name]
+    found = []
+    for banded in (True, False):
+        other(monkeypatch, banded)
+        path = trace(model)
+        assert path.outcome == "reached"
+        assert path._system(0)._pattern.banded is banded  # the choice was forced
+        found.append(path)
+    one, two = found
+    assert len(one) == len(two)
+    points = np.array([[state.points for state in path] for path in found])
+    assert np.abs(points[0] - points[1]).max() < 1e-7  # mm: two Newton solutions, each within its tolerance
+    assert one[-1].energy.total == pytest.approx(two[-1].energy.total, rel=1e-10)
+
+    responses = []
+    for banded in (True, False):
+        other(monkeypatch, banded)
+        system = formulation(model.formulation).system(model, program(model)[0], None)
+        q = one.records[0].q
+        A = system.tangent(q, 0.0, system.evaluate(q, 0.0).forces)
+        b = np.random.default_rng(0).normal(size=system.size)
+        b[system.primal :] = 0.0
+        responses.append((dense(A, system.size), linear_response(system, q).dq[: system.primal], A @ b))
+    for x, y in zip(*responses, strict=True):
+        assert np.abs(x - y).max() <= 1e-10 * np.abs(x).max()
+
+
+@pytest.mark.parametrize("banded", [True, False])
+def test_order_is_a_permutation(banded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scrambled numbering gives the same matrix in the user's order, whatever the order inside."""
+    other(monkeypatch, banded)
+    system, q, lam = systems("supported, spring crease")[0]
+    system = BarsAndHingesSystem(KINDS["supported, spring crease"], system.program, None)
+    order = system._pattern.order
+    assert np.array_equal(np.sort(order), np.arange(system.primal))
+    assert not np.array_equal(order, np.arange(system.primal))
+    A = dense(system.tangent(q, lam, system.evaluate(q, lam).forces), system.size)
+    # column by column by differences: entries stand where the unknowns are
+    h = 1e-5
+    for i in (0, 1, 7, system.primal - 1):
+        e = h * np.eye(system.size)[i]
+        column = (system.evaluate(q + e, lam).residual - system.evaluate(q - e, lam).residual) / (2.0 * h)
+        assert np.abs(column - A[:, i]).max() <= 1e-6 * np.abs(A).max()
+
+
+# --------------------------------------------------------------------------------------- free bodies
+
+
+@pytest.mark.parametrize("banded", [True, False])
+@pytest.mark.parametrize("name", FREE)
+def test_free_body_solves_the_singular_system(
+    name: str, banded: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For loads in equilibrium: K x = b exactly, and x has no rigid part; at the flat and at the folded state."""
+    other(monkeypatch, banded)
+    model = KINDS[name]
+    path = trace(model)
+    system = path._system(0)
+    loaded = np.abs(system.force.end).max() > 0.0
+    for record in (path.records[0], path.records[-1]):
+        matrix = system.tangent(record.q, record.lam, system.evaluate(record.q, record.lam).forces)
+        if isinstance(matrix, MultiplierMatrix):
+            matrix = matrix.augmented
+        assert isinstance(matrix, FreeBodyMatrix)
+        n, Z = system.primal, matrix.Z
+        assert Z.shape == (n, 6)
+        assert np.abs(Z.T @ Z - np.eye(6)).max() < 1e-13
+        K = dense(matrix, n)
+        if not loaded or record.lam == 0.0:  # dead loads stiffen against rotations
+            assert np.abs(K @ Z).max() <= 1e-7 * np.abs(K).max()
+            assert np.sum(np.abs(np.linalg.eigvalsh(K)) < 1e-9 * np.abs(K).max()) >= 6
+        b = np.random.default_rng(1).normal(size=n)
+        b -= Z @ (Z.T @ b)
+        x = matrix.factorise().solve(b)
+        assert np.abs(Z.T @ x).max() <= 1e-13 * np.linalg.norm(x)
+        if not loaded or record.lam == 0.0:
+            assert np.abs(K @ x - b).max() <= 1e-8 * np.abs(K).max() * np.abs(x).max()
+            least = np.linalg.lstsq(K, b, rcond=1e-12)[0]
+            assert np.abs(x - least).max() <= 1e-5 * np.abs(least).max()
+
+
+def test_unbalanced_part_of_a_load_is_left_out() -> None:
+    """What a free body cannot carry does not move it."""
+    system, q, lam = systems("free, spring crease")[0]
+    matrix = system.tangent(q, lam, system.evaluate(q, lam).forces)
+    push = np.tile([0.3, -1.0, 2.0], len(system.mesh.points))
+    assert np.abs(matrix.factorise().solve(push)).max() < 1e-9
+
+
+# --------------------------------------------------------------------------------------- multipliers
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_multipliers_solve_the_saddle(name: str) -> None:
+    """Against a dense solve of [[K + gamma G^T G, G^T], [G, 0]]: constraints met, primal part right, first row exact."""
+    for system, q, lam in systems(name):
+        if system.size == system.primal:
+            continue
+        matrix = system.tangent(q, lam, system.evaluate(q, lam).forces)
+        assert isinstance(matrix, MultiplierMatrix)
+        n, A = system.primal, dense(matrix, system.size)
+        assert np.abs(A[n:, n:]).max() == 0.0
+        rng = np.random.default_rng(5)
+        b = np.concatenate((np.zeros(n), 1e-3 * rng.normal(size=system.size - n)))
+        b[:n] = A[:n] @ np.concatenate((1e-3 * rng.normal(size=n), 1e-2 * rng.normal(size=system.size - n)))
+        if isinstance(matrix.augmented, FreeBodyMatrix):
+            b[:n] -= matrix.augmented.Z @ (matrix.augmented.Z.T @ b[:n])
+        x = matrix.factorise().solve(b)
+        expected = np.linalg.lstsq(A, b, rcond=1e-13)[0]
+        assert np.abs((A @ x - b)[n:]).max() <= 1e-6 * np.abs(b[n:]).max()
+        assert np.abs((A @ x - b)[:n]).max() <= 1e-7 * np.abs(A).max() * np.abs(x[:n]).max()
+        assert np.abs(x[:n] - expected[:n]).max() <= 1e-4 * np.abs(expected[:n]).max()
+        assert np.abs(x[n:] - expected[n:]).max() <= 1e-3 * np.abs(expected[n:]).max()
+
+
+@pytest.mark.parametrize("force", [(0.0, 0.0, 1e-4), (1.0, 0.0, 0.0)])
+def test_multipliers_without_a_gap(force: tuple[float, float, float]) -> None:
+    """A held crease that does not move: the iteration on the multipliers must come to an end."""
+    model = clamped(sector()).step(Fold("crease", to=math.pi), Force("corner:outer-end", each=force))
+    system = formulation(model.formulation).system(model, program(model)[0], None)
+    q = system.start()
+    A = dense(system.tangent(q, 0.0, system.evaluate(q, 0.0).forces), system.size)
+    rate = system.control_rate(q, 0.0)
+    assert np.abs(rate[system.primal :]).max() == 0.0
+    expected = np.linalg.solve(A, -rate)
+    got = linear_response(system, q).dq
+    assert np.isfinite(got).all()
+    assert np.abs(got - expected)[: system.primal].max() <= 1e-7 * np.abs(expected[: system.primal]).max()
