@@ -144,7 +144,9 @@ def _triangles(
     p, q, r = (points[array[:, k]] for k in range(3))
     turn = (q - p)[:, 0] * (r - p)[:, 1] - (q - p)[:, 1] * (r - p)[:, 0]
     if (turn <= 0.0).any() and (turn >= 0.0).any():
-        raise MeshError(f"cells are so long that chords of neighbouring curves cross; use more than {along} along")
+        raise MeshError(
+            f"cells are so long that chords of neighbouring curves cross; use more than {along} along"
+        )
     # arcs that run counter-clockwise have their inner rail on the left: all triangles then come out turned
     array[turn < 0.0] = array[turn < 0.0][:, ::-1]
     return array, first[:-1]

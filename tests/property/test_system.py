@@ -38,6 +38,12 @@ def clamped(mesh: meshes.SheetMesh) -> Model:
     return Model(mesh, SHEET).support("edge:start", "xyz").support("corner:inner-end", "z")
 
 
+def held_at_corners(mesh: meshes.SheetMesh) -> Model:
+    """Three corners take the six rigid motions (App. B); the creases can fold."""
+    model = Model(mesh, SHEET).support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+    return model.support("corner:inner-end", "z")
+
+
 def balanced(mesh: meshes.SheetMesh, size: float) -> tuple[Force, Force]:
     """Two dead forces that pull the corners of the inner edge apart, in equilibrium by symmetry also when folded."""
     a, b = (mesh.corners[f"corner:inner-{end}"] for end in ("start", "end"))
@@ -56,7 +62,7 @@ def kinds() -> dict[str, Model]:
     return {
         "free, spring crease": Model(mesh, SHEET).fold("crease", rest=2.3, Lstar=8.0),
         "free, held crease": Model(mesh, SHEET).fold("crease", to=2.3),
-        "free, moment": Model(mesh, SHEET).crease("crease", stiffness=0.4, rest=3.0).moment("crease", 0.2),
+        "free, moment": Model(mesh, SHEET).crease("crease", stiffness=0.4).moment("crease", 0.2),
         "free, forces": Model(mesh, SHEET).step(Fold("crease", to=2.6), *balanced(mesh, 0.01)),
         "free, all z held": Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
         .fold("crease", rest=2.0, Lstar=20.0),
@@ -70,13 +76,13 @@ def kinds() -> dict[str, Model]:
         "displaced": clamped(mesh).displace("corner:outer-end", "z", 0.4),
         "displaced obliquely, held crease": clamped(mesh)
         .step(Fold("crease", to=2.8), Displace("corner:outer-end", DIAGONAL, 0.3)),
-        "everything": clamped(pair).step(
+        "everything": held_at_corners(pair).step(
             Fold("crease-1", rest=2.5, Lstar=5.0), Fold("crease-2", to=3.6), Force("edge:end", each=(0.0, 0.001, 0.002))
         ),
-        "several steps": clamped(pair)
-        .step(Fold("crease-1", rest=2.6, Lstar=5.0), Moment("crease-1", 0.05))
+        "several steps": held_at_corners(pair)
+        .step(Fold("crease-1", rest=2.6, Lstar=5.0), Moment("crease-1", 0.05), Displace("corner:outer-end", DIAGONAL, 0.1))
         .step(Fold("crease-2", to=3.5), Moment("crease-1", -0.05), Force("edge:end", each=(0.0, 0.0, 0.002)))
-        .displace("corner:outer-end", DIAGONAL, 0.1),
+        .displace("corner:outer-end", DIAGONAL, -0.2),
         "2 rows, alternating": Model(sector(4, rows=2, kind="alternating"), SHEET).fold("crease", to=2.5),
     }  # fmt: skip
 
@@ -179,8 +185,10 @@ def test_states_are_in_equilibrium(name: str) -> None:
         system = path._system(record.step)
         now = system.evaluate(record.q, record.lam)
         assert now.imbalance <= 1e-8
-        size = np.sqrt(np.mean(now.forces[: len(system.elements.bars)] ** 2)) + 1e-9
-        assert np.abs(now.residual[: system.primal]).max() <= 1e-6 * size
+        # relative to the bars' forces, above what rounding of 1e-14 makes of stiffness times size
+        typical = np.sqrt(np.mean(now.forces[: len(system.elements.bars)] ** 2))
+        rounding = 1e-14 * system.elements.bar_stiffness.max() * 50.0
+        assert np.abs(now.residual[: system.primal]).max() <= 1e-6 * typical + rounding
         assert np.abs(now.residual[system.primal :]).max(initial=0.0) < 1e-9  # rad
         assert record.stable in ((True, None) if record.lam == 0.0 else (True,))
 
@@ -188,13 +196,7 @@ def test_states_are_in_equilibrium(name: str) -> None:
 # --------------------------------------------------------------------------------------- band and sparse
 
 
-@pytest.fixture(params=["band", "sparse"])
-def storage(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.setattr(assembly, "band_is_cheaper", lambda n, bandwidth: request.param == "band")
-    return str(request.param)
-
-
-def other(monkeypatch: pytest.MonkeyPatch, banded: bool) -> None:
+def force_storage(monkeypatch: pytest.MonkeyPatch, banded: bool) -> None:
     monkeypatch.setattr(assembly, "band_is_cheaper", lambda n, bandwidth: banded)
 
 
@@ -203,7 +205,7 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     model = KINDS[name]
     found = []
     for banded in (True, False):
-        other(monkeypatch, banded)
+        force_storage(monkeypatch, banded)
         path = trace(model)
         assert path.outcome == "reached"
         assert path._system(0)._pattern.banded is banded  # the choice was forced
@@ -216,21 +218,23 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
 
     responses = []
     for banded in (True, False):
-        other(monkeypatch, banded)
+        force_storage(monkeypatch, banded)
         system = formulation(model.formulation).system(model, program(model)[0], None)
         q = one.records[0].q
         A = system.tangent(q, 0.0, system.evaluate(q, 0.0).forces)
         b = np.random.default_rng(0).normal(size=system.size)
         b[system.primal :] = 0.0
         responses.append((dense(A, system.size), linear_response(system, q).dq[: system.primal], A @ b))
+    # with multipliers the rounding of the penalty (gamma over the stiffness of a bending sheet) comes on top
+    tolerance = 1e-9 if system.size > system.primal else 1e-10
     for x, y in zip(*responses, strict=True):
-        assert np.abs(x - y).max() <= 1e-10 * np.abs(x).max()
+        assert np.abs(x - y).max() <= tolerance * np.abs(x).max()
 
 
 @pytest.mark.parametrize("banded", [True, False])
 def test_order_is_a_permutation(banded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A scrambled numbering gives the same matrix in the user's order, whatever the order inside."""
-    other(monkeypatch, banded)
+    force_storage(monkeypatch, banded)
     system, q, lam = systems("supported, spring crease")[0]
     system = BarsAndHingesSystem(KINDS["supported, spring crease"], system.program, None)
     order = system._pattern.order
@@ -254,7 +258,7 @@ def test_free_body_solves_the_singular_system(
     name: str, banded: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """For loads in equilibrium: K x = b exactly, and x has no rigid part; at the flat and at the folded state."""
-    other(monkeypatch, banded)
+    force_storage(monkeypatch, banded)
     model = KINDS[name]
     path = trace(model)
     system = path._system(0)
@@ -294,7 +298,7 @@ def test_unbalanced_part_of_a_load_is_left_out() -> None:
 
 @pytest.mark.parametrize("name", HELD)
 def test_multipliers_solve_the_saddle(name: str) -> None:
-    """Against a dense solve of [[K + gamma G^T G, G^T], [G, 0]]: constraints met, primal part right, first row exact."""
+    """Against a dense solve of [[K + gamma G^T G, G^T], [G, 0]]: constraints met, first row exact."""
     for system, q, lam in systems(name):
         if system.size == system.primal:
             continue
@@ -309,6 +313,8 @@ def test_multipliers_solve_the_saddle(name: str) -> None:
             b[:n] -= matrix.augmented.Z @ (matrix.augmented.Z.T @ b[:n])
         x = matrix.factorise().solve(b)
         expected = np.linalg.lstsq(A, b, rcond=1e-13)[0]
+        if isinstance(matrix.augmented, FreeBodyMatrix):
+            expected[:n] -= matrix.augmented.Z @ (matrix.augmented.Z.T @ expected[:n])
         assert np.abs((A @ x - b)[n:]).max() <= 1e-6 * np.abs(b[n:]).max()
         assert np.abs((A @ x - b)[:n]).max() <= 1e-7 * np.abs(A).max() * np.abs(x[:n]).max()
         assert np.abs(x[:n] - expected[:n]).max() <= 1e-4 * np.abs(expected[:n]).max()
