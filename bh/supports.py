@@ -179,7 +179,8 @@ def free_motions(points: Array, constraints: Constraints) -> Array:
     rows = motions[constraints.fixed]
     if len(rows) == 0:
         return np.diag(scale)
-    _, values, right = np.linalg.svd(rows, full_matrices=True)
+    # the triangular factor has the same null space and six rows at most, where all left vectors would be (k, k)
+    _, values, right = np.linalg.svd(np.linalg.qr(rows, mode="r"), full_matrices=True)
     rank = int((values > 1e-7 * max(values[0], 1e-300)).sum())
     return scale[:, None] * right[rank:].T
 

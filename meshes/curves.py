@@ -72,6 +72,11 @@ class Polyline:
 
     vertices: Array
 
+    def __post_init__(self) -> None:
+        vertices = np.array(self.vertices, dtype=float)
+        vertices.setflags(write=False)
+        object.__setattr__(self, "vertices", vertices)
+
     @property
     def _arc_length(self) -> Array:
         steps = np.linalg.norm(np.diff(self.vertices, axis=0), axis=1)

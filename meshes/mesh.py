@@ -11,7 +11,7 @@ import numpy as np
 
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
-from meshes.pattern import FoldKind
+from meshes.pattern import FOLD_KINDS, FoldKind
 from meshes.topology import Ints, Topology, build
 
 
@@ -58,11 +58,12 @@ class SheetMesh:
             raise MeshError(f"node {node} is not finite; give three numbers in mm")
         set_ = object.__setattr__
         set_(self, "points", _frozen(points))
-        set_(self, "triangles", _frozen(np.array(self.triangles, dtype=np.int64)))
+        set_(self, "triangles", _frozen(_indices("triangles", self.triangles)))
         for name in ("edge_sets", "fold_angles"):
-            dtype = np.int64 if name == "edge_sets" else float
+            whole = name == "edge_sets"
             frozen = {
-                key: _frozen(np.array(value, dtype=dtype)) for key, value in getattr(self, name).items()
+                key: _frozen(_indices(key, value) if whole else np.array(value, dtype=float))
+                for key, value in getattr(self, name).items()
             }
             set_(self, name, MappingProxyType(frozen))
         for name in ("corners", "folds", "curves"):
@@ -73,12 +74,29 @@ class SheetMesh:
         used[self.triangles] = True
         if not used.all():
             raise MeshError(f"node {int(np.argmin(used))} belongs to no triangle; remove it")
-        for pairs in self.edge_sets.values():
-            topology.find_edges(pairs)
+        self._check_names(topology)
         if self.spans is not None:
             if np.shape(self.spans) != topology.edges.shape:
                 raise MeshError(f"spans must have one row an edge, shape {topology.edges.shape}")
             set_(self, "spans", _frozen(np.array(self.spans, dtype=float)))
+
+    def _check_names(self, topology: Topology) -> None:
+        """Named sets, corners, folds and angles belong to the mesh and to each other."""
+        for name, pairs in self.edge_sets.items():
+            if pairs.ndim != 2 or pairs.shape[1] != 2:
+                raise MeshError(f"edge set '{name}' must be an array (k, 2) of node pairs")
+            topology.find_edges(pairs)
+        for name, node in self.corners.items():
+            if not 0 <= node < len(self.points):
+                raise MeshError(f"corner '{name}' names node {node} of {len(self.points)}; mend its index")
+        for name, fold in self.folds.items():
+            if fold not in FOLD_KINDS:
+                raise MeshError(
+                    f"crease '{name}': fold '{fold}' is not known; use one of {', '.join(FOLD_KINDS)}"
+                )
+        for name, angles in self.fold_angles.items():
+            if angles.shape != (len(self.crease_edges(name)),):
+                raise MeshError(f"crease '{name}' has {angles.size} fold angles; give one an edge")
 
     @cached_property
     def topology(self) -> Topology:
@@ -146,6 +164,19 @@ def _check_triangles(points: Array, triangles: Ints) -> None:
     if thin.any():
         row = int(np.argmax(thin))
         raise MeshError(f"triangle {row} (nodes {triangles[row].tolist()}) is degenerate; it has no area")
+
+
+def _indices(name: str, values: object) -> Ints:
+    """Whole numbers as an index array; anything else is refused rather than cut off."""
+    try:
+        array = np.asarray(values)
+    except ValueError as ragged:
+        raise MeshError(
+            f"{name}: rows of different length; give every row the same number of nodes"
+        ) from ragged
+    if array.size and array.dtype.kind not in "iu":
+        raise MeshError(f"{name} must hold whole numbers (node indices)")
+    return np.array(array, dtype=np.int64)
 
 
 def _frozen(array: Array | Ints) -> Array | Ints:

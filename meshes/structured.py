@@ -48,7 +48,7 @@ def structured(
         raise MeshError("this pattern has no rails to rule between; use an unstructured mesh")
     if kind not in get_args(Kind):
         raise MeshError(f"mesh kind '{kind}' is not known; use one of {', '.join(get_args(Kind))}")
-    if rows < 1 or int(rows) != rows:
+    if not 1 <= rows <= 1e5 or int(rows) != rows:
         raise MeshError(f"rows = {rows} cannot be; use a whole number from 1")
     widths, heights = _panel_sizes(pattern)
     least = 3 if pattern.closed else 1
@@ -57,8 +57,12 @@ def structured(
     if aspect_ratio is not None:
         if not math.isfinite(aspect_ratio) or aspect_ratio <= 0.0:
             raise MeshError(f"aspect_ratio = {aspect_ratio} cannot be; use a positive number, best 5 to 12")
-        along = max(least, round(aspect_ratio * widths.mean() / (heights.mean() / rows)))
+        along = max(least, round(min(aspect_ratio / float(np.mean(heights / rows / widths)), 1e9)))
     assert along is not None
+    if along > 1e6:
+        raise MeshError(
+            f"{along} cells along the crease cannot be meshed; use a smaller aspect_ratio or along"
+        )
     if along < least or int(along) != along:
         raise MeshError(f"along = {along} cells cannot be; use a whole number from {least}")
 

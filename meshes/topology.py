@@ -52,9 +52,8 @@ class Topology:
 
     @property
     def boundary(self) -> Ints:
-        """(b, 2) directed boundary edges, the sheet on their left."""
-        free = np.flatnonzero(self.edge_triangles[:, 1] < 0)
-        return self.edges[free]
+        """(b, 2) boundary edges as node pairs, the smaller node first."""
+        return self.edges[self.edge_triangles[:, 1] < 0]
 
 
 def build(triangles: Ints, nodes: int) -> Topology:

@@ -135,7 +135,7 @@ def run(context: Context) -> CaseResult:
     result = CaseResult(
         name="campaign",
         title=f"{count} random scenes",
-        question="Does every scene reach its target with default settings, and on the lowest branch that fine steps find?",
+        question="Does every scene reach its target with default settings, on the branch that fine steps find?",
         source=SOURCE,
     )
     reached = [r for r in found if r.outcome == "reached"]

@@ -66,8 +66,9 @@ def run(context: Context) -> CaseResult:
     g2, g0, _ = _regression(alphas, settings["guided"])
     result.notes.append(
         f"The factor is the regression of the cantilevered truss (left nodes pinned, the force at the node where the "
-        f"diagonal ends, sheet deflection W / (G H t) without its bending) over alpha = 1 to 20: {a2:.3f} "
-        f"alpha^2 + {a0:.3f}, R^2 = {r2:.5f}. That deflection is alpha^2/2 + 1 + 3/(2 alpha^2), the last term being the chord; "
+        f"diagonal ends, sheet deflection W / (G H t) alone) over alpha = 1 to 20: {a2:.3f} "
+        f"alpha^2 + {a0:.3f}, R^2 = {r2:.5f}. That deflection is alpha^2/2 + 1 + 3/(2 alpha^2), the last term from the "
+        "chord; "
         f"on a finer grid of alpha the constant falls to 1.17. With guided nodes only the diagonal works and the exact "
         f"factor is (alpha + 1/alpha)^2 / 2; its regression is {g2:.3f} alpha^2 + {g0:.3f}."
     )

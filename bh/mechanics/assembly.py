@@ -36,7 +36,8 @@ def elongation(length, rest_length, green):  # type: ignore[no-untyped-def]
 def nodal_forces(x, bars, rest_length, k_bar, green, hinges, k_hinge, rest, couple, f, s_bar, s_hinge):  # type: ignore[no-untyped-def]
     """Energy (N mm) and the mean size of element forces (N); adds the gradient of the energy to `f` (n, 3).
 
-    Writes the force of each bar, k times its elongation (see `elongation`), and the moment of each hinge, k (phi - rest) + couple.
+    Writes the force of each bar, k times its elongation (see `elongation`), and the moment of each hinge,
+    k (phi - rest) + couple.
     """
     g = np.empty(12)
     energy, size, count = 0.0, 0.0, 0

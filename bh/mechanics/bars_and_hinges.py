@@ -177,7 +177,8 @@ class BarsAndHingesSystem:
         x = self.positions(q, lam)
         data = np.zeros(pattern.size)
         tangent_values(
-            x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0], e.hinges, e.hinge_stiffness, forces[bars:],
+            x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0],
+            e.hinges, e.hinge_stiffness, forces[bars:],
             pattern.slots[1], self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge,
         )  # fmt: skip
         matrix: Matrix

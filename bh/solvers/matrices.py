@@ -32,7 +32,11 @@ class IndefiniteError(ArithmeticError):
 
 class Factor(Protocol):
     def solve(self, b: Array) -> Array:
-        """x with A x = b; b (n,) or (n, k)."""
+        """x with A x = b, b (n,)."""
+        ...
+
+    def descend(self, residual: Array) -> Array:
+        """A direction in which the primal unknowns lower the energy, and the change of multipliers with it."""
         ...
 
 
@@ -94,6 +98,9 @@ class BandFactor:
         out[self.order] = x
         return out
 
+    def descend(self, residual: Array) -> Array:
+        return -self.solve(residual)
+
 
 # ---------------------------------------------------------------------------------------------- sparse
 
@@ -148,6 +155,9 @@ class SparseFactor:
         out[self.order] = self.superlu.solve(np.ascontiguousarray(b[self.order]))
         return out
 
+    def descend(self, residual: Array) -> Array:
+        return -self.solve(residual)
+
 
 # ---------------------------------------------------------------------------------------------- composed
 
@@ -186,6 +196,9 @@ class FreeBodyFactor:
     def solve(self, b: Array) -> Array:
         x = self.factor.solve(b - self.Z @ (self.Z.T @ b))
         return x - self.Z @ (self.Z.T @ x)
+
+    def descend(self, residual: Array) -> Array:
+        return -self.solve(residual)
 
 
 @njit(cache=True, nogil=True)
@@ -280,7 +293,10 @@ class MultiplierFactor:
                 break
             v = self.factor.solve(G.transpose_times(p))
             Sp = G.times(v)
-            step = rho / float(p @ Sp)
+            curvature = float(p @ Sp)
+            if curvature <= 0.0:  # no unknown can change these constraints
+                break
+            step = rho / curvature
             y += step * p
             x -= step * v
             miss -= step * Sp
@@ -288,6 +304,15 @@ class MultiplierFactor:
             rho, before = float(miss @ z), rho
             p = z + (rho / before) * p
         return np.concatenate((x, y))
+
+    def descend(self, residual: Array) -> Array:
+        """Newton's direction of the augmented energy at fixed multipliers, and their first-order update.
+
+        The saddle's own direction meets the constraints at once, but may go uphill where the tangent was shifted.
+        """
+        n = self.G.n
+        x = -self.factor.solve(residual[:n])
+        return np.concatenate((x, self.gamma * (residual[n:] + self.G.times(x))))
 
 
 def reverse_cuthill_mckee(rows: Ints, columns: Ints, n: int) -> tuple[Ints, int]:

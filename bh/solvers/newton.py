@@ -97,10 +97,12 @@ class Newton:
             factor, shift = factorise_shifted(matrix, shift)
             if factor is None:
                 return Solution(q, now, iteration, False, "singular tangent", careful=True)
-            dq = -factor.solve(now.residual)
+            dq = factor.descend(now.residual)
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, careful=True)
-            step = line_search(system, q, lam, now, dq)
+            near = shift == 0.0 and now.imbalance < 0.1
+            step = full_step(system, q, lam, now, -factor.solve(now.residual)) if near else None
+            step = step or line_search(system, q, lam, now, dq)
             if step is None:
                 if shift > 1e3:
                     return Solution(q, now, iteration, False, "no descent", careful=True)
@@ -150,6 +152,14 @@ def factorise_shifted(matrix: Matrix, shift: float, largest: float = 1e6) -> tup
         except IndefiniteError:
             shift = NEUTRAL if shift == 0.0 else max(4.0 * shift, 1e-9)
     return None, shift
+
+
+def full_step(
+    system: System, q: Array, lam: float, now: Evaluation, dq: Array
+) -> tuple[Array, Evaluation, float] | None:
+    """Newton's whole step where it at least halves the imbalance; close to a solution it does far better."""
+    there = system.evaluate(q + dq, lam)
+    return (q + dq, there, 1.0) if there.imbalance < 0.5 * now.imbalance else None
 
 
 def line_search(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import IndefiniteError, Matrix
+from bh.solvers.matrices import IndefiniteError, Matrix, MultiplierMatrix
 from bh.solvers.newton import Newton, Solution, factorise_shifted
 from bh.solvers.system import System
 
@@ -22,20 +22,22 @@ def lowest_mode(
     Inverse iteration with the shifted matrix K + s D (D = |diag K|), started from a fixed pseudo-random vector so that
     the same input gives the same mode. The mode has unit length and its largest component is positive.
     """
+    # the penalty of the augmented matrix keeps its low modes in the null space of the constraints
+    matrix = matrix.augmented if isinstance(matrix, MultiplierMatrix) else matrix
     factor, _ = factorise_shifted(matrix, 0.0)
     if factor is None:
         raise IndefiniteError(1)
-    mode = np.random.default_rng(20).normal(size=size)
-    mode[primal:] = 0.0
+    mode = np.random.default_rng(20).normal(size=primal)
     quotient = np.inf
     for _ in range(iterations):
         mode = factor.solve(mode)
-        mode[primal:] = 0.0
         mode /= np.linalg.norm(mode)
         before, quotient = quotient, float(mode @ (matrix @ mode))
         if abs(quotient - before) <= tolerance * abs(quotient):
             break
-    return quotient, mode * np.sign(mode[np.argmax(np.abs(mode))])
+    whole = np.zeros(size)
+    whole[:primal] = mode * np.sign(mode[np.argmax(np.abs(mode))])
+    return quotient, whole
 
 
 def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -> tuple[Solution, str]:

@@ -74,7 +74,9 @@ VALUES = st.one_of(
     st.none(),
     st.booleans(),
     NUMBERS,
-    st.sampled_from(["", "M", "V", "B", "F", "U", "C", "J", "MV", "x\ny", "\ud800", "mm", "furlong", "0" * 99]),
+    st.sampled_from(
+        ["", "M", "V", "B", "F", "U", "C", "J", "MV", "x\ny", "\ud800", "mm", "furlong", "0" * 99]
+    ),
     st.lists(st.integers(-1, 10), max_size=4),
     st.lists(NUMBERS, min_size=2, max_size=3),
     st.just({}),
@@ -175,7 +177,9 @@ def test_damaged_bytes(seed, data):
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, max(len(text) - 1, 0)))
         size = data.draw(st.integers(0, 3))
-        text[at : at + size] = data.draw(st.binary(max_size=3) | st.sampled_from([b"-", b"e9", b"]", b"0", b"1,"]))
+        text[at : at + size] = data.draw(
+            st.binary(max_size=3) | st.sampled_from([b"-", b"e9", b"]", b"0", b"1,"])
+        )
     if data.draw(st.booleans()):
         del text[data.draw(st.integers(0, len(text))) :]
     _survives(bytes(text))

@@ -80,7 +80,10 @@ def kinds() -> dict[str, Model]:
             Fold("crease-1", rest=2.5, Lstar=5.0), Fold("crease-2", to=3.6), Force("edge:end", each=(0.0, 0.001, 0.002))
         ),
         "several steps": held_at_corners(pair)
-        .step(Fold("crease-1", rest=2.6, Lstar=5.0), Moment("crease-1", 0.05), Displace("corner:outer-end", DIAGONAL, 0.1))
+        .step(
+            Fold("crease-1", rest=2.6, Lstar=5.0), Moment("crease-1", 0.05),
+            Displace("corner:outer-end", DIAGONAL, 0.1),
+        )
         .step(Fold("crease-2", to=3.5), Moment("crease-1", -0.05), Force("edge:end", each=(0.0, 0.0, 0.002)))
         .displace("corner:outer-end", DIAGONAL, -0.2),
         "2 rows, alternating": Model(sector(4, rows=2, kind="alternating"), SHEET).fold("crease", to=2.5),

@@ -65,7 +65,12 @@ class TestSets:
         assert pairs(mesh, "crease:valley") == [[1, 4]]
         assert pairs(mesh, "edge:flat") == [[4, 3]]
         assert undirected(mesh.edge_sets["edge:boundary"]) == {(0, 1), (1, 2), (2, 3), (0, 3)}
-        assert dict(mesh.folds) == {"mountain": "mountain", "m1": "mountain", "valley": "valley", "v1": "valley"}
+        assert dict(mesh.folds) == {
+            "mountain": "mountain",
+            "m1": "mountain",
+            "valley": "valley",
+            "v1": "valley",
+        }
         assert set(mesh.edge_sets) == {
             "crease:mountain", "crease:m1", "crease:valley", "crease:v1", "edge:flat", "edge:boundary",
         }  # fmt: skip
@@ -94,7 +99,10 @@ class TestSets:
             edges_assignment=["U", "J", "V"],
             edges_foldAngle=None,
         )
-        assert undirected(mesh.edge_sets["edge:unassigned"]) == {(0, 4), (3, 4)}  # one is not in the file at all
+        assert undirected(mesh.edge_sets["edge:unassigned"]) == {
+            (0, 4),
+            (3, 4),
+        }  # one is not in the file at all
         assert undirected(mesh.edge_sets["edge:join"]) == {(2, 4)}
         assert len(mesh.edge_sets["edge:boundary"]) == 4
 
@@ -186,7 +194,9 @@ class TestFaces:
         coords = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 1]]
         up = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 4, 1], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
         assert (winding(up) > 0).all()
-        down = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 1, 4], [4, 2, 1], [2, 4, 3], [3, 4, 0]])
+        down = read(
+            SQUARE, vertices_coords=coords, faces_vertices=[[0, 1, 4], [4, 2, 1], [2, 4, 3], [3, 4, 0]]
+        )
         assert (winding(down) < 0).all()
 
     @pytest.mark.parametrize("turn", range(4))
@@ -221,7 +231,10 @@ class TestFaces:
             ([[0, 0], [3, 0], [2, 4 / 3], [1.5, 2], [0, 4], [0, 3], [0, 1]], 6.0),  # on two sides
             ([[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [3, 3], [2, 3], [1, 3], [0, 3], [0, 2]], 9.0),
             ([[0, 0], [4, 0], [4, 3], [3, 3], [3, 1], [1, 1], [1, 3], [0, 3]], 8.0),  # a U
-            ([[0.1, 0], [0.2, 1e-17], [0.3, -1e-17], [0.7, 0], [0.4, 0.5]], 0.15),  # straight but for rounding
+            (
+                [[0.1, 0], [0.2, 1e-17], [0.3, -1e-17], [0.7, 0], [0.4, 0.5]],
+                0.15,
+            ),  # straight but for rounding
         ],
     )
     @pytest.mark.parametrize("tilted", [False, True])
@@ -251,7 +264,16 @@ class TestFaces:
         assert np.linalg.norm(across, axis=1).max() < 1.2
 
     def test_units(self, read):
-        sizes = {"mm": 1.0, "unit": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3, "nm": 1e-6}
+        sizes = {
+            "mm": 1.0,
+            "unit": 1.0,
+            "cm": 10.0,
+            "m": 1000.0,
+            "in": 25.4,
+            "pt": 25.4 / 72,
+            "um": 1e-3,
+            "nm": 1e-6,
+        }
         for unit, size in sizes.items():
             mesh = read(SQUARE, frame_unit=unit)
             np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [2 * size, 2 * size, 0], rtol=1e-14)
@@ -267,7 +289,9 @@ def _rings(radii: list[float], letters: str, count: int) -> dict:
     """Concentric regular polygons, edges only."""
     turn = 2 * math.pi / count
     return {
-        "vertices_coords": [[r * math.cos(i * turn), r * math.sin(i * turn)] for r in radii for i in range(count)],
+        "vertices_coords": [
+            [r * math.cos(i * turn), r * math.sin(i * turn)] for r in radii for i in range(count)
+        ],
         "edges_vertices": [
             [k * count + i, k * count + (i + 1) % count] for k in range(len(radii)) for i in range(count)
         ],
@@ -307,14 +331,23 @@ class TestEdgesOnly:
         [
             ({"edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]]}, "edges 4 and 5 cross"),
             ({"edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4]]}, "edge 4 (0-4) hangs loose"),
-            ({"edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 4]]}, "vertex 4 lies on edge 4 (0-2)"),
+            (
+                {"edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 4]]},
+                "vertex 4 lies on edge 4 (0-2)",
+            ),
             ({"edges_vertices": [[0, 1], [1, 2]]}, "hangs loose"),
-            ({"vertices_coords": [[0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 0], [1, 1, 0]]}, "no faces_vertices"),
+            (
+                {"vertices_coords": [[0, 0, 0], [2, 0, 0], [2, 2, 1], [0, 2, 0], [1, 1, 0]]},
+                "no faces_vertices",
+            ),
         ],
     )
     def test_not_plane(self, read, changes, words):
         with pytest.raises(FileFormatError) as caught:
-            read({"vertices_coords": SQUARE["vertices_coords"], "edges_vertices": SQUARE["edges_vertices"]}, **changes)
+            read(
+                {"vertices_coords": SQUARE["vertices_coords"], "edges_vertices": SQUARE["edges_vertices"]},
+                **changes,
+            )
         assert words in str(caught.value)
 
     def test_border_inside_the_sheet(self, read):
@@ -539,12 +572,16 @@ def test_shared_square_twist():
     assert counts == {"crease:mountain": 6, "crease:valley": 6, "edge:facet": 9}
     assert len(mesh.edge_sets["edge:boundary"]) == 12
     # the sign of every fold in space is as drawn: normals part at a mountain, so its far wing lies below
-    normals = np.cross(*(mesh.points[mesh.triangles[:, k]] - mesh.points[mesh.triangles[:, 0]] for k in (1, 2)))
+    normals = np.cross(
+        *(mesh.points[mesh.triangles[:, k]] - mesh.points[mesh.triangles[:, 0]] for k in (1, 2))
+    )
     topology = mesh.topology
     for name, sign in (("crease:mountain", -1), ("crease:valley", 1)):
         for edge in topology.find_edges(mesh.edge_sets[name]):
             hinge = topology.hinges[topology.hinge_edges.tolist().index(edge)]
-            height = normals[topology.edge_triangles[edge, 0]] @ (mesh.points[hinge[3]] - mesh.points[hinge[1]])
+            height = normals[topology.edge_triangles[edge, 0]] @ (
+                mesh.points[hinge[3]] - mesh.points[hinge[1]]
+            )
             assert height * sign > 0
 
 
@@ -564,7 +601,10 @@ class TestWriteFold:
         assert {len(row) for row in data["vertices_coords"]} == {2}
         assert data["edges_vertices"] == mesh.topology.edges.tolist()
         assert data["faces_vertices"] == mesh.triangles.tolist()
-        assert [data["edges_assignment"].count(letter) for letter in "MV"] == [6, 6]  # 4 whole cells and 2 half ones
+        assert [data["edges_assignment"].count(letter) for letter in "MV"] == [
+            6,
+            6,
+        ]  # 4 whole cells and 2 half ones
         assert data["edges_assignment"].count("B") == int((mesh.topology.edge_triangles[:, 1] < 0).sum())
         assert "edges_foldAngle" not in data
         assert os.listdir(tmp_path) == ["out.fold"]
@@ -696,7 +736,12 @@ class TestWriteMesh:
     def test_fields(self, tmp_path, suffix, capfd):
         mesh = self.mesh()
         points = mesh.points + np.array([0.0, 0.0, 3.0])
-        fields = {"u": points, "pair": points[:, :2], "number": np.arange(len(points)), "high": points[:, 0] > 0}
+        fields = {
+            "u": points,
+            "pair": points[:, :2],
+            "number": np.arange(len(points)),
+            "high": points[:, 0] > 0,
+        }
         cells = {"area": mesh.areas}
         path = tmp_path / f"out{suffix}"
         write_mesh(path, mesh, points, fields, cells)
@@ -721,7 +766,11 @@ class TestWriteMesh:
             ("out.vtu", {"cell_fields": {"b": np.zeros(36)}}, "cell field 'b' has shape (36,); give (48,)"),
             ("out.vtu", {"cell_fields": {"b": ["x"] * 48}}, "cell field 'b' is not an array of numbers"),
             ("out.vtu", {"cell_fields": {"b": [[1], [1, 2]]}}, "cell field 'b' is not an array of numbers"),
-            ("out.vtu", {"cell_fields": {"b": np.zeros(48, complex)}}, "cell field 'b' is not an array of numbers"),
+            (
+                "out.vtu",
+                {"cell_fields": {"b": np.zeros(48, complex)}},
+                "cell field 'b' is not an array of numbers",
+            ),
             ("out.vtk", {"node_fields": {"a b": np.zeros(36)}}, "spaces in field names"),
             ("out.vtu", {"points": np.zeros((3, 3))}, "points"),
             ("out.vtu", {"points": np.full((36, 3), np.inf)}, "finite"),

@@ -70,7 +70,9 @@ class TestCurves:
         assert np.quantile(np.abs(steps / curve.length - 1), 0.99) < 1e-8
 
     def test_points(self):
-        np.testing.assert_allclose(Line((1, 2), (4, 6)).point(np.array([0, 0.5, 1])), [[1, 2], [2.5, 4], [4, 6]])
+        np.testing.assert_allclose(
+            Line((1, 2), (4, 6)).point(np.array([0, 0.5, 1])), [[1, 2], [2.5, 4], [4, 6]]
+        )
         arc = Arc((1, 2), 3.0, math.pi / 2, math.pi)
         np.testing.assert_allclose(arc.point(np.array([0, 0.5, 1])), [[1, 5], [-2, 2], [1, -1]], atol=1e-15)
         line = Polyline(np.array([[0.0, 0], [3, 0], [3, 1]]))
@@ -96,7 +98,12 @@ class TestCurves:
 class TestLibrary:
     def test_strip(self):
         pattern = strip(30, 10, [2, 5], ["mountain", "valley"])
-        assert [rail.point(np.zeros(1))[0].tolist() for rail in pattern.rails] == [[0, 0], [0, 2], [0, 5], [0, 10]]
+        assert [rail.point(np.zeros(1))[0].tolist() for rail in pattern.rails] == [
+            [0, 0],
+            [0, 2],
+            [0, 5],
+            [0, 10],
+        ]
         assert pattern.folds == {"crease-1": "mountain", "crease-2": "valley"}
         assert [name for name, _ in pattern.edges] == ["inner", "outer", "start", "end"]
         assert not pattern.closed
@@ -151,9 +158,18 @@ class TestPattern:
         ("creases", "words"),
         [
             ([Crease("far", Line((5, 5), (15, 5)))], "crease 'far' leaves the sheet"),
-            ([Crease("a", Line((0, 0), (10, 10))), Crease("b", Line((0, 10), (10, 0)))], "creases 'a' and 'b' cross"),
-            ([Crease("a", Line((0, 5), (10, 5))), Crease("b", Line((2, 5), (8, 5)))], "creases 'a' and 'b' cross"),
-            ([Crease("a", Line((0, 5), (10, 5))), Crease("a", Line((0, 6), (9, 6)))], "crease name 'a' is used twice"),
+            (
+                [Crease("a", Line((0, 0), (10, 10))), Crease("b", Line((0, 10), (10, 0)))],
+                "creases 'a' and 'b' cross",
+            ),
+            (
+                [Crease("a", Line((0, 5), (10, 5))), Crease("b", Line((2, 5), (8, 5)))],
+                "creases 'a' and 'b' cross",
+            ),
+            (
+                [Crease("a", Line((0, 5), (10, 5))), Crease("a", Line((0, 6), (9, 6)))],
+                "crease name 'a' is used twice",
+            ),
             (
                 [Crease("loop", Polyline(np.array([[0.0, 0], [6, 6], [6, 0], [0, 6]])))],
                 "crease 'loop' crosses itself",
@@ -201,7 +217,9 @@ class TestPattern:
     def test_units_and_folds(self):
         with pytest.raises(PatternError, match="units 'm' are not known"):
             CreasePattern(rings=(SQUARE,), units="m")  # type: ignore[arg-type]
-        with pytest.raises(PatternError, match="fold 'Mountain' is not known; use one of mountain, valley, flat"):
+        with pytest.raises(
+            PatternError, match="fold 'Mountain' is not known; use one of mountain, valley, flat"
+        ):
             Crease("a", Line((0, 0), (1, 1)), "Mountain")  # type: ignore[arg-type]
 
 
@@ -214,7 +232,12 @@ class TestTopology:
         assert topology.hinge_edges.tolist() == [2]
         assert topology.hinges.tolist() == [[0, 1, 2, 3]]  # 0, 1, 2 runs counter-clockwise
         assert topology.triangle_edges.tolist() == [[2, 1, 0], [4, 2, 3]]
-        assert {tuple(sorted(pair)) for pair in topology.boundary.tolist()} == {(0, 1), (0, 2), (1, 3), (2, 3)}
+        assert {tuple(sorted(pair)) for pair in topology.boundary.tolist()} == {
+            (0, 1),
+            (0, 2),
+            (1, 3),
+            (2, 3),
+        }
 
     @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
     @pytest.mark.parametrize("turns", [(0, 0), (1, 0), (2, 1)])
@@ -288,7 +311,12 @@ class TestTopology:
     @pytest.mark.parametrize("rows", [1, 2, 3, 4])
     def test_euler_characteristic(self, kind, rows):
         sheets = {
-            1: [annulus_sector(50, 10, 2.0), annulus_sector([50, 60], 10, 2.0), strip(20, 4), strip(20, 4, [1, 2, 3])],
+            1: [
+                annulus_sector(50, 10, 2.0),
+                annulus_sector([50, 60], 10, 2.0),
+                strip(20, 4),
+                strip(20, 4, [1, 2, 3]),
+            ],
             0: [full_annulus(50, 10), full_annulus([50, 60, 70], 10)],
         }
         for expected, patterns in sheets.items():
@@ -313,7 +341,9 @@ class TestStructured:
             errors = np.array([abs(mesh.areas.sum() - exact) for mesh in meshes_]) / exact
             np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 2.0, atol=0.06)
             assert errors[-1] < 2e-3
-        assert structured(strip(7, 3, [1]), along=5, rows=rows, kind=kind).areas.sum() == pytest.approx(21, rel=1e-14)
+        assert structured(strip(7, 3, [1]), along=5, rows=rows, kind=kind).areas.sum() == pytest.approx(
+            21, rel=1e-14
+        )
 
     def test_named_sets_lie_on_their_curves(self, kind, rows):
         for pattern in (annulus_sector([60, 75], 10, 1.5), full_annulus(60, 10), strip(20, 5, [2, 3])):
@@ -336,7 +366,9 @@ class TestStructured:
         for pattern in (annulus_sector([60, 75], 10, 1.5), full_annulus(60, 10)):
             mesh = structured(pattern, along=30, rows=rows, kind=kind)
             rim = mesh.topology.edge_triangles[:, 1] < 0
-            named = [mesh.topology.find_edges(p) for name, p in mesh.edge_sets.items() if name.startswith("edge:")]
+            named = [
+                mesh.topology.find_edges(p) for name, p in mesh.edge_sets.items() if name.startswith("edge:")
+            ]
             assert sorted(np.concatenate(named).tolist()) == np.flatnonzero(rim).tolist()
             for crease in mesh.creases:
                 assert not rim[mesh.topology.find_edges(mesh.crease_edges(crease))].any()
@@ -427,7 +459,10 @@ class TestDiagonals:
 
     def test_staggered(self):
         slopes = self.slopes("staggered")
-        assert slopes == {0.5: [1, -1] * 4, 1.5: [-1, 1] * 4} or slopes == {0.5: [-1, 1] * 4, 1.5: [1, -1] * 4}
+        assert slopes == {0.5: [1, -1] * 4, 1.5: [-1, 1] * 4} or slopes == {
+            0.5: [-1, 1] * 4,
+            1.5: [1, -1] * 4,
+        }
 
     def test_staggered_crease_has_whole_cells(self):
         mesh = structured(strip(4, 2, [1]), along=4)
@@ -467,7 +502,9 @@ def test_rails_that_run_clockwise_give_counter_clockwise_triangles():
     """The turning sense comes from the positions, not from the order of the rails."""
     rails = tuple(Line((0, y), (5, y)) for y in (2.0, 1.0, 0.0))
     pattern = CreasePattern(
-        rings=(np.array([[0.0, 0], [5, 0], [5, 2], [0, 2]]),), creases=(Crease("crease", rails[1]),), rails=rails
+        rings=(np.array([[0.0, 0], [5, 0], [5, 2], [0, 2]]),),
+        creases=(Crease("crease", rails[1]),),
+        rails=rails,
     )
     for kind in KINDS:
         mesh = structured(pattern, along=4, kind=kind)
@@ -522,8 +559,18 @@ class TestSheetMesh:
             ([[0, 0], [1, 0], [0, math.nan]], [[0, 1, 2]], {}, "node 2 is not finite"),
             ([0, 1, 2], [[0, 1, 2]], {}, "points must be an array (n, 3)"),
             ([[0, 0], [1, 0], [0, 1]], [[0, 1, 3]], {}, "triangle 0 names a node outside"),
-            ([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], {"edge_sets": {"edge:x": [[0, 3]]}}, "not joined by an edge"),
-            ([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], {"spans": np.zeros((2, 2))}, "spans must have one row an edge"),
+            (
+                [[0, 0], [1, 0], [0, 1]],
+                [[0, 1, 2]],
+                {"edge_sets": {"edge:x": [[0, 3]]}},
+                "not joined by an edge",
+            ),
+            (
+                [[0, 0], [1, 0], [0, 1]],
+                [[0, 1, 2]],
+                {"spans": np.zeros((2, 2))},
+                "spans must have one row an edge",
+            ),
         ],
     )
     def test_errors(self, points, triangles, more, words):
@@ -544,7 +591,9 @@ class TestSheetMesh:
         assert mesh.nodes("node:3").tolist() == [3]
         assert mesh.crease_edges("crease").shape == (4, 2)
 
-    @pytest.mark.parametrize("place", ["", "node:", "node:99", "node:-1", "node:1.5", "node:²", "edge:left", "crease"])
+    @pytest.mark.parametrize(
+        "place", ["", "node:", "node:99", "node:-1", "node:1.5", "node:²", "edge:left", "crease"]
+    )
     def test_unknown_places(self, place):
         with pytest.raises(MeshError) as caught:
             self.mesh().nodes(place)

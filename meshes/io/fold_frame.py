@@ -1,0 +1,212 @@
+"""One frame of a FOLD file, read and checked."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshes.curves import Array
+from meshes.errors import FileFormatError
+
+UNITS = {
+    "unit": 1.0, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "pt": 25.4 / 72.0, "um": 1e-3, "nm": 1e-6,
+}  # fmt: skip
+LETTERS = "MVFBUCJ"
+LIMIT = 1e12  # mm; beyond it products of coordinates lose all meaning
+
+Face = list[list[int]]  # rings of vertices: the outside, then holes the other way round
+Side = tuple[int, int]  # two vertices, the smaller one first
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame, checked: what the file says about points (n, 3) in mm, edges and faces."""
+
+    points: Array
+    edges: list[Side]
+    letters: list[str]
+    angles: list[float] | None  # degrees, valley positive; nan where the file has null
+    faces: list[Face]
+
+    @cached_property
+    def flat(self) -> bool:
+        return bool(np.ptp(self.points[:, 2]) <= 1e-9 * np.linalg.norm(np.ptp(self.points, axis=0)))
+
+
+def load(path: str | os.PathLike[str]) -> dict[str, Any]:
+    def refuse(constant: str) -> None:
+        raise FileFormatError(f"{constant} is not JSON; write a number")
+
+    try:
+        text = Path(path).read_bytes().decode("utf-8-sig")
+        if not text.strip():
+            raise FileFormatError("the file is empty; give a FOLD file")
+        data = json.loads(text, parse_constant=refuse)
+    except IsADirectoryError as error:
+        raise FileFormatError("this is a folder; name a .fold file in it") from error
+    except OSError as error:
+        raise FileFormatError(f"cannot be read ({error.strerror}); check the name and rights") from error
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
+    except RecursionError as error:
+        raise FileFormatError("brackets are nested too deeply; FOLD has only lists of lists") from error
+    except FileFormatError:
+        raise
+    except ValueError as error:  # JSON errors, numbers of thousands of digits, null characters in the path
+        raise FileFormatError(f"this is not JSON ({str(error)[:80]}); mend it or export it again") from error
+    if not isinstance(data, dict):
+        raise FileFormatError(f"the top of the file is {show(data)}; a FOLD file is a JSON object {{...}}")
+    return data
+
+
+def select(data: dict[str, Any], frame: int | None) -> dict[str, Any]:
+    """The frame asked for, with all it inherits."""
+    frames = [data, *_list(data, "file_frames")]
+    for number, each in enumerate(frames):
+        if not isinstance(each, dict):
+            raise FileFormatError(f"file_frames[{number - 1}] is {show(each)}; a frame is an object {{...}}")
+    if frame is not None:
+        if isinstance(frame, bool) or not isinstance(frame, int | np.integer) or not 0 <= frame < len(frames):
+            raise FileFormatError(f"there is no frame {frame!r}; the file has frames 0 to {len(frames) - 1}")
+        return _inherited(frames, int(frame))
+    for number in range(len(frames)):
+        found = _inherited(frames, number)
+        if found.get("vertices_coords"):
+            return found
+    raise FileFormatError("no frame has vertices_coords; give the coordinates of the vertices")
+
+
+def _inherited(frames: list[dict[str, Any]], number: int) -> dict[str, Any]:
+    line = [number]
+    while True:
+        inherit = frames[line[-1]].get("frame_inherit", False)
+        if not isinstance(inherit, bool):
+            raise FileFormatError(f"frame_inherit of frame {line[-1]} is {show(inherit)}; use true or false")
+        if not inherit:
+            break
+        parent = frames[line[-1]].get("frame_parent")
+        parent = _index(parent, len(frames), f"frame_parent of frame {line[-1]}")
+        if parent in line:
+            raise FileFormatError(f"frame {line[-1]} inherits from itself by frame {parent}; break the loop")
+        line.append(parent)
+    merged: dict[str, Any] = {}
+    for each in reversed(line):
+        merged.update(frames[each])
+    return merged
+
+
+def check(frame: dict[str, Any]) -> Frame:
+    points = _points(frame)
+    count = len(points)
+    edges: list[Side] = []
+    numbers: dict[Side, int] = {}
+    for number, pair in enumerate(_list(frame, "edges_vertices")):
+        what = f"edges_vertices[{number}]"
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise FileFormatError(f"{what} is {show(pair)}; an edge is a list of two vertex numbers")
+        a, b = (_index(vertex, count, f"a vertex of {what}") for vertex in pair)
+        if a == b:
+            raise FileFormatError(f"{what} joins vertex {a} to itself; remove it")
+        if side(a, b) in numbers:
+            raise FileFormatError(f"{what} repeats edge {numbers[side(a, b)]} ({a}-{b}); remove one of them")
+        numbers[side(a, b)] = number
+        edges.append((a, b))
+    angles = _angles(frame, len(edges))
+    letters = _letters(frame, len(edges), angles)
+    faces: list[Face] = []
+    for number, ring in enumerate(_list(frame, "faces_vertices")):
+        what = f"faces_vertices[{number}]"
+        if not isinstance(ring, list) or len(ring) < 3:
+            raise FileFormatError(f"{what} is {show(ring)}; a face is a list of three or more vertices")
+        ring = [_index(vertex, count, f"a vertex of {what}") for vertex in ring]
+        if len(set(ring)) < len(ring):
+            raise FileFormatError(f"{what} uses a vertex twice; name every corner once, split slit faces")
+        faces.append([ring])
+    if not faces and not edges:
+        raise FileFormatError("the frame has no faces_vertices and no edges_vertices; give one of them")
+    return Frame(points, edges, letters, angles, faces)
+
+
+def _points(frame: dict[str, Any]) -> Array:
+    unit = frame.get("frame_unit", "unit")
+    if not isinstance(unit, str) or unit not in UNITS:
+        raise FileFormatError(f"frame_unit {show(unit)} is not known; use one of {', '.join(UNITS)}")
+    rows = _list(frame, "vertices_coords")
+    if not rows:
+        raise FileFormatError("the frame has no vertices_coords; give [x, y] or [x, y, z] for every vertex")
+    points = np.zeros((len(rows), 3))
+    for vertex, row in enumerate(rows):
+        if not isinstance(row, list) or len(row) not in (2, 3):
+            raise FileFormatError(f"vertices_coords[{vertex}] is {show(row)}; give [x, y] or [x, y, z]")
+        for axis, value in enumerate(row):
+            if not _is_number(value) or not abs(value) <= LIMIT / UNITS[unit]:
+                raise FileFormatError(
+                    f"vertices_coords[{vertex}] holds {show(value)}; give numbers up to {LIMIT:g} mm in size"
+                )
+            points[vertex, axis] = value
+    return points * UNITS[unit]
+
+
+def _angles(frame: dict[str, Any], count: int) -> list[float] | None:
+    if frame.get("edges_foldAngle") is None:
+        return None
+    values = _list(frame, "edges_foldAngle")
+    _same_length("edges_foldAngle", len(values), count)
+    for edge, value in enumerate(values):
+        if value is not None and not (_is_number(value) and abs(value) <= 180.0 + 1e-9):
+            raise FileFormatError(f"edges_foldAngle[{edge}] is {show(value)}; give degrees from -180 to 180")
+    return [math.nan if value is None else float(value) for value in values]
+
+
+def _letters(frame: dict[str, Any], count: int, angles: list[float] | None) -> list[str]:
+    if frame.get("edges_assignment") is None:  # then the sign of the angle says which crease it is
+        return ["M" if angle < 0.0 else "V" if angle > 0.0 else "U" for angle in angles or [0.0] * count]
+    letters = _list(frame, "edges_assignment")
+    _same_length("edges_assignment", len(letters), count)
+    for edge, letter in enumerate(letters):
+        if not isinstance(letter, str) or len(letter) != 1 or letter not in LETTERS:
+            raise FileFormatError(f"edges_assignment[{edge}] is {show(letter)}; use one of {LETTERS}")
+    return letters
+
+
+def _same_length(key: str, length: int, count: int) -> None:
+    if length != count:
+        raise FileFormatError(f"{key} has {length} entries for {count} edges_vertices; give one an edge")
+
+
+def _list(frame: dict[str, Any], key: str) -> list[Any]:
+    value = frame.get(key)
+    if value is None:
+        return []
+    if not isinstance(value, list):
+        raise FileFormatError(f"{key} is {show(value)}; give a list")
+    return value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _index(value: object, count: int, what: str) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < count:
+        raise FileFormatError(f"{what} is {show(value)}; use a whole number from 0 to {count - 1}")
+    return value
+
+
+def show(value: object) -> str:
+    """A JSON value in a few characters of ASCII on one line (lists and objects can be nested deeply)."""
+    if isinstance(value, dict | list):
+        return "an object" if isinstance(value, dict) else f"a list of {len(value)}"
+    text = json.dumps(value)
+    return text if len(text) <= 40 else f"{text[:36]} ..."
+
+
+def side(a: int, b: int) -> Side:
+    return (a, b) if a < b else (b, a)
