@@ -11,7 +11,7 @@ import pytest
 import bh
 from bh.formulations import formulation
 from bh.program import program
-from bh.solvers.continuation import point
+from bh.solvers.increments import point
 from bh.solvers.trace import Walk, walk
 from verification.appendix_b import model
 

@@ -14,13 +14,16 @@ if TYPE_CHECKING:
     from bh.model import CreaseLaw, Model, Sheet
     from bh.path import Path, trace
     from bh.scene import load_scene
+    from bh.solvers.arc_length import ArcLength
+    from bh.solvers.automatic import Automatic
     from bh.solvers.continuation import LoadControl
     from bh.solvers.newton import Newton
     from bh.state import Energy, State
     from bh.supports import RigidBody, Support
 
 _HOME = {
-    "CreaseLaw": "bh.model", "Displace": "bh.actuation", "Energy": "bh.state", "Fold": "bh.actuation",
+    "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic", "CreaseLaw": "bh.model",
+    "Displace": "bh.actuation", "Energy": "bh.state", "Fold": "bh.actuation",
     "Force": "bh.actuation", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
     "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
     "Path": "bh.path", "PathFileError": "bh.errors", "RigidBody": "bh.supports", "SceneError": "bh.errors",
@@ -30,7 +33,8 @@ _HOME = {
 _SUBMODULES = ("plotting",)
 
 __all__ = [
-    "CreaseLaw", "Displace", "Energy", "Fold", "Force", "InputError", "LoadControl", "Model", "ModelError", "Moment",
+    "ArcLength", "Automatic", "CreaseLaw", "Displace", "Energy", "Fold", "Force",
+    "InputError", "LoadControl", "Model", "ModelError", "Moment",
     "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "load_scene", "trace",
 ]  # fmt: skip
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ class Sheet:
     def __post_init__(self) -> None:
         for name, unit in (("E", "MPa"), ("t", "mm")):
             value = getattr(self, name)
-            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0.0):
+            if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
                 raise ModelError(f"sheet {name} = {value} cannot be; give a positive number in {unit}")
         if not -1.0 < self.nu <= 0.5:
             raise ModelError(f"sheet nu = {self.nu} cannot be; Poisson's ratio lies in (-1, 0.5]")

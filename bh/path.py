@@ -21,8 +21,9 @@ from bh.formulations import Formulation, formulation
 from bh.model import Model
 from bh.program import StepProgram, program
 from bh.progress import ProgressMeter, meter
-from bh.solvers.continuation import Increment, LoadControl, Point, point
-from bh.solvers.trace import Walk, walk
+from bh.solvers.automatic import Automatic
+from bh.solvers.increments import Increment, Point, point
+from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
 from bh.storage import PathFile, StateRow, reading
 
@@ -185,7 +186,7 @@ def trace(
     model: Model,
     *,
     progress: bool | ProgressMeter = False,
-    strategy: LoadControl | None = None,
+    strategy: Strategy | None = None,
     file: str | FilePath | None = None,
     resume: bool = False,
 ) -> Path:
@@ -207,13 +208,14 @@ def trace(
     """
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
-    strategy = strategy or LoadControl()
+    strategy = strategy or Automatic()
     path = Path(model)
     target: PathFile | None = None
     if file is not None:
         if resume:
             path, target = _resume(model, FilePath(file))
         else:
+            path._system(0)  # a model that cannot be solved must not replace the file of one that was
             target = _new_file(path, FilePath(file))
     report = meter(progress)
     try:
@@ -232,7 +234,7 @@ def trace(
 
 
 def _run_step(
-    path: Path, step: int, strategy: LoadControl, report: ProgressMeter, target: PathFile | None
+    path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
 ) -> StepOutcome:
     system = path._system(step)
     began = time.perf_counter()
@@ -242,6 +244,7 @@ def _run_step(
         if target is not None:
             target.add(path._row(len(path.records) - 1, record))
 
+    increment: float | None = None
     done = [record for record in path.records if record.step == step]
     if not done:
         q = system.start()
@@ -252,13 +255,14 @@ def _run_step(
                 Record(0, 0.0, q, 0, imbalance, None, time.perf_counter() - began, strategy.limits(system)[0])
             )
             began = time.perf_counter()
-        history, increment = [here], None
+        history = [here]
     else:
-        history, increment = (
-            [point(system, record.q, record.lam) for record in done[-3:]],
-            done[-1].next_increment,
-        )
-        if len(done) < 3 and (step > 0 or done[0].lam == 0.0) and done[0].lam > 0.0:
+        # after a jump to another branch the extrapolation began anew there (`LoadControl.follow`)
+        jumps = [index for index, record in enumerate(done) if record.note]
+        recent = done[max(len(done) - 3, jumps[-1] if jumps else 0) :]
+        history = [point(system, record.q, record.lam) for record in recent]
+        increment = done[-1].next_increment
+        if len(history) < 3 and step > 0 and not jumps:  # later steps do not store where they begin
             history.insert(0, point(system, system.start(), 0.0))
     journey: Iterator[Increment] = walk(Walk(system, strategy, tuple(history), increment))
     for increment_ in journey:

@@ -1,28 +1,22 @@
 """Pictures of folded sheets, curves of energy, and series for ParaView.
 
-Pictures are rendered by pyvista without a window and framed by matplotlib, both imported when first needed. On
-Linux rendering needs EGL, OSMesa or an X server. Which of them works is found out before VTK is asked, because
-VTK ends the whole process where it finds none.
+Pictures are rendered by pyvista without a window (`bh.offscreen`) and framed by matplotlib, both imported when
+first needed.
 """
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import os
 import shutil
-import sys
 import tempfile
 import uuid
-from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from meshes.errors import InputError
+from bh.offscreen import PlotError, has_display, render
 from meshes.io.export import replacing, write_mesh
 
 if TYPE_CHECKING:
@@ -43,10 +37,6 @@ CURVES = {
     "folding": ("#009e73", (0, (1.2, 1.2))),
 }
 MOST_EDGES = 20_000  # triangles of a mesh whose edges can still be told apart in a picture
-
-
-class PlotError(InputError):
-    """A picture, curve or series that cannot be made or written."""
 
 
 class Colouring(NamedTuple):
@@ -113,7 +103,7 @@ def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
     Raises:
         PlotError: an unknown colour, or there is no display.
     """
-    if not _has_display():
+    if not has_display():
         raise PlotError("no display to show the sheet on; use bh.plotting.picture(state, 'sheet.png')")
     import pyvista as pv
     from matplotlib.font_manager import findfont
@@ -397,22 +387,14 @@ def _axes(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
 
 def _render(state: State, colouring: Colouring | None, size: tuple[int, int], camera: Camera) -> Array:
     """(height, width, 3) picture of the sheet alone, values in [0, 1]."""
-    width, height = size
-    with _off_screen():
-        import pyvista as pv
+    _, height = size
+    pixel = 2.0 * camera.half_height / height * max(height / 700.0, 0.5)
 
-        # drawn twice as large and averaged: the same smooth lines from every driver
-        plotter = pv.Plotter(off_screen=True, window_size=[2 * width, 2 * height], lighting="none")
-        try:
-            plotter.add_light(pv.Light(light_type="headlight", intensity=0.6))
-            plotter.add_light(pv.Light(position=(-0.8, 0.9, 0.7), light_type="camera light", intensity=0.55))
-            _draw(plotter, state, colouring, 2.0 * camera.half_height / height * max(height / 700.0, 0.5))
-            camera.aim(plotter)
-            image = np.asarray(plotter.screenshot(return_img=True), dtype=float)[..., :3] / 255.0
-        finally:
-            plotter.close()
-    averaged: Array = image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
-    return averaged
+    def draw(plotter: Any) -> None:
+        _draw(plotter, state, colouring, pixel)
+        camera.aim(plotter)
+
+    return render(size, draw)
 
 
 def _frame(
@@ -449,80 +431,6 @@ def _frame(
 def _unit(width: int, height: int) -> float:
     """Size of texts: 1 in a picture of 1200 x 900 pixels, still to be read in small ones."""
     return max(min(width / 1200, height / 500), 0.5)
-
-
-@contextlib.contextmanager
-def _off_screen() -> Iterator[None]:
-    """Let VTK make its window from a library that is there, and leave the environment as it was."""
-    key = "VTK_DEFAULT_OPENGL_WINDOW"
-    chosen, before = _window(), os.environ.get(key)
-    if chosen and before is None:
-        os.environ[key] = chosen
-    try:
-        yield
-    finally:
-        if chosen and before is None:
-            os.environ.pop(key, None)
-
-
-def _window() -> str:
-    """VTK's kind of window to draw in off screen; "" to let VTK choose."""
-    if not sys.platform.startswith("linux"):
-        return ""
-    if _egl_works():
-        return "vtkEGLRenderWindow"
-    if any(_library(name) for name in ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")):
-        return "vtkOSOpenGLRenderWindow"
-    if _has_display():
-        return "vtkXOpenGLRenderWindow"
-    raise PlotError(
-        "pictures need an OpenGL library; on Debian or Ubuntu: apt-get install libegl1 libgl1-mesa-dri"
-    )
-
-
-@lru_cache(maxsize=1)
-def _egl_works() -> bool:
-    """True if EGL can be set up on some device (a processor will do). It stays set up, VTK shares it."""
-    egl = _library("libEGL.so.1")
-    if egl is None:
-        return False
-    egl.eglGetProcAddress.restype = ctypes.c_void_p
-    query = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
-    platform = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
-    if not (query and platform):
-        return False
-    pointer, number = ctypes.c_void_p, ctypes.c_int
-    query_devices = ctypes.CFUNCTYPE(number, number, pointer, pointer)(query)
-    display_of = ctypes.CFUNCTYPE(pointer, number, pointer, pointer)(platform)
-    egl.eglInitialize.argtypes = (pointer, pointer, pointer)
-    devices, count = (pointer * 16)(), number()
-    if not query_devices(16, devices, ctypes.byref(count)):
-        return False
-    device_platform = 0x313F  # EGL_PLATFORM_DEVICE_EXT
-    displays = (display_of(device_platform, devices[i], None) for i in range(count.value))
-    return any(display and egl.eglInitialize(display, None, None) for display in displays)
-
-
-def _has_display() -> bool:
-    """True if a window can be opened."""
-    if not sys.platform.startswith("linux"):
-        return True
-    x11 = _library("libX11.so.6") if os.environ.get("DISPLAY") else None
-    if x11 is None:
-        return False
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    x11.XCloseDisplay.argtypes = (ctypes.c_void_p,)
-    display = x11.XOpenDisplay(None)
-    if display:
-        x11.XCloseDisplay(display)
-    return bool(display)
-
-
-def _library(name: str) -> ctypes.CDLL | None:
-    try:
-        return ctypes.CDLL(name)
-    except OSError:
-        return None
 
 
 def _swap(new: FilePath, place: FilePath) -> None:

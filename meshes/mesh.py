@@ -66,7 +66,10 @@ class SheetMesh:
                 for key, value in getattr(self, name).items()
             }
             set_(self, name, MappingProxyType(frozen))
-        for name in ("corners", "folds", "curves"):
+        # plain integers, also of NumPy's, which JSON does not know
+        corners = {name: int(node) for name, node in self.corners.items()}
+        set_(self, "corners", MappingProxyType(corners))
+        for name in ("folds", "curves"):
             set_(self, name, MappingProxyType(dict(getattr(self, name))))
         topology = self.topology
         _check_triangles(points, self.triangles)

@@ -3,46 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.increments import Increment, Point, extrapolate, point
 from bh.solvers.newton import Newton, Solution
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Point:
-    """A converged state on the way of one step: lambda, unknowns, element forces and the rate of work there."""
-
-    lam: float
-    q: Array
-    forces: Array
-    energy: float
-    power: float
-
-
-@dataclass(frozen=True)
-class Increment:
-    """What one increment of lambda came to.
-
-    `outcome` is "reached" for an accepted state; else it names why the step could not go on and `point` is the last
-    accepted state. `cuts` tells why the increment was cut before it was accepted.
-    """
-
-    point: Point
-    outcome: str
-    iterations: int
-    imbalance: float
-    stable: bool | None
-    next_increment: float
-    cuts: tuple[str, ...] = ()
-    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -96,7 +68,7 @@ class LoadControl:
             # do not leave a crumb for the end
             lam = 1.0 if step > 0.999 * left else here.lam + (0.5 * left if step > 0.7 * left else step)
             q, forces = extrapolate(points, lam)
-            solution = self.newton.solve(system, q, lam, forces)
+            solution = self.newton.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
             iterations += solution.iterations
             note = ""
             if solution.converged and not solution.stable:
@@ -137,6 +109,25 @@ class LoadControl:
             )
             cuts, iterations = [], 0
 
+    @staticmethod
+    def _tangent_guess(
+        system: System, points: Sequence[Point], lam: float
+    ) -> Callable[[], tuple[Array, Array]] | None:
+        """The first-order prediction from the last point: less accurate, but of the path's own tangent.
+
+        Where the path bends sharply the extrapolated forces can make a tangent indefinite that is not.
+        """
+        if len(points) < 2:
+            return None
+
+        def guess() -> tuple[Array, Array]:
+            here = points[-1]
+            factor, _ = system.tangent(here.q, here.lam, here.forces).factorise_any()
+            change = -(lam - here.lam) * factor.solve(system.control_rate(here.q, here.lam))
+            return here.q + change, system.predicted_forces(here.forces, change)
+
+        return guess
+
     def _objection(
         self, system: System, here: Point, solution: Solution, lam: float, left_saddle: bool
     ) -> str:
@@ -157,27 +148,3 @@ class LoadControl:
         if abs(gained - work) > self.work_mismatch * size + noise:
             return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
         return ""
-
-
-def point(system: System, q: Array, lam: float) -> Point:
-    """The point of a path at given unknowns."""
-    evaluation = system.evaluate(q, lam)
-    return Point(lam, q, evaluation.forces, evaluation.energy, system.power(q, lam))
-
-
-def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:
-    """Unknowns and element forces at `lam` by the polynomial through up to three points (constant, line, parabola)."""
-    q, forces = np.zeros_like(points[-1].q), np.zeros_like(points[-1].forces)
-    for i, item in enumerate(points):
-        weight = 1.0
-        for j, other in enumerate(points):
-            if j != i:
-                weight *= (lam - other.lam) / (item.lam - other.lam)
-        q += weight * item.q
-        forces += weight * item.forces
-    return q, forces
-
-
-def with_newton(strategy: LoadControl, newton: Newton) -> LoadControl:
-    """A copy of a strategy that solves with another Newton."""
-    return replace(strategy, newton=newton)

@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+TINY_SHIFT = 1e-12  # shifts up to this only take rounding off
+MOST_DENSE = 4000  # constraints whose Schur complement is still formed as a dense matrix
+
+
 class IndefiniteError(ArithmeticError):
     """The matrix is not positive definite (for multipliers: not so on the constraint's null space).
 
@@ -45,6 +49,13 @@ class Matrix(Protocol):
         """Factor of A + shift * diag(|A|); raises `IndefiniteError`."""
         ...
 
+    def factorise_any(self) -> tuple[Factor, int]:
+        """Factor of A, definite or not, and its number of negative eigenvalues (on the constraints' null space).
+
+        Raises `IndefiniteError` only where A is singular to rounding.
+        """
+        ...
+
     def __matmul__(self, x: Array) -> Array: ...
 
 
@@ -66,6 +77,16 @@ class BandMatrix:
         if info != 0:
             raise IndefiniteError(1)
         return BandFactor(factor, self.order)
+
+    def factorise_any(self) -> tuple[Factor, int]:
+        try:
+            return self.factorise(), 0
+        except IndefiniteError:
+            ab = self.ab.copy(order="F")
+            negative = band_ldl(ab)
+            if negative < 0:
+                raise IndefiniteError(1) from None
+            return BandLDLFactor(ab, self.order), negative
 
     def __matmul__(self, x: Array) -> Array:
         y = x[self.order]
@@ -102,6 +123,53 @@ class BandFactor:
         return -self.solve(residual)
 
 
+@njit(cache=True, nogil=True)
+def band_ldl(ab):  # type: ignore[no-untyped-def]
+    """L D L^T of a symmetric band in place (unit L below, D in the first row), without pivoting.
+
+    Returns the number of negative pivots, which is the number of negative eigenvalues (Sylvester), or -1 where a pivot
+    vanishes beside its column. LAPACK has no such routine; its pivoting ones destroy the band.
+    """
+    width, n = ab.shape
+    negative = 0
+    for j in range(n):
+        pivot = ab[0, j]
+        largest = 0.0
+        rows = min(width, n - j)
+        for i in range(1, rows):
+            largest = max(largest, abs(ab[i, j]))
+        if abs(pivot) <= 1e-15 * largest or pivot == 0.0:
+            return -1
+        if pivot < 0.0:
+            negative += 1
+        for i in range(1, rows):
+            scaled = ab[i, j] / pivot
+            for k in range(i, rows):
+                ab[k - i, j + i] -= scaled * ab[k, j]
+        for i in range(1, rows):
+            ab[i, j] /= pivot
+    return negative
+
+
+@dataclass(frozen=True)
+class BandLDLFactor:
+    """Factor of an indefinite band."""
+
+    ab: Array
+    order: Ints
+
+    def solve(self, b: Array) -> Array:
+        unit = {"uplo": "L", "diag": "U"}
+        x, _ = lapack.dtbtrs(self.ab, b[self.order], trans="N", **unit)
+        x, _ = lapack.dtbtrs(self.ab, x / self.ab[0], trans="T", **unit)
+        out = np.empty_like(b)
+        out[self.order] = x
+        return out
+
+    def descend(self, residual: Array) -> Array:
+        raise IndefiniteError(1)
+
+
 # ---------------------------------------------------------------------------------------------- sparse
 
 
@@ -113,6 +181,15 @@ class SparseMatrix:
     order: Ints
 
     def factorise(self, shift: float = 0.0) -> SparseFactor:
+        factor, negative = self._factorise(shift)
+        if negative:
+            raise IndefiniteError(negative)
+        return factor
+
+    def factorise_any(self) -> tuple[Factor, int]:
+        return self._factorise(0.0)
+
+    def _factorise(self, shift: float) -> tuple[SparseFactor, int]:
         from scipy.sparse.linalg import splu
 
         A = self.csc
@@ -130,9 +207,7 @@ class SparseMatrix:
             raise IndefiniteError(1) from singular
         # with diagonal pivots U = D L^T, so the signs on the diagonal of U are the inertia (Sylvester)
         negative = int((factor.U.diagonal() <= 0.0).sum())
-        if negative:
-            raise IndefiniteError(negative)
-        return SparseFactor(factor, self.order)
+        return SparseFactor(factor, self.order), negative
 
     def __matmul__(self, x: Array) -> Array:
         out = np.empty_like(x)
@@ -178,6 +253,10 @@ class FreeBodyMatrix:
 
     def factorise(self, shift: float = 0.0) -> FreeBodyFactor:
         return FreeBodyFactor(self.grounded.factorise(shift), self.Z)
+
+    def factorise_any(self) -> tuple[Factor, int]:
+        factor, negative = self.grounded.factorise_any()
+        return FreeBodyFactor(factor, self.Z), negative
 
     def __matmul__(self, x: Array) -> Array:
         out = self.grounded @ x
@@ -250,8 +329,27 @@ class MultiplierMatrix:
     G: ConstraintRows
     gamma: Array  # (c,) one for each constraint
 
-    def factorise(self, shift: float = 0.0) -> MultiplierFactor:
-        return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma)
+    def factorise(self, shift: float = 0.0) -> MultiplierFactor | DenseSchurFactor:
+        try:
+            return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma)
+        except IndefiniteError:
+            if shift > TINY_SHIFT:
+                raise
+        # large moments in the constraints can outweigh gamma: A is indefinite, the state on the constraints is not
+        factor, negative = self.factorise_any()
+        if negative > 0 or isinstance(factor, MultiplierFactor):
+            raise IndefiniteError(max(negative, 1))
+        return factor  # type: ignore[return-value]
+
+    def factorise_any(self) -> tuple[Factor, int]:
+        factor, negative = self.augmented.factorise_any()
+        if negative == 0:
+            return MultiplierFactor(factor, self.G, self.gamma), 0
+        if len(self.gamma) > MOST_DENSE:
+            raise IndefiniteError(negative)
+        whole = DenseSchurFactor.of(factor, self.G)
+        # inertia of the saddle is that of A and of -S; its c constraints take c of the negative ones (Gould 1985)
+        return whole, negative - int((whole.schur_values < 0.0).sum())
 
     def __matmul__(self, x: Array) -> Array:
         n = self.G.n
@@ -313,6 +411,39 @@ class MultiplierFactor:
         n = self.G.n
         x = -self.factor.solve(residual[:n])
         return np.concatenate((x, self.gamma * (residual[n:] + self.G.times(x))))
+
+
+@dataclass(frozen=True)
+class DenseSchurFactor:
+    """Factor of a saddle matrix whose first block is indefinite; its Schur complement G A^-1 G^T is dense."""
+
+    factor: Factor
+    G: ConstraintRows
+    influence: Array  # (n, c) A^-1 G^T
+    schur: Array
+    schur_values: Array
+
+    @classmethod
+    def of(cls, factor: Factor, G: ConstraintRows) -> DenseSchurFactor:
+        count = len(G.values)
+        influence = np.empty((G.n, count))
+        schur = np.empty((count, count))
+        for k in range(count):
+            unit = np.zeros(count)
+            unit[k] = 1.0
+            influence[:, k] = factor.solve(G.transpose_times(unit))
+            schur[:, k] = G.times(influence[:, k])
+        schur = 0.5 * (schur + schur.T)
+        return cls(factor, G, influence, schur, np.asarray(np.linalg.eigvalsh(schur), dtype=float))
+
+    def solve(self, b: Array) -> Array:
+        n = self.G.n
+        x = self.factor.solve(b[:n])
+        y = np.linalg.solve(self.schur, self.G.times(x) - b[n:])
+        return np.concatenate((x - self.influence @ y, y))
+
+    def descend(self, residual: Array) -> Array:
+        return -self.solve(residual)
 
 
 def reverse_cuthill_mckee(rows: Ints, columns: Ints, n: int) -> tuple[Ints, int]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +52,23 @@ class Newton:
     careful: int = 200
     bold_shift: float = 1e-5
 
-    def solve(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
-        """Equilibrium at `lam` from the guess `q`; `forces` are the element forces that go with the guess."""
+    def solve(
+        self,
+        system: System,
+        q: Array,
+        lam: float,
+        forces: Array | None = None,
+        second_guess: Callable[[], tuple[Array, Array]] | None = None,
+    ) -> Solution:
+        """Equilibrium at `lam` from the guess `q`; `forces` are the element forces that go with the guess.
+
+        `second_guess` makes another one, tried boldly before the careful way.
+        """
         first = self.solve_boldly(system, q, lam, forces)
+        if not first.converged and second_guess is not None:
+            spent = first.iterations
+            first = self.solve_boldly(system, *_with_lambda(second_guess(), lam))
+            first = replace(first, iterations=first.iterations + spent)
         if first.converged or self.careful == 0:
             return first
         second = self.solve_carefully(system, q, lam)
@@ -136,6 +151,10 @@ class Newton:
         except IndefiniteError:
             stable = False
         return Solution(q, now, iterations, True, "", stable, careful)
+
+
+def _with_lambda(guess: tuple[Array, Array], lam: float) -> tuple[Array, float, Array]:
+    return guess[0], lam, guess[1]
 
 
 def factorise_shifted(matrix: Matrix, shift: float, largest: float = 1e6) -> tuple[Factor | None, float]:

@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-from bh.solvers.continuation import Increment, LoadControl, Point
+from bh.solvers.increments import Increment, Point
 from bh.solvers.system import System
+
+
+class Strategy(Protocol):
+    """How a step is walked: load control, arc length, or one that chooses."""
+
+    def limits(self, system: System) -> tuple[float, float]:
+        """First and largest increment of lambda for a system."""
+        ...
+
+    def follow(
+        self, system: System, history: Sequence[Point], increment: float | None = None
+    ) -> Iterator[Increment]:
+        """Accepted increments from the last of up to three points to lambda = 1, or one failure last."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -14,7 +29,7 @@ class Walk:
     """A step to be walked: from the last point of `history` (up to three) to lambda = 1."""
 
     system: System
-    strategy: LoadControl
+    strategy: Strategy
     history: tuple[Point, ...]
     increment: float | None = None
 

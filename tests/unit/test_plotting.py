@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -15,13 +16,13 @@ from numpy.typing import NDArray
 
 import bh
 import meshes
-from bh import plotting
+from bh import offscreen, plotting
 from meshes.errors import InputError
 
 
 def drawable() -> bool:
     try:
-        plotting._window()
+        offscreen.window()
     except plotting.PlotError:
         return False
     return True
@@ -98,7 +99,7 @@ def test_environment_stays_as_it_was(
 ) -> None:
     monkeypatch.delenv("VTK_DEFAULT_OPENGL_WINDOW", raising=False)
     plotting.picture(path[-1], tmp_path / "a.png", size=(160, 120))
-    assert "VTK_DEFAULT_OPENGL_WINDOW" not in plotting.os.environ
+    assert "VTK_DEFAULT_OPENGL_WINDOW" not in os.environ
     assert capfd.readouterr() == ("", "")  # VTK tells of every library it cannot find
 
 
@@ -133,18 +134,18 @@ def test_places_that_cannot_be_written_are_refused(path: bh.Path, tmp_path: Path
 
 
 def test_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plotting.sys, "platform", "linux")
-    monkeypatch.setattr(plotting, "_library", lambda name: None)
-    plotting._egl_works.cache_clear()
+    monkeypatch.setattr(offscreen.sys, "platform", "linux")
+    monkeypatch.setattr(offscreen, "library", lambda name: None)
+    offscreen.egl_works.cache_clear()
     try:
         with pytest.raises(plotting.PlotError, match="apt-get install libegl1 libgl1-mesa-dri"):
-            plotting._window()
+            offscreen.window()
     finally:
-        plotting._egl_works.cache_clear()
+        offscreen.egl_works.cache_clear()
 
 
 def test_window_needs_a_display(path: bh.Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plotting.sys, "platform", "linux")
+    monkeypatch.setattr(offscreen.sys, "platform", "linux")
     monkeypatch.setenv("DISPLAY", "")
     with pytest.raises(InputError, match=r"no display .* use bh\.plotting\.picture"):
         path.plot()

@@ -1,0 +1,231 @@
+"""What must not matter: place, orientation, numbering, handedness, mountain or valley, unit of length."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import bh
+import meshes
+from bh import Fold, Force, Model, Sheet, trace
+from meshes import SheetMesh
+
+Array = NDArray[np.float64]
+QUICK = settings(deadline=None, derandomize=True, max_examples=8)
+SHEET = Sheet(E=4000.0, t=0.127)
+FOLDS: dict[str, dict[str, Any]] = {"held": {"to": 2.0}, "spring": {"rest": 1.5, "Lstar": 25.0}}
+KINDS = ("staggered", "alternating")
+SAME = 1e-8
+
+
+def sector(kind: str = "staggered", fold: str = "mountain", along: int = 8) -> SheetMesh:
+    pattern = meshes.annulus_sector(100.0, 10.0, math.pi / 4, fold)  # type: ignore[arg-type]
+    return meshes.structured(pattern, along=along, kind=kind)  # type: ignore[arg-type]
+
+
+def free(mesh: SheetMesh) -> Model:
+    """A free sheet for imposed angles and springs alike: nothing singles out a direction."""
+    return Model(mesh, SHEET)
+
+
+def solve(model: Model) -> bh.State:
+    path = trace(model)
+    assert path.outcome == "reached", path.reason
+    return path[-1]
+
+
+def assert_same_energies(one: bh.State, two: bh.State, factor: float = 1.0) -> None:
+    scale = one.energy.total
+    for kind, value in one.energy.as_dict().items():
+        assert two.energy.as_dict()[kind] / factor == pytest.approx(value, rel=SAME, abs=SAME * scale), kind
+    assert two.energy.total / factor == pytest.approx(one.energy.total, rel=SAME)
+
+
+def renumbered(mesh: SheetMesh, seed: int) -> tuple[SheetMesh, NDArray[np.int64]]:
+    """Nodes and triangles in another order, triangles begun at another corner; `new` of each old node."""
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(mesh.points))  # old node of each new one
+    new = np.empty_like(order)
+    new[order] = np.arange(len(order))
+    triangles = new[mesh.triangles][rng.permutation(len(mesh.triangles))]
+    triangles = np.array([np.roll(row, rng.integers(3)) for row in triangles])
+    bare = SheetMesh(mesh.points[order], triangles)
+    assert mesh.spans is not None
+    found = mesh.topology.find_edges(order[bare.topology.edges])
+    return (
+        replace(
+            bare,
+            edge_sets={name: new[pairs] for name, pairs in mesh.edge_sets.items()},
+            corners={name: int(new[node]) for name, node in mesh.corners.items()},
+            folds=mesh.folds,
+            spans=mesh.spans[found],
+        ),
+        new,
+    )
+
+
+def mirrored(mesh: SheetMesh) -> SheetMesh:
+    """Seen in a mirror x -> -x: triangles turned round so that they stay counter-clockwise from +z."""
+    return replace(mesh, points=mesh.points * np.array([-1.0, 1.0, 1.0]), triangles=mesh.triangles[:, ::-1])
+
+
+BASE = {
+    (kind, how): solve(free(sector(kind)).fold("crease", **FOLDS[how])) for kind in KINDS for how in FOLDS
+}
+every = pytest.mark.parametrize(("kind", "how"), list(BASE))
+
+
+def test_base_is_not_trivial() -> None:
+    for (_, how), state in BASE.items():
+        assert state.energy.total > 1e-2
+        assert (state.energy.folding > 0.0) is (how == "spring")
+
+
+@every
+@QUICK
+@given(seed=st.integers(0, 10_000))
+def test_rotated_and_translated(kind: str, how: str, seed: int) -> None:
+    """The flat sheet anywhere in space: same energies and angles, positions moved along."""
+    rng = np.random.default_rng(seed)
+    Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    Q = Q * np.sign(np.linalg.det(Q))
+    shift = 100.0 * rng.normal(size=3)
+    mesh = sector(kind)
+    base = BASE[kind, how]
+    moved = solve(free(replace(mesh, points=mesh.points @ Q.T + shift)).fold("crease", **FOLDS[how]))
+    assert_same_energies(base, moved)
+    assert np.abs(moved.dihedral_angles - base.dihedral_angles).max() < 1e-7
+    assert np.abs(moved.points - (base.points @ Q.T + shift)).max() < 1e-5
+
+
+@every
+@QUICK
+@given(seed=st.integers(0, 10_000))
+def test_renumbered(kind: str, how: str, seed: int) -> None:
+    mesh, new = renumbered(sector(kind), seed)
+    base = BASE[kind, how]
+    state = solve(free(mesh).fold("crease", **FOLDS[how]))
+    assert_same_energies(base, state)
+    assert np.abs(state.points[new] - base.points).max() < 1e-5
+    assert state.dihedral("crease") == pytest.approx(base.dihedral("crease"), abs=1e-7)
+
+
+@every
+@pytest.mark.parametrize("scale", [1e-3, 2.0, 1e3])
+def test_unit_of_length(kind: str, how: str, scale: float) -> None:
+    """Millimetres to metres (1e-3): E / s^2 in N / m^2, energies x s in N m; the numbers differ, the sheet does not."""
+    mesh = sector(kind)
+    assert mesh.spans is not None
+    other = replace(mesh, points=mesh.points * scale, spans=mesh.spans * scale)
+    sheet = Sheet(E=SHEET.E / scale**2, t=SHEET.t * scale)
+    fold = dict(FOLDS[how])
+    if "Lstar" in fold:
+        fold["Lstar"] *= scale
+    state = solve(Model(other, sheet).fold("crease", **fold))
+    assert_same_energies(BASE[kind, how], state, factor=scale)
+    assert np.abs(state.points / scale - BASE[kind, how].points).max() < 1e-5
+
+
+@every
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_unit_of_force(kind: str, how: str, factor: float) -> None:
+    """E times a factor: all energies times that factor, same shape (a spring by its L* goes along)."""
+    state = solve(Model(sector(kind), Sheet(E=SHEET.E * factor, t=SHEET.t)).fold("crease", **FOLDS[how]))
+    assert_same_energies(BASE[kind, how], state, factor=factor)
+    assert np.abs(state.points - BASE[kind, how].points).max() < 1e-5
+
+
+def test_similar_sheets() -> None:
+    """All lengths times s with the same E: energies times s^3."""
+    base, s = BASE["staggered", "held"], 3.0
+    pattern = meshes.annulus_sector(100.0 * s, 10.0 * s, math.pi / 4)
+    state = solve(
+        Model(meshes.structured(pattern, along=8), Sheet(SHEET.E, SHEET.t * s)).fold("crease", to=2.0)
+    )
+    assert_same_energies(base, state, factor=s**3)
+
+
+@every
+def test_valley_mirrors_mountain(kind: str, how: str) -> None:
+    """The same fold downwards: every dihedral angle explementary, heights reversed, same energies."""
+    base = BASE[kind, how]
+    fold = {
+        key: (2.0 * math.pi - value if key in ("to", "rest") else value) for key, value in FOLDS[how].items()
+    }
+    state = solve(free(sector(kind, "valley")).fold("crease", **fold))
+    assert_same_energies(base, state)
+    assert np.abs(state.dihedral_angles + base.dihedral_angles - 2.0 * math.pi).max() < 1e-7
+    assert np.abs(state.points - base.points * [1, 1, -1]).max() < 1e-5
+
+
+@every
+def test_fold_by_is_mountain_or_valley_as_drawn(kind: str, how: str) -> None:
+    fold = {"by": 1.0} if how == "held" else {"by": 1.0, "Lstar": 25.0}
+    up = solve(free(sector(kind, "mountain")).fold("crease", **fold))
+    down = solve(free(sector(kind, "valley")).fold("crease", **fold))
+    assert_same_energies(up, down)
+    assert (up.dihedral("crease") < math.pi).all()
+    assert (up.fold_angle("crease") > 0.0).all()
+    assert (down.dihedral("crease") > math.pi).all()
+    lift = up.crease_points("crease")[:, 2].mean() - up.points[up.mesh.nodes("edge:outer"), 2].mean()
+    assert lift > 1.0  # mm: the crease of a mountain goes to +z
+
+
+@every
+def test_left_and_right_are_alike(kind: str, how: str) -> None:
+    """The mirrored mesh (other handedness of all triangles and diagonals) stores the same."""
+    base = BASE[kind, how]
+    mesh = mirrored(sector(kind))
+    assert np.array_equal(np.sort(mesh.topology.edges.ravel()), np.sort(base.mesh.topology.edges.ravel()))
+    state = solve(free(mesh).fold("crease", **FOLDS[how]))
+    assert_same_energies(base, state)
+    assert np.abs(state.points - base.points * [-1, 1, 1]).max() < 1e-5
+    assert state.dihedral("crease") == pytest.approx(base.dihedral("crease"), abs=1e-7)
+
+
+def test_left_and_right_with_loads_and_supports() -> None:
+    """Oblique supports, a force and an unsymmetric support, seen in the mirror."""
+    mesh = sector()
+    flip = np.array([-1.0, 1.0, 1.0])
+
+    def model(mesh: SheetMesh, s: Array) -> Model:
+        def vector(*v: float) -> list[float]:
+            return (np.array(v) * s).tolist()
+
+        supported = (
+            Model(mesh, SHEET).support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+        )
+        supported = supported.support("corner:outer-end", [vector(1.0, 0.3, 2.0)])
+        return supported.step(
+            Fold("crease", to=2.3),
+            Force("edge:end", each=vector(1e-3, 0.0, 2e-3)),
+            Force([5], each=vector(0, 1e-3, 0)),
+        )
+
+    one, two = solve(model(mesh, np.ones(3))), solve(model(mirrored(mesh), flip))
+    assert_same_energies(one, two)
+    assert np.abs(two.points - one.points * flip).max() < 1e-5
+    assert np.abs(two.reactions - one.reactions * flip).max() < 1e-6
+
+
+def test_turned_over() -> None:
+    """Triangles counted clockwise: what was below is above, so a mountain becomes a valley of the same energy."""
+    mesh = sector()
+    over = replace(mesh, triangles=mesh.triangles[:, ::-1])
+    state = solve(free(over).fold("crease", to=2.0 * math.pi - 2.0))
+    assert_same_energies(BASE["staggered", "held"], state)
+    assert np.abs(state.points - BASE["staggered", "held"].points).max() < 1e-5
+
+
+def test_same_input_same_numbers() -> None:
+    """Bit for bit (DESIGN.md, section 3)."""
+    again = solve(free(sector()).fold("crease", to=2.0))
+    assert np.array_equal(again.points, BASE["staggered", "held"].points)
+    assert again.energy == BASE["staggered", "held"].energy

@@ -1,0 +1,294 @@
+"""The cases that judge the solvers: they run, their records have the agreed form, and their verdicts can be bad."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import verification.cases as registry
+from meshes import InputError
+from verification import command
+from verification.cases import CASES, case
+from verification.checks import CaseResult, Check, Context, line, plot
+from verification.run import run, write_json
+
+# DESIGN.md, section 2, and the outcome of the path that the value was read from
+KEYS = {
+    "case", "quantity", "params", "value", "unit", "reference", "source", "error", "tolerance", "passed", "unknowns",
+    "iterations", "wall_time_s", "outcome",
+}  # fmt: skip
+SLOW = {"appendix_b", "campaign"}  # over some five seconds on the slowest machine
+
+
+def check(**changes: Any) -> Check:
+    given = {
+        "case": "c", "quantity": "q", "params": {"alpha": 2.0}, "value": 1.05, "unit": "mm", "reference": 1.0,
+        "source": "s", "tolerance": 0.1,
+    } | changes  # fmt: skip
+    return Check(**given)
+
+
+def no_constants(text: str) -> Any:
+    def refuse(word: str) -> None:
+        raise AssertionError(f"{word} is not JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+# --------------------------------------------------------------------------------------- records and verdicts
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "passed"),
+    [
+        ({}, 0.05, True),
+        ({"value": 1.2}, 0.2, False),
+        ({"value": 0.8}, 0.2, False),  # too small is as wrong as too large
+        ({"value": 1.125, "tolerance": 0.125}, 0.125, True),  # the bound belongs to it
+        ({"reference": -1.0, "value": -1.05}, 0.05, True),
+        ({"reference": -1.0, "value": 1.0}, 2.0, False),
+        ({"reference": 0.0, "value": -0.05}, 0.05, True),  # absolute where the reference is zero
+        ({"reference": 0.0, "value": 0.2}, 0.2, False),
+        ({"reference": 1e-9, "value": 2e-9}, 1.0, False),  # small is not zero
+        ({"tolerance": None}, 0.05, None),
+        ({"reference": None}, None, None),
+        ({"outcome": "stalled"}, 0.05, False),  # a right number from a path that failed is not right
+        ({"outcome": "stalled", "tolerance": None}, 0.05, False),
+        ({"tolerance": 0.0, "value": 1.0}, 0.0, True),
+    ],
+)
+def test_error_and_passed(changes: dict[str, Any], error: float | None, passed: bool | None) -> None:
+    made = check(**changes)
+    assert made.error == (None if error is None else pytest.approx(error))
+    assert made.passed is passed
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_does_not_pass(value: float, tmp_path: Path) -> None:
+    made = check(value=value)
+    assert made.passed is False
+    write_json(tmp_path / "record.json", made.record())
+    record = no_constants((tmp_path / "record.json").read_text())
+    assert record["value"] is None
+    assert record["error"] is None
+    assert record["passed"] is False
+
+
+def test_record_has_exactly_the_agreed_keys() -> None:
+    record = check(unknowns=7, iterations=3, wall_time_s=0.5).record()
+    assert set(record) == KEYS
+    assert record["params"] == {"alpha": 2.0}
+    assert record["passed"] is True
+    assert set(check(reference=None, tolerance=None).record()) == KEYS
+
+
+@pytest.mark.parametrize(
+    ("checks", "verdict"),
+    [
+        ([], "reported"),
+        ([{}], "holds"),
+        ([{"tolerance": None}], "reported"),
+        ([{}, {"tolerance": None}], "holds"),
+        ([{}, {"value": 9.0}], "differs"),
+        ([{"tolerance": None, "outcome": "bifurcation"}], "differs"),
+        ([{}, {"value": math.nan}], "differs"),
+    ],
+)
+def test_verdict(checks: list[dict[str, Any]], verdict: str) -> None:
+    result = CaseResult("c", "t", "q", "s", checks=[check(**changes) for changes in checks])
+    assert result.verdict == verdict
+    assert result.summary()["verdict"] == verdict
+
+
+def test_plots_with_gaps_can_be_stored(tmp_path: Path) -> None:
+    """A curve with a value that could not be computed: null in the file, not NaN."""
+    curve = plot("id", "t", "x", "y", [line("a", [1.0, 2.0], [math.nan, 3.0])], "caption", log="x")
+    write_json(tmp_path / "plot.json", {"plots": [curve]})
+    data = no_constants((tmp_path / "plot.json").read_text())["plots"][0]
+    assert data["series"][0]["y"] == [None, 3.0]
+    assert data["x"] == {"label": "x", "log": True}
+    assert data["y"]["log"] is False
+
+
+def test_json_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    file = tmp_path / "data.json"
+    write_json(file, {"a": 1})
+    with pytest.raises(TypeError):
+        write_json(file, {"a": object()})
+    assert json.loads(file.read_text()) == {"a": 1}
+    with pytest.raises(InputError, match="nowhere") as caught:
+        write_json(tmp_path / "nowhere" / "data.json", {})
+    assert "\n" not in str(caught.value)
+
+
+# --------------------------------------------------------------------------------------- cases
+
+
+def test_unknown_case() -> None:
+    with pytest.raises(InputError, match="'tori'") as caught:
+        case("tori")
+    for name in CASES:
+        assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_case_runs_nothing(tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        run(["derivatives", "tori"], tmp_path / "results")
+    assert not (tmp_path / "results").exists()
+
+
+def test_folder_that_cannot_be_made(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="file") as caught:
+        run(["shear_calibration"], tmp_path / "file" / "results")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in CASES]
+)
+def test_case_in_quick_mode(name: str, tmp_path: Path) -> None:
+    """Runs, holds, and stores records that a JSON reader gets back as they were."""
+    told: list[str] = []
+    data = run([name], tmp_path, quick=True, report=told.append)
+    assert any(name in text for text in told)
+    stored = no_constants((tmp_path / "checks.json").read_text())
+    assert set(stored) == {"checks", "versions", "date", "machine", "quick", "cases"}
+    assert stored["quick"] is True
+    assert len(stored["checks"]) == len(data["checks"]) > 5
+    for record in stored["checks"]:
+        assert set(record) == KEYS
+        assert record["case"] == name
+        assert record["quantity"]
+        assert record["source"]
+        assert record["value"] is not None
+        assert (record["error"] is None) == (record["reference"] is None)
+        assert record["passed"] is not False, record
+    (summary,) = stored["cases"]
+    assert summary["name"] == name
+    assert summary["verdict"] == "holds"
+    assert summary["wall_time_s"] > 0.0
+    for picture in summary["pictures"]:
+        assert (tmp_path / picture["file"]).stat().st_size > 1000
+        assert picture["alt"]
+    for curve in summary["plots"]:
+        for series in curve["series"]:
+            assert len(series["x"]) == len(series["y"]) > 0
+    assert {"python", "numpy", "curved-crease-workbench"} <= set(stored["versions"])
+
+
+def test_records_of_the_strips(tmp_path: Path) -> None:
+    """The quantities and parameters that the issue names."""
+    records = run(["strips"], tmp_path, quick=True)["checks"]
+    assert {r["quantity"] for r in records} == {
+        "tension",
+        "torsion",
+        "bending_out_of_plane",
+        "bending_in_plane",
+    }
+    assert all({"mesh", "alpha", "formulation"} <= set(r["params"]) for r in records)
+    assert {r["params"]["mesh"] for r in records} == {"staggered", "alternating", "one-way", "mirrored"}
+    by = {(r["quantity"], r["params"]["mesh"], r["params"]["alpha"]): r["value"] for r in records}
+    assert by["tension", "alternating", 8.0] == pytest.approx(1.0, abs=1e-6)
+    assert by["torsion", "alternating", 1.0] == pytest.approx(4.0, rel=0.02)
+    assert 0.0 < by["bending_out_of_plane", "alternating", 4.0] - 1.0 < 0.1
+    assert by["bending_in_plane", "alternating", 8.0] == pytest.approx(3.0, rel=0.1)
+
+
+# --------------------------------------------------------------------------------------- a case that fails
+
+
+def disagreeing(context: Context) -> CaseResult:
+    context.tell("disagreeing: thinking")
+    return CaseResult("bad", "t", "q", "s", checks=[check(case="bad"), check(case="bad", value=math.nan)])
+
+
+@pytest.fixture
+def bad_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+    import types
+
+    module = types.ModuleType("verification.bad_for_tests")
+    module.run = disagreeing  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(registry.CASES, "bad", module.__name__)
+
+
+@pytest.mark.usefixtures("bad_case")
+def test_failures_are_told(tmp_path: Path) -> None:
+    told: list[str] = []
+    data = run(["bad"], tmp_path, report=told.append)
+    assert data["cases"][0]["verdict"] == "differs"
+    assert any("differs" in text and "1 of 2" in text for text in told)
+
+
+@pytest.mark.usefixtures("bad_case")
+def test_command_exits_with_one(tmp_path: Path) -> None:
+    import typer
+
+    app = typer.Typer()
+    app.command()(command.verify)
+    arguments = ["bad", "--results", str(tmp_path), "--json", str(tmp_path / "out.json")]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 1
+    assert "failed" in done.output
+    assert "1 of 2" in done.output
+    stored = no_constants((tmp_path / "out.json").read_text())
+    assert set(stored) == {"checks", "versions"}
+    assert [record["passed"] for record in stored["checks"]] == [True, False]
+
+
+def test_command_that_holds(tmp_path: Path) -> None:
+    import typer
+
+    app = typer.Typer()
+    app.command()(command.verify)
+    done = CliRunner().invoke(app, ["shear_calibration", "--results", str(tmp_path), "--quick"])
+    assert done.exit_code == 0, done.output
+    assert CliRunner().invoke(app, ["--list"]).output.split() == list(CASES)
+
+
+# --------------------------------------------------------------------------------------- judges that can see
+
+
+def test_derivatives_case_sees_a_wrong_hessian(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A Hessian that is wrong by 1e-6 of itself, and only where the hinge is flat or closed, is found."""
+    from bh.mechanics import kinematics
+
+    right = kinematics.dihedral_hessians
+    monkeypatch.setattr(kinematics, "dihedral_hessians", lambda x, hinges: (1.0 + 1e-6) * right(x, hinges))
+    data = run(["derivatives"], tmp_path, quick=True)
+    failed = {r["quantity"] for r in data["checks"] if r["passed"] is False}
+    assert failed == {"dihedral Hessian, relative error"}
+    assert data["cases"][0]["verdict"] == "differs"
+
+
+def test_cone_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Bending hinges 10 % too stiff."""
+    from bh.mechanics import elements
+
+    right = elements.bending_hinge_stiffness
+    monkeypatch.setattr(elements, "bending_hinge_stiffness", lambda *args: 1.1 * right(*args))
+    data = run(["cone"], tmp_path, quick=True)
+    assert data["cases"][0]["verdict"] == "differs"
+    wrong = [r for r in data["checks"] if r["quantity"] == "energy ratio" and r["passed"] is False]
+    assert wrong
+    right_radius = [r["passed"] for r in data["checks"] if r["quantity"] == "crease radius"]
+    assert False not in right_radius  # the shape does not depend on it
+
+
+def test_strips_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Diagonals by Eq. 3.3 without the factor of Eq. 3.4 are as good in tension; hinges of half the area are not."""
+    from bh.mechanics import elements
+
+    right = elements.bending_hinge_stiffness
+    monkeypatch.setattr(elements, "bending_hinge_stiffness", lambda E, t, L, A: right(E, t, L, 0.5 * A))
+    data = run(["strips"], tmp_path, quick=True)
+    failed = {r["quantity"] for r in data["checks"] if r["passed"] is False}
+    assert failed == {"torsion", "bending_out_of_plane"}
