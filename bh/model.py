@@ -48,7 +48,10 @@ class Sheet:
 
 @dataclass(frozen=True)
 class CreaseLaw:
-    """A spring crease: moment a length = stiffness (phi - rest), N mm / mm."""
+    """A spring crease: moment a length = stiffness (phi - rest), N mm / mm.
+
+    A `rest` angle that is not flat comes in during the first step, since the sheet begins flat.
+    """
 
     Lstar: float | None = None
     stiffness: float | None = None

@@ -257,14 +257,15 @@ def _run_step(
             began = time.perf_counter()
         history = [here]
     else:
+        here = point(system, system.start(), 0.0)
         # after a jump to another branch the extrapolation began anew there (`LoadControl.follow`)
-        jumps = [index for index, record in enumerate(done) if record.note]
+        jumps = [index for index, record in enumerate(done) if record.note not in ("", "arc length")]
         recent = done[max(len(done) - 3, jumps[-1] if jumps else 0) :]
-        history = [point(system, record.q, record.lam) for record in recent]
+        history = [point(system, record.q, record.lam, record.note) for record in recent]
         increment = done[-1].next_increment
         if len(history) < 3 and step > 0 and not jumps:  # later steps do not store where they begin
-            history.insert(0, point(system, system.start(), 0.0))
-    journey: Iterator[Increment] = walk(Walk(system, strategy, tuple(history), increment))
+            history.insert(0, here)
+    journey: Iterator[Increment] = walk(Walk(system, strategy, tuple(history), increment, here))
     for increment_ in journey:
         now = time.perf_counter()
         if increment_.outcome != "reached":

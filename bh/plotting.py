@@ -72,8 +72,8 @@ def picture(
         the absolute path of the file.
 
     Raises:
-        PlotError: an unknown colour, a size that cannot be, no library to draw with, or a file that cannot be
-            written.
+        PlotError: not a state, an unknown colour, a size that cannot be, or no library to draw with.
+        FileFormatError: the file cannot be written.
     """
     target = FilePath(file)
     if target.suffix.lower() != ".png":
@@ -101,7 +101,7 @@ def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
         options: of `pyvista.Plotter.show`.
 
     Raises:
-        PlotError: an unknown colour, or there is no display.
+        PlotError: not a state, an unknown colour, or there is no display.
     """
     if not has_display():
         raise PlotError("no display to show the sheet on; use bh.plotting.picture(state, 'sheet.png')")
@@ -208,6 +208,8 @@ def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path"
 
 
 def _colouring(state: State, colour: str | None, top: float | None) -> Colouring | None:
+    if not hasattr(state, "nodal_energy_density"):
+        raise PlotError(f"{type(state).__name__} is not a state; give one of a path, such as path[-1]")
     if colour is None:
         return None
     if colour == "total":

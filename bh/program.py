@@ -28,7 +28,8 @@ class StepProgram:
     Attributes:
         law: (m,) SHEET (uncreased), SPRING (elastic crease) or HELD (angle imposed exactly).
         stiffness: (m,) of spring creases a length, N mm / (mm rad).
-        rest: rest dihedral angles of the springs, rad.
+        rest: rest dihedral angles of the springs, rad; start is nan where a held crease is released: the spring then
+            begins with the moment that the crease has.
         held: imposed dihedral angles, rad; start is nan where the angle at the start of the step is to be taken.
         moment: couple a length that closes the dihedral angle below the sheet, N mm / mm.
         force: (n, 3) dead forces, N.
@@ -47,7 +48,9 @@ class StepProgram:
     def rotation(self) -> float:
         """Largest change of an imposed or rest angle in this step, rad."""
         held = np.where(np.isnan(self.held.start), math.pi, self.held.start)
-        change = np.concatenate((np.abs(self.held.end - held)[self.law == HELD], np.abs(self.rest.rate)))
+        change = np.concatenate(
+            (np.abs(self.held.end - held)[self.law == HELD], np.abs(np.nan_to_num(self.rest.rate)))
+        )
         return float(change.max(initial=0.0))
 
 
@@ -63,21 +66,32 @@ class _Builder:
         self.law = np.zeros(hinges, dtype=np.int64)
         self.stiffness = np.zeros(hinges)
         self.rest = np.full(hinges, math.pi)
+        self.made = np.full(hinges, math.pi)  # rest angles of the laws; they come in during the first step
         self.held = np.full(hinges, np.nan)
         self.moment = np.zeros(hinges)
+        self.steps = 0
+        self.released = np.zeros(hinges, dtype=bool)
         self.force = np.zeros((nodes, 3))
         self.displaced: dict[tuple[int, tuple[float, float, float]], float] = {}
         for name, crease in model.creases.items():
             self._spring(self.hinges(name), crease)
-            self.rest[self.hinges(name)] = crease.rest
+            self.made[self.hinges(name)] = crease.rest
         for step in model.steps:  # a spring that a later step names is there from the start, at rest flat
             for item in step:
                 if isinstance(item, Fold) and (item.Lstar is not None or item.stiffness is not None):
                     self._spring(self.creases(item.crease)[0], CreaseLaw(item.Lstar, item.stiffness))
 
     def _spring(self, hinges: Ints, law: CreaseLaw) -> None:
+        stiffness = law.per_length(self.model.sheet)
+        other = (self.law[hinges] == SPRING) & ~np.isclose(self.stiffness[hinges], stiffness, rtol=1e-12)
+        if other.any():
+            edge = self.mesh.topology.hinges[hinges[int(np.argmax(other))], 1:3].tolist()
+            raise ModelError(
+                f"the crease at edge {edge} has two stiffnesses ({self.stiffness[hinges][other][0]:.6g} and "
+                f"{stiffness:.6g} N mm / (mm rad)); give it one, it cannot change from step to step"
+            )
         self.law[hinges] = SPRING
-        self.stiffness[hinges] = law.per_length(self.model.sheet)
+        self.stiffness[hinges] = stiffness
 
     def hinges(self, crease: str) -> Ints:
         found = self.hinge_of_edge[self.mesh.topology.find_edges(self.mesh.crease_edges(crease))]
@@ -112,6 +126,10 @@ class _Builder:
 
     def step(self, actuations: tuple[Actuation, ...]) -> StepProgram:
         before = (self.rest.copy(), self.held.copy(), self.moment.copy(), self.force.copy())
+        self.steps += 1
+        if self.steps == 1:
+            self.rest = self.made.copy()
+        self.released = np.zeros(len(self.rest), dtype=bool)
         displaced = dict(self.displaced)
         for item in actuations:
             if isinstance(item, Fold):
@@ -124,6 +142,7 @@ class _Builder:
             else:
                 self._displace(item)
         rest, held, moment, force = before
+        rest[self.released] = np.nan
         return StepProgram(
             law=self.law.copy(),
             stiffness=self.stiffness.copy(),
@@ -158,6 +177,9 @@ class _Builder:
             self.law[hinges] = HELD
             self.held[hinges] = angle
             return
+        if item.Lstar is not None or item.stiffness is not None:  # a held crease is released into its spring
+            self.released[hinges] = self.law[hinges] == HELD
+            self.law[hinges], self.held[hinges] = SPRING, np.nan
         if (self.law[hinges] != SPRING).any():
             raise ModelError(f"fold of crease '{item.crease}' by its rest angle needs Lstar or stiffness")
         self.rest[hinges] = angle
@@ -183,8 +205,10 @@ class _Builder:
             self.displaced[(node, key)] = item.by
 
     def _prescribed(self, before: dict[tuple[int, tuple[float, float, float]], float]) -> list[Prescribed]:
+        # a node that begins to be displaced in a later step begins where it is
+        start = np.nan if self.steps > 1 else 0.0
         return [
-            Prescribed(np.array([node]), direction, before.get((node, direction), 0.0), end)
+            Prescribed(np.array([node]), direction, before.get((node, direction), start), end)
             for (node, direction), end in self.displaced.items()
         ]
 

@@ -38,7 +38,10 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """Displacement along one direction at some nodes, from `start` to `end` (mm) while lambda runs from 0 to 1."""
+    """Displacement along one direction at some nodes, from `start` to `end` (mm) while lambda runs from 0 to 1.
+
+    `start` is nan where the displacement that the step begins with is to be taken.
+    """
 
     nodes: Ints
     direction: tuple[float, float, float]
@@ -52,7 +55,8 @@ class Constraints:
 
     Attributes:
         fixed: (n, 3) True where the local component is prescribed.
-        start, end: (n, 3) prescribed local displacement at lambda = 0 and 1, mm (zero for supports).
+        start, end: (n, 3) prescribed local displacement at lambda = 0 and 1, mm (zero for supports; start is nan
+            where the displacement that the step begins with is to be taken).
         frame_of: (n,) row of `frames` for nodes whose local axes are not x, y, z; else -1.
         frames: (f, 3, 3) rows are the local axes.
         rigid_body: True if the remaining rigid motions are to be taken out.
@@ -214,7 +218,7 @@ def _orthonormal(node: int, rows: list[tuple[Array, float, float]]) -> tuple[Arr
         if norm > 1e-9:
             axes.append(rest / norm)
             values.append(value / norm)
-        elif np.abs(value).max() > 1e-12 * (1.0 + abs(start) + abs(end)):
+        elif np.nanmax(np.abs(value)) > 1e-12 * (1.0 + abs(end)):
             raise ModelError(
                 f"node {node} is held and displaced along the same direction; remove the support or the displacement"
             )

@@ -23,11 +23,15 @@ from reports.figures import (
     markup,
     picture_link,
     plot_rows,
-    superscript,
+    scientific,
     svg,
     typeset,
 )
 
+SOURCE = (
+    "Equation numbers, “the source” and “App. B” refer to the dissertation “How Curved Creases Enhance the "
+    "Stiffness and Enable Shape Morphing of Thin-Sheet Structures” by Steven R. Woodruff (University of Michigan, 2022)."
+)
 VERDICTS = ("holds", "reported", "differs")  # from the best to the worst
 MOST_FAILURES = 25  # that are listed at the top
 TEMPLATES = Path(__file__).parent / "templates"
@@ -95,6 +99,11 @@ class CaseInfo(BaseModel):
     plots: list[Plot] = []
     pictures: list[Picture] = []
     wall_time_s: float | None = None
+    # of the run that the case is from; None where that is the run of the whole file
+    versions: dict[str, str] | None = None
+    date: str | None = None
+    machine: str | dict[str, Any] | None = None
+    quick: bool | None = None
 
 
 class Results(BaseModel):
@@ -212,8 +221,13 @@ def build(results_folder: Path, out_file: Path) -> Path:
         "text": lambda text: Markup(markup(text)), "params": lambda params: Markup(_params(params)),
     }  # fmt: skip
     failed = [item for case in cases for item in case.checks if item[1].passed is False]
+    missing = [name for name in known_cases() if name not in [case.name for case in cases]]
     page = environment.get_template("report.html").render(
         results=results,
+        source=SOURCE,
+        missing=missing,
+        shortfall=shortfall(results),
+        others=_others(results),
         date=_date(results.date),
         cases=cases,
         machine=_machine(results.machine),
@@ -267,11 +281,47 @@ def read(file: Path) -> Results:
     return results
 
 
+def known_cases() -> list[str]:
+    """Names of all verification cases that there are."""
+    from verification.cases import CASES
+
+    return list(CASES)
+
+
+def shortfall(results: Results) -> str:
+    """What a full run has and these results have not, in a few words: "1 of 5 cases run, 1 of them quick"."""
+    known = known_cases()
+    there = {info.name for info in results.cases} | {check.case for check in results.checks}
+    run = [name for name in known if name in there]
+    quick = sum(results.quick if info.quick is None else info.quick for info in results.cases)
+    words = [f"{len(run)} of {len(known)} cases run"] if len(run) < len(known) else []
+    if quick:
+        words.append("quick" if quick == len(results.cases) else f"{quick} of them quick")
+    return ", ".join(words)
+
+
+def _others(results: Results) -> list[tuple[str, str]]:
+    """Cases from an earlier run than the last, with its date and what else was not as in the last one."""
+    found = []
+    for info in results.cases:
+        if info.date in (None, results.date):
+            continue
+        words = [_date(info.date or "")]
+        versions = results.versions if info.versions is None else info.versions
+        for key in dict.fromkeys([*versions, *results.versions]):
+            if versions.get(key) != results.versions.get(key):
+                words.append(f"{key} {versions.get(key, 'unknown')}")
+        found.append((info.name, "; ".join(words)))
+    return found
+
+
 def _cases(results: Results, folder: Path) -> list[Case]:
     """Every case with what belongs to it; records of cases that say nothing of themselves get a plain one."""
     infos = {info.name: info for info in results.cases}
     for check in results.checks:
         infos.setdefault(check.case, CaseInfo(name=check.case))
+    for info in infos.values():
+        info.quick = results.quick if info.quick is None else info.quick
     count = 0
     cases = []
     for name, info in infos.items():
@@ -330,12 +380,12 @@ def number(value: float | None, digits: int = 5, full: bool = False) -> str:
     power = int(exponent)
     if -4 <= power < 6:
         text = f"{value:,.{max(digits - 1 - power, 0)}f}".replace(",", "\u2009")
-        tail = ""
     else:
-        text, tail = mantissa, "\u2009\N{MULTIPLICATION SIGN}\u200910" + superscript(power)
+        text = mantissa
     if short and "." in text:
         text = text.rstrip("0").rstrip(".")
-    return text.replace("-", "\N{MINUS SIGN}") + tail
+    text = text.replace("-", "\N{MINUS SIGN}")
+    return text if -4 <= power < 6 else scientific(text, power)
 
 
 def share(value: float | None, check: Check) -> str:

@@ -21,7 +21,7 @@ def report(
     ] = False,
 ) -> None:
     """Run the verification cases and show what they found as one HTML page."""
-    from reports.build import build, read
+    from reports.build import build, read, shortfall
 
     page = results / "report.html" if out is None else out
     if not reuse:
@@ -29,7 +29,12 @@ def report(
 
         run(None, results, quick, lambda text: typer.echo(text, err=True))
     written = build(results, page)
-    checks = read(results / "checks.json").checks
-    judged = [check.passed for check in checks if check.passed is not None]
-    typer.echo(f"{sum(judged)} of {len(judged)} checks passed, {len(checks) - len(judged)} reported")
+    found = read(results / "checks.json")
+    judged = [check.passed for check in found.checks if check.passed is not None]
+    less = shortfall(found)
+    typer.echo(
+        f"{sum(judged)} of {len(judged)} checks passed, {len(found.checks) - len(judged)} reported"
+        + (f" ({less})" if less else "")
+    )
     typer.echo(f"report: {written}")
+    typer.echo(written.as_uri())

@@ -268,11 +268,17 @@ _GREEK = {
     "psi": "ψ",
     "pi": "π",
 }
+_POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)[eE]([+-]?\d+)(?![\w]|\.\d)")
+_THOUSANDS = re.compile(r"(?<![\d.,])\d{1,3}(?:,\d{3})+(?![\d,]\d)")
+_NEGATIVE = re.compile(r"(?<![\w.)\]%°^])-(?=\d)")
 _SUBSCRIPT = re.compile(r"(?<![\w&])([A-Za-z\u03b1-\u03c9])_([A-Za-z0-9]{1,3})(?!\w)")
 
 
 def typeset(text: str) -> str:
-    """Plain text as a printer would set it: Greek letters for their names, raised powers, no bad breaks."""
+    """Plain text as a printer would set it: Greek letters for their names, numbers as in tables, no bad breaks."""
+    text = _POWER.sub(lambda found: scientific(found[1], int(found[2])), text)
+    text = _THOUSANDS.sub(lambda found: found[0].replace(",", "\u2009"), text)
+    text = _NEGATIVE.sub("\N{MINUS SIGN}", text)
     text = re.sub(rf"(?<![A-Za-z])({'|'.join(_GREEK)})(?![A-Za-z])", lambda found: _GREEK[found[0]], text)
     text = re.sub(r"\^(-?\d+)(?!\d|\.\d)", lambda found: superscript(int(found[1])), text)
     return re.sub(r"(?<=\d) (?=%)| (?== )|(?<= =) ", "\u00a0", text)
@@ -285,6 +291,11 @@ def markup(text: str) -> str:
 
 def superscript(number: int) -> str:
     return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def scientific(mantissa: str, power: int) -> str:
+    """A number times a power of ten."""
+    return f"{mantissa}\u2009\N{MULTIPLICATION SIGN}\u200910{superscript(power)}"
 
 
 def _inline(text: str, plot: Plot, prefix: str) -> str:

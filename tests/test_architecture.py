@@ -22,7 +22,7 @@ DESCRIPTION = (
     "bh.describe", "bh.state", "bh.formulations",
 )  # fmt: skip
 PATH = ("bh.path", "bh.storage", "bh.progress")
-PROTOCOL = ("bh.solvers.matrices", "bh.solvers.system")
+PROTOCOL = ("bh.solvers.matrices", "bh.solvers.saddle", "bh.solvers.system")
 TOP = ("bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.offscreen", "bh.warm_up")
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,

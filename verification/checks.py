@@ -56,6 +56,9 @@ class Check:
         return data
 
 
+RECORD = {*Check.__dataclass_fields__, "error", "passed"}  # the keys of a record
+
+
 @dataclass
 class CaseResult:
     """What a case found: checks, and what the report shows of it."""

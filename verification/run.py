@@ -6,16 +6,22 @@ import json
 import math
 import os
 import platform
+import shutil
+import subprocess
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from bh.path import versions
 from meshes.errors import InputError
 from verification.cases import CASES, case
-from verification.checks import Context
+from verification.checks import RECORD, CaseResult, Context
+
+OF_A_RUN = ("versions", "date", "machine", "quick")  # kept for every case, as cases may be run one by one
+PROJECT = Path(__file__).resolve().parents[1]
 
 
 def run(
@@ -26,7 +32,10 @@ def run(
 ) -> dict[str, Any]:
     """Run the named cases (all if None) and write `folder`/checks.json and the pictures.
 
-    Returns what was written: {"checks": [...], "versions": {...}, "date", "machine", "cases": [...]}.
+    The file keeps what it holds of other cases, each with the versions, the date, the machine and the `quick` of its
+    own run; those at the top are of this run (`quick` if any case is).
+
+    Returns the part of this run: {"checks": [...], "versions": {...}, "date", "machine", "quick", "cases": [...]}.
 
     Raises:
         InputError: an unknown case, or a folder that cannot be written.
@@ -49,9 +58,14 @@ def run(
         judged = sum(check.passed is not None for check in result.checks)
         report(f"{name}: {result.verdict}, {passed} of {judged} checks passed, {result.wall_time_s:.1f} s")
         found.append(result)
-    data = {
-        "checks": [check.record() for result in found for check in result.checks],
-        "versions": versions(),
+    data = _record(found, quick)
+    write_json(folder / "checks.json", _merged(_stored(folder / "checks.json"), data))
+    return data
+
+
+def _record(found: Sequence[CaseResult], quick: bool) -> dict[str, Any]:
+    run_by = {
+        "versions": environment(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": {
             "system": platform.system(),
@@ -59,10 +73,79 @@ def run(
             "cores": os.cpu_count(),
         },
         "quick": quick,
-        "cases": [result.summary() for result in found],
     }
-    write_json(folder / "checks.json", data)
-    return data
+    return {
+        "checks": [check.record() for result in found for check in result.checks],
+        **run_by,
+        "cases": [{**result.summary(), **run_by} for result in found],
+    }
+
+
+def _stored(file: Path) -> dict[str, Any]:
+    """What an earlier run has left of the cases that there still are; nothing if the file is missing or broken."""
+    nothing: dict[str, Any] = {"checks": [], "cases": []}
+    try:
+        old = json.loads(file.read_text(encoding="utf-8"))
+        of_the_run = {key: old[key] for key in OF_A_RUN}
+        cases = [{**of_the_run, **dict(info)} for info in old["cases"] if info["name"] in CASES]
+        checks = [dict(check) for check in old["checks"] if check["case"] in CASES]
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        return nothing
+    summary = CaseResult("", "", "", "").summary()
+    names = [info["name"] for info in cases]
+    whole = (
+        all(set(info) == {*summary, *OF_A_RUN} for info in cases)
+        and all(set(check) >= RECORD and check["case"] in names for check in checks)
+        and len(set(names)) == len(names)
+    )
+    return {"checks": checks, "cases": cases} if whole else nothing
+
+
+def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+    """The new record with what the old one has of other cases, in the order of `CASES`."""
+    ran = {info["name"] for info in new["cases"]}
+    order = list(CASES).index
+    cases = [info for info in old["cases"] if info["name"] not in ran] + new["cases"]
+    checks = [check for check in old["checks"] if check["case"] not in ran] + new["checks"]
+    return {
+        **new,
+        "checks": sorted(checks, key=lambda check: order(check["case"]) if check["case"] in CASES else -1),
+        "quick": any(info["quick"] for info in cases),
+        "cases": sorted(cases, key=lambda info: order(info["name"])),
+    }
+
+
+def environment() -> dict[str, str]:
+    """Versions of what numbers and pictures depend on, and the commit if this is a working copy."""
+    found = dict(versions())
+    for name in ("pyvista", "vtk", "matplotlib"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    commit = _commit()
+    return {**found, "git commit": commit} if commit else found
+
+
+def _commit() -> str:
+    """The commit of the working copy, or an empty string where there is none to be told."""
+    git = shutil.which("git")
+    if git is None or not (PROJECT / ".git").exists():
+        return ""
+
+    def ask(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [git, *words], cwd=PROJECT, capture_output=True, text=True, timeout=10, check=False
+        )
+
+    try:
+        head = ask("rev-parse", "--short=12", "HEAD")
+        if head.returncode != 0:
+            return ""
+        changed = ask("diff", "--quiet", "HEAD").returncode == 1
+    except (OSError, ValueError, subprocess.SubprocessError):
+        return ""
+    return head.stdout.strip() + (" with changes" if changed else "")
 
 
 def write_json(file: Path, data: Any) -> None:

@@ -6,6 +6,7 @@ angle is imposed exactly is a hinge with a multiplier (its moment), in augmented
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +25,8 @@ from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
 from bh.model import Model
 from bh.program import StepProgram
-from bh.solvers.matrices import ConstraintRows, FreeBodyMatrix, Matrix, MultiplierMatrix
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import Energy, State
 from bh.supports import Constraints, free_motions, rigid_motions
@@ -32,6 +34,7 @@ from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 LARGEST_TURN = 1.3  # rad that any hinge may turn in one increment before the driver mistrusts it
+COMPLIANCE = 1e-9  # of a held crease, in parts of 1 / gamma
 ROUNDING = 8.0 * np.finfo(float).eps
 
 
@@ -44,8 +47,11 @@ class BarsAndHingesSystem:
         self.reference = mesh.points
         start_points = mesh.points if start is None else start.points
         held_start = dihedral_angles(start_points, mesh.topology.hinges)
-        self.elements = sheet_elements(model, program, held_start)
-        self.constraints: Constraints = program.constraints
+        edges = mesh.points[mesh.topology.hinges[:, 1:3]]
+        moments = np.zeros(len(held_start)) if start is None else np.nan_to_num(start.crease_moments)
+        moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+        self.elements = sheet_elements(model, program, held_start, moments)
+        self.constraints: Constraints = _begin_where_they_are(program.constraints, start_points - mesh.points)
         self.force = program.force
         self.program = program
 
@@ -54,6 +60,8 @@ class BarsAndHingesSystem:
         self.number[free] = np.arange(free.sum())
         self.free = np.flatnonzero(free.ravel())
         self.primal = len(self.free)
+        if self.primal == 0:
+            raise ModelError("the supports hold every node; nothing can move, so remove some of them")
         self.size = self.primal + self.elements.held
         self.turned = np.flatnonzero(self.constraints.frame_of >= 0)
         self.turned_axes = self.constraints.frames[self.constraints.frame_of[self.turned]]
@@ -125,8 +133,13 @@ class BarsAndHingesSystem:
         if self.elements.held:
             held = slice(-self.elements.held, None)
             turn = (forces[held] - q[self.primal :]) / self.elements.hinge_stiffness[held]
-            residual[self.primal :] = turn
-            gap = 100.0 * float(np.abs(turn).max())  # a held angle is to be met far better than a force
+            residual[self.primal :] = turn - self._compliance * q[self.primal :]
+            energy -= 0.5 * float(self._compliance @ q[self.primal :] ** 2)
+            # a held angle is to be met to 1e-12 rad: what is left of it, times the stiffness of the bars, is a moment
+            gap = 1e4 * max(float(np.abs(residual[self.primal :]).max()) - ROUNDING, 0.0)
+            gap = max(
+                gap, 10.0 * float(np.abs(turn).max())
+            )  # the compliance is no excuse for an angle that is not met
             # the independent force of a held hinge is its multiplier; the penalty gamma * turn is no physical moment
             # and would only spoil the geometric stiffness while the angle is not yet met
             forces[held] = q[self.primal :]
@@ -190,7 +203,8 @@ class BarsAndHingesSystem:
             matrix = pattern.matrix(data)
         if not e.held:
             return matrix
-        return MultiplierMatrix(matrix, self._constraint_rows(), e.hinge_stiffness[-e.held :])
+        gamma = e.hinge_stiffness[-e.held :]
+        return MultiplierMatrix(matrix, self._constraint_rows(), gamma, self._compliance)
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         e = self.elements
@@ -291,6 +305,15 @@ class BarsAndHingesSystem:
         if self.constraints.rigid_body:
             groups += (self.mesh.triangles[self._ground_triangle][None, :],)
         return build_pattern(self.number, groups)
+
+    @cached_property
+    def _compliance(self) -> Array:
+        """Compliance of held creases, rad / (N mm): far below rounding of the angles at ordinary moments.
+
+        Where panels are rigid, a straight crease can carry moments that balance each other at no cost; it picks the
+        smallest ones.
+        """
+        return COMPLIANCE / self.elements.hinge_stiffness[-self.elements.held :]
 
     @cached_property
     def _held_columns(self) -> Ints:
@@ -405,3 +428,15 @@ def _to_triangles(model: Model, energy: Array, edges: Ints) -> Array:
         inside = sides[:, side] >= 0
         np.add.at(density, sides[inside, side], share[inside])
     return density
+
+
+def _begin_where_they_are(constraints: Constraints, displacement: Array) -> Constraints:
+    """Prescribed displacements whose start is nan begin with the displacement (n, 3) that the nodes have."""
+    unknown = np.isnan(constraints.start)
+    if not unknown.any():
+        return constraints
+    local = displacement.copy()
+    turned = np.flatnonzero(constraints.frame_of >= 0)
+    axes = constraints.frames[constraints.frame_of[turned]]
+    local[turned] = np.einsum("nij,nj->ni", axes, displacement[turned])
+    return replace(constraints, start=np.where(unknown, local, constraints.start))

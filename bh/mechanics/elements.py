@@ -38,8 +38,11 @@ class Elements:
     green: bool = False
 
 
-def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Elements:
-    """Element stiffness of a model in one step; `held_start` (m,) are the dihedral angles that the step begins with."""
+def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment_start: Array) -> Elements:
+    """Element stiffness of a model in one step; `held_start` and `moment_start` (m,) are what it begins with.
+
+    Dihedral angles (rad) and total moments (N mm) of all hinges; moments are zero off creases.
+    """
     mesh, sheet = model.mesh, model.sheet
     topology = mesh.topology
     points = mesh.points
@@ -67,9 +70,10 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Ele
     def ramp(bend: Array, spring: Array, held: Array) -> Array:
         return np.where(law == SHEET, bend[source], np.where(law == SPRING, spring[source], held[source]))
 
-    rest = Ramp(
-        ramp(reference, program.rest.start, held_from), ramp(reference, program.rest.end, program.held.end)
+    rest_from = np.where(
+        np.isnan(program.rest.start), held_start - moment_start / _nonzero(k_fold), program.rest.start
     )
+    rest = Ramp(ramp(reference, rest_from, held_from), ramp(reference, program.rest.end, program.held.end))
     scale = np.where(law == HELD, 0.0, hinge_length[source])
     couple = Ramp(program.moment.start[source] * scale, program.moment.end[source] * scale)
     return Elements(
@@ -79,3 +83,7 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array) -> Ele
         bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]),
         green=model.stiffness is not None and model.stiffness.green,
     )  # fmt: skip
+
+
+def _nonzero(stiffness: Array) -> Array:
+    return np.where(stiffness == 0.0, np.inf, stiffness)

@@ -20,6 +20,7 @@ from bh.solvers.newton import Newton
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
+MODE = "arc length"
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class ArcLength:
         generalised: scale the increment of lambda by the root of the generalised stiffness parameter (MGDCM) in place
             of keeping the arc; it shortens where the path stiffens and needs no length of its own.
         goal: iterations that an increment should take; `iterations` the most.
-        growth: largest arc, in parts of the first one.
+        growth: largest arc, in parts of the one that `first` makes at the start of the step.
         most: increments before giving up.
         lowest: lambda at which a path that runs backwards is given up.
         newton: tolerance, and the solver for the last point at lambda = 1.
@@ -52,22 +53,28 @@ class ArcLength:
         return self.first, 1.0
 
     def follow(
-        self, system: System, history: Sequence[Point], increment: float | None = None
+        self,
+        system: System,
+        history: Sequence[Point],
+        increment: float | None = None,
+        origin: Point | None = None,
     ) -> Iterator[Increment]:
         """Follow the path from the last point of `history` until lambda = 1; see `LoadControl.follow`."""
         here = history[-1]
         direction = here.q - history[-2].q if len(history) > 1 else None
-        length: float | None = None
-        largest = math.inf
+        p = system.primal
+        start, _ = self._tangent(system, origin or history[0])
+        largest = self.growth * self.first * float(np.linalg.norm(start[:p]))
+        length: float | None = increment if here.mode == MODE else None
+        shortest: float | None = None
         first_tangent: Array | None = None
         for _ in range(self.most):
             tangent, negative = self._tangent(system, here)
-            p = system.primal
             size = float(np.linalg.norm(tangent[:p]))
             if length is None:
                 length = (increment or self.first) * size
-                largest = self.growth * self.first * size
-                first_tangent = tangent
+            if shortest is None or first_tangent is None:
+                shortest, first_tangent = self.smallest * length, tangent
             sign = 1.0 if direction is None else math.copysign(1.0, float(tangent[:p] @ direction[:p]))
             scale = length / max(size, 1e-300)
             if self.generalised and first_tangent is not None:
@@ -75,23 +82,23 @@ class ArcLength:
             there, iterations, reason = self._increment(system, here, tangent, sign * scale)
             if there is None:
                 length *= 0.4
-                if length < self.smallest * largest:
-                    yield Increment(here, "stalled", iterations, math.nan, None, length / size, (), reason)
+                if length < shortest:
+                    yield Increment(here, "stalled", iterations, math.nan, None, length, (), reason)
                     return
                 continue
             direction = there.q - here.q
             done = there.lam >= 1.0
             if there.lam < self.lowest:
                 note = f"the path runs back below lambda {self.lowest:g}"
-                yield Increment(here, "limit-point", iterations, math.nan, None, length / size, (), note)
+                yield Increment(here, "limit-point", iterations, math.nan, None, length, (), note)
                 return
             length = min(largest, length * min(1.8, math.sqrt(self.goal / max(iterations, 1))))
             here = there
             _, negative = self._tangent(system, here)
             evaluation = system.evaluate(here.q, here.lam)
             yield Increment(
-                here, "reached", iterations, evaluation.imbalance, negative == 0, length / max(size, 1e-300), (),
-                "arc length", negative,
+                here, "reached", iterations, evaluation.imbalance, negative == 0, length, (),
+                MODE, negative,
             )  # fmt: skip
             if done:
                 return
@@ -128,7 +135,7 @@ class ArcLength:
                     part = (1.0 - here.lam) / (lam - here.lam)
                     system.tangent(here.q, here.lam, here.forces)  # predictions are from the last tangent
                     return self._arrive(system, here, part * (q - here.q))
-                return point(system, q, lam), iteration, ""
+                return point(system, q, lam, MODE), iteration, ""
             try:
                 factor, _ = system.tangent(q, lam, forces).factorise_any()
             except IndefiniteError:
@@ -156,4 +163,4 @@ class ArcLength:
         turned = system.objection(here.q, here.lam, solution.q, 1.0)
         if turned or far:
             return None, solution.iterations, turned or "jumped to another branch"
-        return point(system, solution.q, 1.0), solution.iterations, ""
+        return point(system, solution.q, 1.0, MODE), solution.iterations, ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from bh.solvers.arc_length import ArcLength
+from bh.solvers.arc_length import MODE, ArcLength
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, Point
 from bh.solvers.system import System
@@ -30,17 +30,26 @@ class Automatic:
         return self.load.limits(system)
 
     def follow(
-        self, system: System, history: Sequence[Point], increment: float | None = None
+        self,
+        system: System,
+        history: Sequence[Point],
+        increment: float | None = None,
+        origin: Point | None = None,
     ) -> Iterator[Increment]:
         """See `LoadControl.follow`; increments by arc length say so in their note."""
         points = list(history)
+        if points[-1].mode == MODE and points[-1].lam < 1.0:  # a resumed run goes on the way it went
+            passed = yield from self._run(self.arc.follow(system, points, increment, origin), points)
+            if passed is not None:
+                yield passed
+            return
         first = replace(self.load, smallest=max(self.patience, self.load.smallest))
         failure = yield from self._run(first.follow(system, points, increment), points)
         if failure is None:
             return
         if len(points) > 1:
             step = max(points[-1].lam - points[-2].lam, self.patience)
-            passed = yield from self._run(self.arc.follow(system, points, step), points)
+            passed = yield from self._run(self.arc.follow(system, points, step, origin), points)
             if passed is None:
                 return
             failure = replace(passed, note=f"{failure.note}; by arc length: {passed.note}")

@@ -39,7 +39,7 @@ class LoadControl:
     largest: float = 0.34
     goal: int = 5
     smallest: float = 1e-5
-    work_mismatch: float = 0.35
+    work_mismatch: float = 0.2
     newton: Newton = field(default_factory=Newton)
 
     def limits(self, system: System) -> tuple[float, float]:
@@ -51,7 +51,11 @@ class LoadControl:
         return self.first, self.largest
 
     def follow(
-        self, system: System, history: Sequence[Point], increment: float | None = None
+        self,
+        system: System,
+        history: Sequence[Point],
+        increment: float | None = None,
+        origin: Point | None = None,
     ) -> Iterator[Increment]:
         """Go from the last point of `history` to lambda = 1; yields every accepted increment, or one failure last.
 

@@ -15,13 +15,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Point:
-    """A converged state on the way of one step: lambda, unknowns, element forces and the rate of work there."""
+    """A converged state on the way of one step: lambda, unknowns, element forces and the rate of work there.
+
+    `mode` is "arc length" where the state was found so, which a resumed run has to go on with.
+    """
 
     lam: float
     q: Array
     forces: Array
     energy: float
     power: float
+    mode: str = ""
 
 
 @dataclass(frozen=True)
@@ -44,10 +48,10 @@ class Increment:
     negative: int | None = None
 
 
-def point(system: System, q: Array, lam: float) -> Point:
+def point(system: System, q: Array, lam: float, mode: str = "") -> Point:
     """The point of a path at given unknowns."""
     evaluation = system.evaluate(q, lam)
-    return Point(lam, q, evaluation.forces, evaluation.energy, system.power(q, lam))
+    return Point(lam, q, evaluation.forces, evaluation.energy, system.power(q, lam), mode)
 
 
 def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Symmetric matrices that factorise themselves: banded, sparse, with multipliers, and of a free body.
+"""Symmetric matrices that factorise themselves: banded, sparse, of a free body (multipliers: `bh.solvers.saddle`).
 
 A matrix knows how to solve with itself; the driver does not care how. `factorise` either returns a factor or raises
 `IndefiniteError`, which says how many eigenvalues are negative, so that the driver can shift or turn back.
@@ -19,10 +19,6 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-TINY_SHIFT = 1e-12  # shifts up to this only take rounding off
-MOST_DENSE = 4000  # constraints whose Schur complement is still formed as a dense matrix
-
-
 class IndefiniteError(ArithmeticError):
     """The matrix is not positive definite (for multipliers: not so on the constraint's null space).
 
@@ -36,7 +32,7 @@ class IndefiniteError(ArithmeticError):
 
 class Factor(Protocol):
     def solve(self, b: Array) -> Array:
-        """x with A x = b, b (n,)."""
+        """x with A x = b, b (n,) or (n, k)."""
         ...
 
     def descend(self, residual: Array) -> Array:
@@ -161,7 +157,8 @@ class BandLDLFactor:
     def solve(self, b: Array) -> Array:
         unit = {"uplo": "L", "diag": "U"}
         x, _ = lapack.dtbtrs(self.ab, b[self.order], trans="N", **unit)
-        x, _ = lapack.dtbtrs(self.ab, x / self.ab[0], trans="T", **unit)
+        pivots = self.ab[0] if x.ndim == 1 else self.ab[0][:, None]
+        x, _ = lapack.dtbtrs(self.ab, x / pivots, trans="T", **unit)
         out = np.empty_like(b)
         out[self.order] = x
         return out
@@ -275,172 +272,6 @@ class FreeBodyFactor:
     def solve(self, b: Array) -> Array:
         x = self.factor.solve(b - self.Z @ (self.Z.T @ b))
         return x - self.Z @ (self.Z.T @ x)
-
-    def descend(self, residual: Array) -> Array:
-        return -self.solve(residual)
-
-
-@njit(cache=True, nogil=True)
-def _times(values, columns, x, out):  # type: ignore[no-untyped-def]
-    for i in range(len(values)):
-        total = 0.0
-        for j in range(values.shape[1]):
-            if columns[i, j] >= 0:
-                total += values[i, j] * x[columns[i, j]]
-        out[i] = total
-
-
-@njit(cache=True, nogil=True)
-def _transpose_times(values, columns, y, out):  # type: ignore[no-untyped-def]
-    for i in range(len(values)):
-        for j in range(values.shape[1]):
-            if columns[i, j] >= 0:
-                out[columns[i, j]] += values[i, j] * y[i]
-
-
-@dataclass(frozen=True)
-class ConstraintRows:
-    """Gradients G (c, n) of constraints, each with a few entries: `values` and `columns` (c, w), column -1 unused."""
-
-    values: Array
-    columns: Ints
-    n: int
-
-    def times(self, x: Array) -> Array:
-        out = np.empty(len(self.values))
-        _times(self.values, self.columns, x, out)
-        return out
-
-    def transpose_times(self, y: Array) -> Array:
-        out = np.zeros(self.n)
-        _transpose_times(self.values, self.columns, y, out)
-        return out
-
-
-@dataclass(frozen=True)
-class MultiplierMatrix:
-    """The saddle matrix [[A, G^T], [G, 0]] of constraints in augmented form, A = K + gamma G^T G.
-
-    A is positive definite just where K is so on the null space of G (for gamma large enough) and has the sparsity of
-    ordinary hinges. Right-hand sides and solutions are (n + c,), multipliers last.
-    """
-
-    augmented: BandMatrix | SparseMatrix | FreeBodyMatrix
-    G: ConstraintRows
-    gamma: Array  # (c,) one for each constraint
-
-    def factorise(self, shift: float = 0.0) -> MultiplierFactor | DenseSchurFactor:
-        try:
-            return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma)
-        except IndefiniteError:
-            if shift > TINY_SHIFT:
-                raise
-        # large moments in the constraints can outweigh gamma: A is indefinite, the state on the constraints is not
-        factor, negative = self.factorise_any()
-        if negative > 0 or isinstance(factor, MultiplierFactor):
-            raise IndefiniteError(max(negative, 1))
-        return factor  # type: ignore[return-value]
-
-    def factorise_any(self) -> tuple[Factor, int]:
-        factor, negative = self.augmented.factorise_any()
-        if negative == 0:
-            return MultiplierFactor(factor, self.G, self.gamma), 0
-        if len(self.gamma) > MOST_DENSE:
-            raise IndefiniteError(negative)
-        whole = DenseSchurFactor.of(factor, self.G)
-        # inertia of the saddle is that of A and of -S; its c constraints take c of the negative ones (Gould 1985)
-        return whole, negative - int((whole.schur_values < 0.0).sum())
-
-    def __matmul__(self, x: Array) -> Array:
-        n = self.G.n
-        top = self.augmented @ x[:n] + self.G.transpose_times(x[n:])
-        return np.concatenate((top, self.G.times(x[:n])))
-
-    def diagonal(self) -> Array:
-        return np.concatenate((self.augmented.diagonal(), np.zeros(len(self.gamma))))
-
-
-@dataclass(frozen=True)
-class MultiplierFactor:
-    """Solves by conjugate gradients on the Schur complement S = G A^-1 G^T, preconditioned by gamma.
-
-    S is 1 / gamma up to the stiffness of the structure against the constraints, so few steps suffice; x and y meet
-    the first row exactly after each of them. The tolerance is relative to the multipliers: Newton's method corrects
-    the rest (an inexact Newton, Dembo, Eisenstat and Steihaug 1982).
-    """
-
-    factor: Factor
-    G: ConstraintRows
-    gamma: Array
-    most: int = 40
-    tolerance: float = 1e-3
-
-    def solve(self, b: Array) -> Array:
-        G, n = self.G, self.G.n
-        gap = b[n:]
-        y = np.zeros(len(gap))
-        x = self.factor.solve(b[:n])
-        miss = G.times(x) - gap
-        goal = 1e-7 * float(np.abs(gap).max(initial=0.0))
-        p = z = self.gamma * miss
-        rho = float(miss @ z)
-        for _ in range(self.most):
-            if rho == 0.0 or (
-                np.abs(miss).max() <= goal and np.abs(z).max() <= self.tolerance * np.abs(y).max()
-            ):
-                break
-            v = self.factor.solve(G.transpose_times(p))
-            Sp = G.times(v)
-            curvature = float(p @ Sp)
-            if curvature <= 0.0:  # no unknown can change these constraints
-                break
-            step = rho / curvature
-            y += step * p
-            x -= step * v
-            miss -= step * Sp
-            z = self.gamma * miss
-            rho, before = float(miss @ z), rho
-            p = z + (rho / before) * p
-        return np.concatenate((x, y))
-
-    def descend(self, residual: Array) -> Array:
-        """Newton's direction of the augmented energy at fixed multipliers, and their first-order update.
-
-        The saddle's own direction meets the constraints at once, but may go uphill where the tangent was shifted.
-        """
-        n = self.G.n
-        x = -self.factor.solve(residual[:n])
-        return np.concatenate((x, self.gamma * (residual[n:] + self.G.times(x))))
-
-
-@dataclass(frozen=True)
-class DenseSchurFactor:
-    """Factor of a saddle matrix whose first block is indefinite; its Schur complement G A^-1 G^T is dense."""
-
-    factor: Factor
-    G: ConstraintRows
-    influence: Array  # (n, c) A^-1 G^T
-    schur: Array
-    schur_values: Array
-
-    @classmethod
-    def of(cls, factor: Factor, G: ConstraintRows) -> DenseSchurFactor:
-        count = len(G.values)
-        influence = np.empty((G.n, count))
-        schur = np.empty((count, count))
-        for k in range(count):
-            unit = np.zeros(count)
-            unit[k] = 1.0
-            influence[:, k] = factor.solve(G.transpose_times(unit))
-            schur[:, k] = G.times(influence[:, k])
-        schur = 0.5 * (schur + schur.T)
-        return cls(factor, G, influence, schur, np.asarray(np.linalg.eigvalsh(schur), dtype=float))
-
-    def solve(self, b: Array) -> Array:
-        n = self.G.n
-        x = self.factor.solve(b[:n])
-        y = np.linalg.solve(self.schur, self.G.times(x) - b[n:])
-        return np.concatenate((x - self.influence @ y, y))
 
     def descend(self, residual: Array) -> Array:
         return -self.solve(residual)

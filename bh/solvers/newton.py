@@ -109,13 +109,13 @@ class Newton:
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=True)
             matrix = system.tangent(q, lam, now.forces)
-            factor, shift = factorise_shifted(matrix, shift)
+            factor, shift = factorise_shifted(matrix, shift, least=1e-11)
             if factor is None:
                 return Solution(q, now, iteration, False, "singular tangent", careful=True)
             dq = factor.descend(now.residual)
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, careful=True)
-            near = shift == 0.0 and now.imbalance < 0.1
+            near = shift < 1e-9 and now.imbalance < 0.1
             step = full_step(system, q, lam, now, -factor.solve(now.residual)) if near else None
             step = step or line_search(system, q, lam, now, dq)
             if step is None:
@@ -157,19 +157,22 @@ def _with_lambda(guess: tuple[Array, Array], lam: float) -> tuple[Array, float, 
     return guess[0], lam, guess[1]
 
 
-def factorise_shifted(matrix: Matrix, shift: float, largest: float = 1e6) -> tuple[Factor | None, float]:
+def factorise_shifted(
+    matrix: Matrix, shift: float, largest: float = 1e6, least: float = 0.0
+) -> tuple[Factor | None, float]:
     """The factor with the smallest tried shift (in parts of the diagonal) that makes the matrix positive definite.
 
     Neutral modes, such as the phase of the waves of a buckled ring, are first given a stiffness at the level of
     rounding. Returns None where the shift would exceed `largest`.
     """
     if shift < 1e-9:
-        shift = 0.0
+        shift = least
     while shift <= largest:
         try:
             return matrix.factorise(shift), shift
         except IndefiniteError:
-            shift = NEUTRAL if shift == 0.0 else max(4.0 * shift, 1e-9)
+            # a matrix that is indefinite at zero has been looked at closely; go past what it calls rounding
+            shift = 1e-11 if shift == 0.0 else max(4.0 * shift, 1e-9)
     return None, shift
 
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import IndefiniteError, Matrix, MultiplierMatrix
+from bh.solvers.matrices import IndefiniteError, Matrix
 from bh.solvers.newton import Newton, Solution, factorise_shifted
+from bh.solvers.saddle import MultiplierMatrix
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
@@ -24,7 +25,7 @@ def lowest_mode(
     """
     # the penalty of the augmented matrix keeps its low modes in the null space of the constraints
     matrix = matrix.augmented if isinstance(matrix, MultiplierMatrix) else matrix
-    factor, _ = factorise_shifted(matrix, 0.0)
+    factor, _ = factorise_shifted(matrix, 0.0, least=1e-11)
     if factor is None:
         raise IndefiniteError(1)
     mode = np.random.default_rng(20).normal(size=primal)

@@ -18,20 +18,31 @@ class Strategy(Protocol):
         ...
 
     def follow(
-        self, system: System, history: Sequence[Point], increment: float | None = None
+        self,
+        system: System,
+        history: Sequence[Point],
+        increment: float | None = None,
+        origin: Point | None = None,
     ) -> Iterator[Increment]:
-        """Accepted increments from the last of up to three points to lambda = 1, or one failure last."""
+        """Accepted increments from the last of up to three points to lambda = 1, or one failure last.
+
+        `increment` is the next one to try, `origin` the point that the step began with, where they are known.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class Walk:
-    """A step to be walked: from the last point of `history` (up to three) to lambda = 1."""
+    """A step to be walked: from the last point of `history` (up to three) to lambda = 1.
+
+    `origin` is the point that the step began with, where `history` no longer has it (a resumed run).
+    """
 
     system: System
     strategy: Strategy
     history: tuple[Point, ...]
     increment: float | None = None
+    origin: Point | None = None
 
 
 def walk(task: Walk) -> Iterator[Increment]:
@@ -39,4 +50,4 @@ def walk(task: Walk) -> Iterator[Increment]:
 
     The last one has another outcome than "reached" if the step could not be finished.
     """
-    yield from task.strategy.follow(task.system, task.history, task.increment)
+    yield from task.strategy.follow(task.system, task.history, task.increment, task.origin)

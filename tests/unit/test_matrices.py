@@ -13,14 +13,12 @@ from bh.mechanics import assembly
 from bh.mechanics.assembly import build_pattern
 from bh.solvers.matrices import (
     BandMatrix,
-    ConstraintRows,
     FreeBodyMatrix,
     IndefiniteError,
-    MultiplierFactor,
-    MultiplierMatrix,
     SparseMatrix,
     reverse_cuthill_mckee,
 )
+from bh.solvers.saddle import ConstraintRows, MultiplierFactor, MultiplierMatrix
 
 Array = NDArray[np.float64]
 N, BAND = 12, 3
@@ -248,7 +246,9 @@ def constrained(seed: int = 8, count: int = 3, gamma: float = 50.0) -> tuple[Mul
                 G[i, columns[i, j]] += values[i, j]
     weights = np.full(count, gamma)
     A = symmetric(9, lift=12.0) + G.T @ (weights[:, None] * G)
-    matrix = MultiplierMatrix(sparse(A, np.arange(N)), ConstraintRows(values, columns, N), weights)
+    matrix = MultiplierMatrix(
+        sparse(A, np.arange(N)), ConstraintRows(values, columns, N), weights, 0.0 * weights
+    )
     return matrix, np.block([[A, G.T], [G, np.zeros((count, count))]])
 
 
@@ -269,33 +269,42 @@ def test_multipliers_against_a_dense_saddle(gap: float, gamma: float) -> None:
     assert np.abs(y[:N] - expected[:N]).max() <= 1e-3 * np.abs(expected[:N]).max()
     # as tight as it is asked for
     factor = matrix.factorise()
-    tight = MultiplierFactor(factor.factor, factor.G, factor.gamma, most=200, tolerance=1e-12).solve(b)
+    tight = MultiplierFactor(
+        factor.factor, factor.G, factor.gamma, factor.compliance, most=200, tolerance=1e-12
+    ).solve(b)
     assert np.allclose(tight, expected, rtol=1e-7, atol=1e-8)
 
 
 def test_indefinite_but_positive_on_the_constraints() -> None:
-    """K with a negative direction that the constraint holds: a large gamma makes it definite, a small one does not."""
+    """K with a negative direction that the constraint holds is definite there, whatever gamma is."""
     rng = np.random.default_rng(11)
     g = np.zeros(N)
     g[:4] = rng.normal(size=4)
     K = symmetric(12, lift=12.0) - 60.0 * np.outer(g, g) / (g @ g)
     assert (np.linalg.eigvalsh(K) < 0.0).sum() == 1
     G = ConstraintRows(g[None, :4].copy(), np.arange(4)[None], N)
-    for gamma, definite in ((100.0, True), (1e-3, False)):
-        matrix = MultiplierMatrix(sparse(K + gamma * np.outer(g, g), np.arange(N)), G, np.array([gamma]))
-        if definite:
-            y = matrix.factorise().solve(np.ones(N + 1))
-            assert g @ y[:N] == pytest.approx(1.0, abs=1e-7)
-        else:
-            with pytest.raises(IndefiniteError):
-                matrix.factorise()
+    for gamma in (100.0, 1e-3):
+        matrix = MultiplierMatrix(
+            sparse(K + gamma * np.outer(g, g), np.arange(N)), G, np.array([gamma]), np.zeros(1)
+        )
+        y = matrix.factorise().solve(np.ones(N + 1))
+        assert g @ y[:N] == pytest.approx(1.0, abs=1e-7)
+        assert matrix.factorise_any()[1] == 0
+    other = np.roll(g, 7)
+    K = K - 60.0 * np.outer(other, other) / (other @ other)
+    matrix = MultiplierMatrix(
+        sparse(K + 100.0 * np.outer(g, g), np.arange(N)), G, np.array([100.0]), np.zeros(1)
+    )
+    assert matrix.factorise_any()[1] == 1
+    with pytest.raises(IndefiniteError):
+        matrix.factorise()
 
 
 def test_constraint_that_no_unknown_can_meet() -> None:
     """All unknowns of a constraint are prescribed: an error that says so, or the least-squares answer; no crash."""
     A, order = shuffled(symmetric())
     G = ConstraintRows(np.ones((1, 4)), np.full((1, 4), -1), N)
-    matrix = MultiplierMatrix(sparse(A, order), G, np.array([1.0]))
+    matrix = MultiplierMatrix(sparse(A, order), G, np.array([1.0]), np.zeros(1))
     try:
         y = matrix.factorise().solve(np.ones(N + 1))
     except IndefiniteError:

@@ -112,6 +112,7 @@ def test_environment_stays_as_it_was(
         ),
         (lambda s, f: plotting.picture(s, f / "a.jpg"), "is not a .png file"),
         (lambda s, f: plotting.picture(s, f / "a.png", size=(0, 10)), "size 0 x 10 cannot be"),
+        (lambda s, f: plotting.picture([s], f / "a.png"), r"list is not a state; give .* path\[-1\]"),
         (lambda s, f: plotting.picture(s, f / "a.png", top=float("nan")), "top = nan cannot be"),
     ],
 )

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from meshes.errors import InputError
 from reports.build import build, number, seconds, share
 from reports.figures import Plot, svg, typeset
+from verification.cases import CASES
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 MESHES = ("staggered", "alternating", "one-way", "mirrored")
@@ -254,8 +255,33 @@ def test_same_results_give_the_same_page(tmp_path: Path, html: str) -> None:
 
 
 def test_reproduction_and_environment_are_told(page: Page) -> None:
-    for words in ("bh verify strips", "bh verify cone", "2.4.6", "22 November 2026, 02:18 UTC", "quick run"):
+    for words in (
+        "bh verify strips",
+        "bh verify cone",
+        "2.4.6",
+        "22 November 2026, 02:18 UTC",
+        "quick run",
+        "Woodruff",
+    ):
         assert words in page.text
+
+
+def test_what_is_missing_or_quick_is_named(tmp_path: Path) -> None:
+    data = results(tmp_path)
+    page = Page(build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert f"3 of {len(CASES)} cases run, quick. Not run: shear_calibration, appendix_b" in page.text
+    assert "20 records of strips" in page.text
+    assert "1 record of cone" in page.text
+    data["cases"] = [{"name": name, "quick": name == "cone"} for name in CASES]
+    data["cases"][0] |= {
+        "date": "2025-01-02T03:04:00+00:00",
+        "versions": {"python": "3.11.4", "numpy": "1.0"},
+    }
+    write(tmp_path, data)
+    page = Page(build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert "Not run" not in page.text
+    assert "1 of them quick" in page.text
+    assert "strips is of 2 January 2025, 03:04 UTC; numpy 1.0" in page.text
 
 
 def test_text_of_results_is_escaped(html: str) -> None:
@@ -353,6 +379,10 @@ def test_errors_are_shares_of_the_reference(tmp_path: Path) -> None:
 
 def test_text_is_typeset() -> None:
     assert typeset("(theta + 1/theta)^2.") == "(θ + 1/θ)²."
+    assert typeset("about 4.5e-06 N, -3 at 1,745, or 2E3.") == (
+        "about 4.5\u2009×\u200910⁻⁶ N, −3 at 1\u2009745, or 2\u2009×\u200910³."  # noqa: RUF001
+    )
+    assert typeset("Eq. 3.2-3.4, 20-30, 1e, v1e3, 1,2") == "Eq. 3.2-3.4, 20-30, 1e, v1e3, 1,2"
     assert typeset("theta_a, alphabet, 2^-3, x^2.5") == "θ_a, alphabet, 2⁻³, x^2.5"
     assert typeset("t = 1, 3 % of") == "t\u00a0=\u00a01, 3\u00a0% of"
 

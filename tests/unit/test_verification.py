@@ -201,6 +201,75 @@ def test_records_of_the_strips(tmp_path: Path) -> None:
     assert by["bending_in_plane", "alternating", 8.0] == pytest.approx(3.0, rel=0.1)
 
 
+def test_a_run_keeps_what_others_found(tmp_path: Path) -> None:
+    first = run(["shear_calibration", "derivatives"], tmp_path, quick=True)
+    file = tmp_path / "checks.json"
+    old = no_constants(file.read_text())
+    old["date"] = old["cases"][0]["date"] = old["cases"][1]["date"] = "2020-01-01T00:00:00+00:00"
+    write_json(file, old)
+    again = run(["shear_calibration"], tmp_path)
+    assert {record["case"] for record in again["checks"]} == {
+        "shear_calibration"
+    }  # what is returned is of this run
+    stored = no_constants(file.read_text())
+    assert [info["name"] for info in stored["cases"]] == ["shear_calibration", "derivatives"]
+    fresh, kept = stored["cases"]
+    assert (fresh["date"], fresh["quick"]) == (stored["date"], False)
+    assert (kept["date"], kept["quick"]) == ("2020-01-01T00:00:00+00:00", True)
+    assert kept["versions"] == first["versions"]
+    assert stored["quick"] is True  # of one of them
+    of_case = {
+        name: [r for r in stored["checks"] if r["case"] == name]
+        for name in ("derivatives", "shear_calibration")
+    }
+    assert of_case["derivatives"] == [r for r in old["checks"] if r["case"] == "derivatives"]
+    assert len(of_case["shear_calibration"]) == len(again["checks"])
+
+
+def test_what_is_left_of_a_file_of_one_run(tmp_path: Path) -> None:
+    """A file of a version that kept no date with the cases: they get that of the file."""
+    run(["shear_calibration"], tmp_path, quick=True)
+    file = tmp_path / "checks.json"
+    old = no_constants(file.read_text())
+    for key in ("versions", "date", "machine", "quick"):
+        del old["cases"][0][key]
+    write_json(file, old)
+    run(["derivatives"], tmp_path, quick=True)
+    kept = no_constants(file.read_text())["cases"][0]
+    assert (kept["name"], kept["date"], kept["quick"]) == ("shear_calibration", old["date"], True)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "{",
+        "[]",
+        "null",
+        "{}",
+        '{"checks": 3, "cases": [], "versions": {}, "date": "", "machine": {}, "quick": true}',
+        '{"checks": [{"case": "cone"}], "cases": [], "versions": {}, "date": "", "machine": {}, "quick": true}',
+        '{"checks": [], "cases": [{"name": "cone"}], "versions": {}, "date": "", "machine": {}, "quick": true}',
+        '{"checks": [], "cases": [7], "versions": {}, "date": "", "machine": {}, "quick": true}',
+    ],
+)
+def test_a_broken_record_is_begun_anew(tmp_path: Path, content: str) -> None:
+    (tmp_path / "checks.json").write_text(content)
+    data = run(["shear_calibration"], tmp_path, quick=True)
+    assert no_constants((tmp_path / "checks.json").read_text()) == json.loads(json.dumps(data))
+
+
+def test_environment_and_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    import verification.run as runner
+
+    assert {"python", "pyvista", "matplotlib"} <= set(runner.environment())
+    monkeypatch.setattr(runner, "PROJECT", tmp_path)  # no repository
+    assert "git commit" not in runner.environment()
+    (tmp_path / ".git").write_text("no repository either")
+    assert "git commit" not in runner.environment()
+    monkeypatch.setattr(runner.shutil, "which", lambda name: None)
+    assert "git commit" not in runner.environment()
+
+
 # --------------------------------------------------------------------------------------- a case that fails
 
 

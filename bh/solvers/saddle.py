@@ -1,0 +1,189 @@
+"""Saddle matrices of constraints with multipliers, in augmented form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bh.solvers.matrices import BandMatrix, Factor, FreeBodyMatrix, IndefiniteError, SparseMatrix
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+NOISE = 2e-14  # error of a constraint that is rounding (angles in rad)
+TINY_SHIFT = 1e-12  # shifts up to this only take rounding off
+MOST_DENSE = 4000  # constraints whose Schur complement is still formed as a dense matrix
+
+
+@njit(cache=True, nogil=True)
+def _times(values, columns, x, out):  # type: ignore[no-untyped-def]
+    for i in range(len(values)):
+        total = 0.0
+        for j in range(values.shape[1]):
+            if columns[i, j] >= 0:
+                total += values[i, j] * x[columns[i, j]]
+        out[i] = total
+
+
+@njit(cache=True, nogil=True)
+def _transpose_times(values, columns, y, out):  # type: ignore[no-untyped-def]
+    for i in range(len(values)):
+        for j in range(values.shape[1]):
+            if columns[i, j] >= 0:
+                out[columns[i, j]] += values[i, j] * y[i]
+
+
+@dataclass(frozen=True)
+class ConstraintRows:
+    """Gradients G (c, n) of constraints, each with a few entries: `values` and `columns` (c, w), column -1 unused."""
+
+    values: Array
+    columns: Ints
+    n: int
+
+    def times(self, x: Array) -> Array:
+        out = np.empty(len(self.values))
+        _times(self.values, self.columns, x, out)
+        return out
+
+    def dense(self) -> Array:
+        """G as an array (c, n)."""
+        out = np.zeros((len(self.values), self.n))
+        for entry in range(self.columns.shape[1]):
+            used = np.flatnonzero(self.columns[:, entry] >= 0)
+            out[used, self.columns[used, entry]] += self.values[used, entry]
+        return out
+
+    def transpose_times(self, y: Array) -> Array:
+        out = np.zeros(self.n)
+        _transpose_times(self.values, self.columns, y, out)
+        return out
+
+
+@dataclass(frozen=True)
+class MultiplierMatrix:
+    """The saddle matrix [[A, G^T], [G, -compliance]] of constraints in augmented form, A = K + gamma G^T G.
+
+    A is positive definite just where K is so on the null space of G (for gamma large enough) and has the sparsity of
+    ordinary hinges. Right-hand sides and solutions are (n + c,), multipliers last.
+    """
+
+    augmented: BandMatrix | SparseMatrix | FreeBodyMatrix
+    G: ConstraintRows
+    gamma: Array  # (c,) one for each constraint
+    compliance: Array  # (c,) of the constraints, tiny: it decides between multipliers that do the same
+
+    def factorise(self, shift: float = 0.0) -> MultiplierFactor | DenseSchurFactor:
+        try:
+            return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma, self.compliance)
+        except IndefiniteError:
+            if shift > TINY_SHIFT:
+                raise
+        # large moments in the constraints can outweigh gamma: A is indefinite, the state on the constraints is not
+        factor, negative = self.factorise_any()
+        if negative > 0 or isinstance(factor, MultiplierFactor):
+            raise IndefiniteError(max(negative, 1))
+        return factor  # type: ignore[return-value]
+
+    def factorise_any(self) -> tuple[Factor, int]:
+        factor, negative = self.augmented.factorise_any()
+        if negative == 0:
+            return MultiplierFactor(factor, self.G, self.gamma, self.compliance), 0
+        if len(self.gamma) > MOST_DENSE:
+            raise IndefiniteError(negative)
+        whole = DenseSchurFactor.of(factor, self.G, self.compliance)
+        # inertia of the saddle is that of A and of -S; its c constraints take c of the negative ones (Gould 1985)
+        return whole, negative - int((whole.schur_values < 0.0).sum())
+
+    def __matmul__(self, x: Array) -> Array:
+        n = self.G.n
+        top = self.augmented @ x[:n] + self.G.transpose_times(x[n:])
+        return np.concatenate((top, self.G.times(x[:n]) - self.compliance * x[n:]))
+
+    def diagonal(self) -> Array:
+        return np.concatenate((self.augmented.diagonal(), -self.compliance))
+
+
+@dataclass(frozen=True)
+class MultiplierFactor:
+    """Solves by conjugate gradients on the Schur complement S = G A^-1 G^T, preconditioned by gamma.
+
+    S is 1 / gamma up to the stiffness of the structure against the constraints, so few steps suffice; x and y meet
+    the first row exactly after each of them. The tolerance is relative to the multipliers: Newton's method corrects
+    the rest (an inexact Newton, Dembo, Eisenstat and Steihaug 1982).
+    """
+
+    factor: Factor
+    G: ConstraintRows
+    gamma: Array
+    compliance: Array
+    most: int = 40
+    tolerance: float = 1e-3
+
+    def solve(self, b: Array) -> Array:
+        G, n = self.G, self.G.n
+        gap = b[n:]
+        y = np.zeros(len(gap))
+        x = self.factor.solve(b[:n])
+        miss = G.times(x) - gap
+        goal = 1e-7 * float(np.abs(gap).max(initial=0.0))
+        p = z = self.gamma * miss
+        rho = float(miss @ z)
+        for _ in range(self.most):
+            error = float(np.abs(miss).max(initial=0.0))
+            # constraints that say the same (a straight crease between rigid panels) leave a rounding error that no
+            # multiplier can remove; chasing it would pump up moments that mean nothing
+            if error <= NOISE or (error <= goal and np.abs(z).max() <= self.tolerance * np.abs(y).max()):
+                break
+            v = self.factor.solve(G.transpose_times(p))
+            Sp = G.times(v) + self.compliance * p
+            curvature = float(p @ Sp)
+            if curvature <= 0.0:  # no unknown can change these constraints
+                break
+            step = rho / curvature
+            y += step * p
+            x -= step * v
+            miss -= step * Sp
+            z = self.gamma * miss
+            rho, before = float(miss @ z), rho
+            p = z + (rho / before) * p
+        return np.concatenate((x, y))
+
+    def descend(self, residual: Array) -> Array:
+        """Newton's direction of the augmented energy at fixed multipliers, and their first-order update.
+
+        The saddle's own direction meets the constraints at once, but may go uphill where the tangent was shifted.
+        """
+        n = self.G.n
+        x = -self.factor.solve(residual[:n])
+        return np.concatenate((x, self.gamma * (residual[n:] + self.G.times(x))))
+
+
+@dataclass(frozen=True)
+class DenseSchurFactor:
+    """Factor of a saddle matrix whose first block is indefinite; its Schur complement G A^-1 G^T is dense."""
+
+    factor: Factor
+    G: ConstraintRows
+    influence: Array  # (n, c) A^-1 G^T
+    schur: Array
+    schur_values: Array
+
+    @classmethod
+    def of(cls, factor: Factor, G: ConstraintRows, compliance: Array) -> DenseSchurFactor:
+        rows = G.dense()
+        influence = factor.solve(np.ascontiguousarray(rows.T))
+        schur = rows @ influence
+        schur = 0.5 * (schur + schur.T) + np.diag(compliance)
+        return cls(factor, G, influence, schur, np.asarray(np.linalg.eigvalsh(schur), dtype=float))
+
+    def solve(self, b: Array) -> Array:
+        n = self.G.n
+        x = self.factor.solve(b[:n])
+        y = np.linalg.solve(self.schur, self.G.times(x) - b[n:])
+        return np.concatenate((x - self.influence @ y, y))
+
+    def descend(self, residual: Array) -> Array:
+        return -self.solve(residual)
