@@ -57,3 +57,11 @@ def formulation(name: str) -> Formulation:
             return made
     known = ", ".join(names()) or "none; install the project with pip first"
     raise ModelError(f"formulation '{name}' is not known; use one of: {known}")
+
+
+def takes_nu(name: str) -> bool:
+    """Whether a formulation uses Poisson's ratio of the sheet; it can say so itself by an attribute of this name.
+
+    The formulation that a model has by default does not (3.3.2 of the source).
+    """
+    return bool(getattr(formulation(name), "takes_nu", name != Model.formulation))

@@ -103,7 +103,9 @@ LIBRARY: dict[str, type[StripPattern | AnnulusSectorPattern | FullAnnulusPattern
 
 
 class SheetTable(Table):
-    E: Positive = Field(description="Young's modulus in MPa, a positive number")
+    E: Positive = Field(
+        description="Young's modulus in MPa, a positive number up to 1e9 MPa (1 GPa is 1000 MPa)"
+    )
     nu: Annotated[float, Field(gt=-1.0, le=0.5)] = Field(0.0, description="Poisson's ratio in (-1, 0.5]")
     t: Length = Field(description="the thickness in mm, a positive number")
 

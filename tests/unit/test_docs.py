@@ -1,0 +1,73 @@
+"""docs/scenes.md lists every key that a scene can have, with what `bh.scene_schema` says of it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from bh import scene_schema as schema
+from bh.scene import SECTIONS
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
+TABLES: dict[str, type[schema.Table]] = {
+    'pattern, kind = "strip"': schema.StripPattern,
+    'pattern, kind = "annulus_sector"': schema.AnnulusSectorPattern,
+    'pattern, kind = "full_annulus"': schema.FullAnnulusPattern,
+    "pattern, file": schema.FilePattern,
+    "sheet": schema.SheetTable,
+    "mesh": schema.MeshTable,
+    "model": schema.ModelTable,
+    "supports": schema.SupportTable,
+    "creases.NAME": schema.CreaseTable,
+    "steps: fold": schema.FoldTable,
+    "steps: moment": schema.MomentTable,
+    "steps: force": schema.ForceTable,
+    "steps: displace": schema.DisplaceTable,
+    "outputs": schema.OutputsTable,
+}
+
+
+def rows(table: type[schema.Table]) -> list[str]:
+    """The lines that the page has for a table of the scene."""
+    found = ["| Key | Default | Give |", "|---|---|---|"]
+    for key, field in table.model_fields.items():
+        value = "pi" if field.default == math.pi else schema.shown(field.default)
+        default = "needed" if field.is_required() else {"None": "", "[]": "none"}.get(value, value)
+        about = field.description or f'"{key_of(field)}"'
+        found.append(f"| `{key}` | {default} | {about} |")
+    return found
+
+
+def key_of(field: object) -> str:
+    """The one word that a `kind` can be."""
+    (word,) = field.annotation.__args__  # type: ignore[attr-defined]
+    return str(word)
+
+
+@pytest.mark.parametrize("title", TABLES)
+def test_tables_are_those_of_the_schema(title: str) -> None:
+    section = PAGE.split(f"\n### {title}\n")[1].split("\n#")[0]
+    assert [line for line in section.splitlines() if line.startswith("|")] == rows(TABLES[title])
+
+
+def test_nothing_is_left_out() -> None:
+    every = {kind for kind in vars(schema).values() if isinstance(kind, type) and issubclass(kind, schema.Table)}
+    assert set(TABLES.values()) == every - {schema.Table}
+    named = {title.split(",")[0].split(":")[0].split(".")[0] for title in TABLES}
+    assert named == set(SECTIONS)
+    assert PAGE.count("\n### ") == len(TABLES)
+
+
+def test_places_of_the_page_are_places() -> None:
+    import re
+
+    import meshes
+
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=4)
+    places = re.findall(r"^\| `([^`]+)` \|", PAGE.split("\n## Places\n")[1].split("\n## ")[0], re.MULTILINE)
+    assert {"all", "crease:NAME", "node:N", "edge:inner", "corner:inner-start"} <= set(places)
+    for place in places:
+        assert len(mesh.nodes(place.replace("NAME", "crease").replace(":N", ":3"))) >= 1
+    assert set(mesh.corners) <= set(places)
