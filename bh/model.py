@@ -15,12 +15,13 @@ from bh.actuation import Actuation, Displace, Fold, Force, Moment
 from bh.errors import ModelError
 from bh.supports import RigidBody, Support
 from meshes import SheetMesh
+from meshes.mesh import count
 from meshes.topology import Ints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Sheet:
-    """A thin elastic sheet.
+    """A thin elastic sheet; its values are given by name: `Sheet(E=4000, nu=0.38, t=0.127)`.
 
     Attributes:
         E: Young's modulus, MPa.
@@ -36,9 +37,9 @@ class Sheet:
         for name, unit in (("E", "MPa"), ("t", "mm")):
             value = getattr(self, name)
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
-                raise ModelError(f"sheet {name} = {value} cannot be; give a positive number in {unit}")
-        if not -1.0 < self.nu <= 0.5:
-            raise ModelError(f"sheet nu = {self.nu} cannot be; Poisson's ratio lies in (-1, 0.5]")
+                raise ModelError(f"sheet {name} = {value!r} cannot be; give a positive number in {unit}")
+        if not (isinstance(self.nu, Real) and -1.0 < self.nu <= 0.5):
+            raise ModelError(f"sheet nu = {self.nu!r} cannot be; Poisson's ratio lies in (-1, 0.5]")
 
     def bending_stiffness(self, nu: float | None = None) -> float:
         """D = E t^3 / (12 (1 - nu^2)), N mm (Eq. B.2); `nu` overrides the sheet's."""
@@ -99,7 +100,7 @@ class ElementStiffness:
             object.__setattr__(self, name, values)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Model:
     """A sheet with supports, creases and steps of actuation (frozen; the methods return changed copies).
 
@@ -120,6 +121,25 @@ class Model:
     creases: Mapping[str, CreaseLaw] = field(default_factory=dict)
     formulation: str = "bars-and-hinges"
     stiffness: ElementStiffness | None = None
+
+    def __post_init__(self) -> None:
+        for name, kind, how in (
+            ("mesh", SheetMesh, "meshes.structured(pattern, aspect_ratio=8)"),
+            ("sheet", Sheet, "bh.Sheet(E=4000, nu=0.38, t=0.127)"),
+        ):
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                what = value.__name__ if isinstance(value, type) else f"a {type(value).__name__}"
+                raise ModelError(
+                    f"the {name} of a model is {what}; give bh.Model(mesh, sheet) {how} as {name}"
+                )
+
+    def __repr__(self) -> str:
+        """One line: "Model(384 triangles, 1 crease, 4 supports, 1 step, bars-and-hinges)"."""
+        supports = count(len(self.supports), "support") if self.supports else "rigid-body support"
+        creases = count(len(self.mesh.creases), "crease")
+        triangles, steps = count(len(self.mesh.triangles), "triangle"), count(len(self.steps), "step")
+        return f"Model({triangles}, {creases}, {supports}, {steps}, {self.formulation})"
 
     @classmethod
     def from_arrays(

@@ -26,6 +26,7 @@ from bh.solvers.increments import Increment, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
 from bh.storage import PathFile, StateRow, reading
+from meshes.mesh import count
 
 Array = NDArray[np.float64]
 
@@ -102,6 +103,14 @@ class Path:
     def lambdas(self) -> Array:
         """(states,) step + lambda of every state: 1.25 is a quarter of the second step."""
         return np.array([record.step + record.lam for record in self.records])
+
+    def __repr__(self) -> str:
+        """One line: "Path(reached, 6 states, 16 iterations, 1 of 1 steps)"."""
+        reached = sum(step.outcome == "reached" for step in self.steps)
+        return (
+            f"Path({self.outcome}, {count(len(self), 'state')}, {count(self.iterations, 'iteration')}, "
+            f"{reached} of {count(len(self.model.steps), 'step')})"
+        )
 
     def __len__(self) -> int:
         return len(self.records)
@@ -206,6 +215,9 @@ def trace(
         ModelError: the model has no steps, or cannot be solved as described.
         PathFileError: the file cannot be written, or is of another model.
     """
+    if not isinstance(model, Model):
+        what = "give scene.model" if hasattr(model, "model") else "give a bh.Model"
+        raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
     strategy = strategy or Automatic()

@@ -175,7 +175,7 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
     flat = _pattern(drawn)
     _check_size(flat, how)
     with within("mesh"):
-        return structured(flat, how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
+        return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
 
 
 def _mesh_table(table: dict[str, Any]) -> MeshTable:

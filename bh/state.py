@@ -35,7 +35,7 @@ class Energy:
         }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class State:
     """A solved state.
 
@@ -63,6 +63,11 @@ class State:
     crease_moments: Array
     stable: bool | None = None
     extra: Mapping[str, Array] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """One line: "State(step 0, lambda 1, energy 0.0534 N mm, stable)"."""
+        stable = {True: ", stable", False: ", not stable", None: ""}[self.stable]
+        return f"State(step {self.step}, lambda {self.lam:.4g}, energy {self.energy.total:.4g} N mm{stable})"
 
     def dihedral(self, crease: str) -> Array:
         """Dihedral angles along a crease, one an edge in order, rad."""

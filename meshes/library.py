@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import SupportsFloat
 
 import numpy as np
 
@@ -47,7 +48,8 @@ def annulus_sector(
     """
     angle = _positive("angle", angle)
     if angle >= 2.0 * math.pi:
-        raise PatternError(f"angle {angle:g} rad closes the sector; use full_annulus for a whole turn")
+        hint = "; angles are radians, not degrees" if 7.0 < angle <= 360.0 else ""
+        raise PatternError(f"angle {angle:g} rad closes the sector; use full_annulus for a whole turn{hint}")
     radii = _radii(radius, width)
     return _between_rails([Arc((0.0, 0.0), r, 0.0, angle) for r in radii], folds)
 
@@ -58,7 +60,10 @@ def full_annulus(radius: float | Sequence[float], width: float, folds: Folds = "
 
 
 def _radii(radius: float | Sequence[float], width: float) -> list[float]:
-    creases = [float(r) for r in np.atleast_1d(np.asarray(radius, dtype=float))]
+    try:
+        creases = [float(r) for r in np.atleast_1d(np.asarray(radius, dtype=float))]
+    except (TypeError, ValueError) as error:
+        raise PatternError(f"radius = {radius!r} is not a number; give radii in mm") from error
     for r in creases:
         _positive("radius", r)
     width = _positive("width", width)
@@ -96,6 +101,8 @@ def _between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
 
 
 def _positive(name: str, value: float) -> float:
+    if isinstance(value, str | bool) or not isinstance(value, SupportsFloat):
+        raise PatternError(f"{name} = {value!r} is not a number; give a positive length or angle")
     value = float(value)
     if not math.isfinite(value) or value <= 0.0:
         raise PatternError(f"{name} = {value:g} cannot be; give a positive length or angle")

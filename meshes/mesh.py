@@ -15,7 +15,12 @@ from meshes.pattern import FOLD_KINDS, FoldKind
 from meshes.topology import Ints, Topology, build
 
 
-@dataclass(frozen=True, eq=False)
+def count(number: int, what: str) -> str:
+    """ "1 crease", "2 creases" """
+    return f"{number} {what}" + ("" if number == 1 else "s")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class SheetMesh:
     """A triangulated sheet in its stress-free state, with named sets (frozen: arrays are read-only).
 
@@ -82,6 +87,14 @@ class SheetMesh:
             if np.shape(self.spans) != topology.edges.shape:
                 raise MeshError(f"spans must have one row an edge, shape {topology.edges.shape}")
             set_(self, "spans", _frozen(np.array(self.spans, dtype=float)))
+
+    def __repr__(self) -> str:
+        """One line: "SheetMesh(451 nodes, 640 triangles, 1 crease, staggered, aspect ratio 8.1)"."""
+        words = [count(len(self.points), "node"), count(len(self.triangles), "triangle")]
+        words += [count(len(self.creases), "crease"), self.kind]
+        if self.aspect_ratio == self.aspect_ratio:
+            words.append(f"aspect ratio {self.aspect_ratio:.3g}")
+        return f"SheetMesh({', '.join(words)})"
 
     def _check_names(self, topology: Topology) -> None:
         """Named sets, corners, folds and angles belong to the mesh and to each other."""

@@ -27,8 +27,8 @@ Kind = Literal["staggered", "alternating", "one-way", "mirrored"]
 
 def structured(
     pattern: CreasePattern,
-    aspect_ratio: float | None = None,
     *,
+    aspect_ratio: float | None = None,
     along: int | None = None,
     rows: int = 1,
     kind: Kind = "staggered",
@@ -44,6 +44,10 @@ def structured(
     Raises:
         MeshError: no rails, both or none of `aspect_ratio` and `along`, counts below one.
     """
+    if not isinstance(pattern, CreasePattern):
+        raise MeshError(
+            f"a {type(pattern).__name__} cannot be meshed; give a pattern, such as meshes.strip(100, 10)"
+        )
     if not pattern.rails:
         raise MeshError("this pattern has no rails to rule between; use an unstructured mesh")
     if kind not in get_args(Kind):

@@ -45,7 +45,7 @@ class Scene:
         radii = [self.radius + self.gap * i for i in range(self.creases)]
         folds: list[Any] = ["mountain" if i % 2 == 0 else "valley" for i in range(self.creases)]
         pattern = meshes.annulus_sector(radii, self.width, self.angle, folds)
-        mesh = meshes.structured(pattern, self.aspect_ratio, kind=self.kind)  # type: ignore[arg-type]
+        mesh = meshes.structured(pattern, aspect_ratio=self.aspect_ratio, kind=self.kind)  # type: ignore[arg-type]
         model = Model(mesh, Sheet(E=4000.0, t=self.thickness))
         if self.supports == "corners":
             model = model.support("corner:inner-start", "xyz").support("corner:outer-start", "yz")

@@ -16,6 +16,7 @@ CASES = {
     "hard_cases": "verification.hard_cases",
 }
 LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds
+ALL_CASES = {**CASES, **LONG_CASES}
 
 
 def case(name: str) -> Case:
@@ -24,8 +25,7 @@ def case(name: str) -> Case:
     Raises:
         InputError: there is no such case; the message lists those there are.
     """
-    every = {**CASES, **LONG_CASES}
-    if name not in every:
-        raise InputError(f"there is no verification case '{name}'; use one of {', '.join(every)}")
-    found: Case = import_module(every[name]).run
+    if name not in ALL_CASES:
+        raise InputError(f"there is no verification case '{name}'; use one of {', '.join(ALL_CASES)}")
+    found: Case = import_module(ALL_CASES[name]).run
     return found

@@ -26,7 +26,7 @@ SOURCE = "Eq. 3.13 integrated: U = 1/2 D theta_a ln(r_o/r_i) cot^2(phi/2)"
 def cone_model(angle: float, alpha: float, kind: Kind) -> Model:
     """The sector with its crease kept in its plane, else free, folded exactly to a right angle."""
     pattern = meshes.annulus_sector(RADIUS, WIDTH, angle)
-    mesh = meshes.structured(pattern, alpha, kind=kind)
+    mesh = meshes.structured(pattern, aspect_ratio=alpha, kind=kind)
     model = Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
     return model.fold("crease", to=DIHEDRAL)
 

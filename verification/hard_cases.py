@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ def _check(
 
 def annulus(along: int = 48, t: float = 0.127, kind: Any = "staggered", **sector: float) -> Model:
     """A free creased sector: radius 100, width 10 each side, 45 degrees unless said otherwise."""
-    size = {"radius": 100.0, "width": 10.0, "angle": math.pi / 4, **sector}
+    size: dict[str, Any] = {"radius": 100.0, "width": 10.0, "angle": math.pi / 4, **sector}
     return Model(
         meshes.structured(meshes.annulus_sector(**size), along=along, kind=kind), Sheet(E=4000.0, t=t)
     )
@@ -113,7 +114,7 @@ def crease_stiffness(result: CaseResult) -> Found:
         reached.append(float(path[-1].dihedral("crease").mean()))
         yield _check("L*: total energy", path[-1].energy.total, "N mm", fine[-1].energy.total,
                      "four times finer increments", 1e-7, path, Lstar_mm=Lstar)  # fmt: skip
-    ordered = all(a < b for a, b in zip(reached[:-1], reached[1:], strict=True))
+    ordered = all(a < b for a, b in pairwise(reached))
     yield _check("L*: softer creases stay more open", float(ordered), "", 1.0, "energy", 0.0)
     yield _check("L* = 0.01: dihedral angle", reached[0], "rad", math.pi / 2, "rigid crease", 1e-3)
 
@@ -192,7 +193,7 @@ def trusses(result: CaseResult) -> Found:
             lam = np.array([item.point.lam for item in found])
             w = np.array([item.point.q[0] for item in found])
             off = float(np.abs(toy.load(w) - lam).max()) if found[-1].outcome == "reached" else math.nan
-            params = {
+            params: dict[str, Any] = {
                 "spring": "none" if spring is None else spring,
                 "control": "MGDCM" if generalised else "arc",
             }

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 class VonMisesTruss:
     """Two bars from (+-span, 0) to (0, rise), pushed down by lambda * force at the top, or through a spring there.
 
-    Unknowns: deflection w of the top (mm, downwards); with a spring of stiffness `spring` also the displacement s of its
-    other end, where the force acts. A soft spring turns the snap-through into a snap-back. Energy of a bar
+    Unknowns: deflection w of the top (mm, downwards); with a spring of stiffness `spring` also the displacement s of
+    its other end, where the force acts. A soft spring turns the snap-through into a snap-back. Energy of a bar
     1/2 stiffness (l - L)^2.
     """
 

@@ -35,8 +35,11 @@ class Evaluation(NamedTuple):
 class System(Protocol):
     """q: (n,) unknowns. The first `primal` of them minimise the energy, the rest are multipliers."""
 
-    size: int
-    primal: int
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def primal(self) -> int: ...
 
     def evaluate(self, q: Array, lam: float) -> Evaluation: ...
 

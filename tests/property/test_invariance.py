@@ -147,7 +147,7 @@ def test_similar_sheets() -> None:
     base, s = BASE["staggered", "held"], 3.0
     pattern = meshes.annulus_sector(100.0 * s, 10.0 * s, math.pi / 4)
     state = solve(
-        Model(meshes.structured(pattern, along=8), Sheet(SHEET.E, SHEET.t * s)).fold("crease", to=2.0)
+        Model(meshes.structured(pattern, along=8), Sheet(E=SHEET.E, t=SHEET.t * s)).fold("crease", to=2.0)
     )
     assert_same_energies(base, state, factor=s**3)
 

@@ -125,7 +125,7 @@ def test_aspect_ratio_comes_out(pattern, kind, alpha, rows):
     widths = 0.5 * (lengths[:-1] + lengths[1:])
     wanted = alpha / np.mean(heights / rows / widths)
     assume(least_cells(pattern, rows) <= wanted <= 1000)
-    mesh = structured(pattern, alpha, rows=rows, kind=kind)
+    mesh = structured(pattern, aspect_ratio=alpha, rows=rows, kind=kind)
     cells = (
         len(mesh.triangles) // ((len(pattern.rails) - 1) * rows) // 2
     )  # staggered rows have one triangle more

@@ -53,7 +53,9 @@ def test_tables_are_those_of_the_schema(title: str) -> None:
 
 
 def test_nothing_is_left_out() -> None:
-    every = {kind for kind in vars(schema).values() if isinstance(kind, type) and issubclass(kind, schema.Table)}
+    every = {
+        kind for kind in vars(schema).values() if isinstance(kind, type) and issubclass(kind, schema.Table)
+    }
     assert set(TABLES.values()) == every - {schema.Table}
     named = {title.split(",")[0].split(":")[0].split(".")[0] for title in TABLES}
     assert named == set(SECTIONS)

@@ -418,12 +418,12 @@ class TestStructured:
     def test_aspect_ratio(self, kind, rows):
         """The number of cells is whole, so alpha comes out within half a cell."""
         for alpha in (0.7, 3.0, 8.0, 12.5):
-            mesh = structured(strip(100, 12, [6]), alpha, rows=rows, kind=kind)
+            mesh = structured(strip(100, 12, [6]), aspect_ratio=alpha, rows=rows, kind=kind)
             along = 100 * alpha / (6 / rows)
             assert mesh.aspect_ratio == pytest.approx(alpha, rel=0.5 / along + 1e-12)
             widths = 100 * mesh.aspect_ratio / (6 / rows)
             assert widths == pytest.approx(round(along), abs=1e-9)
-            sector = structured(annulus_sector(100, 10, 1.0), alpha, rows=rows, kind=kind)
+            sector = structured(annulus_sector(100, 10, 1.0), aspect_ratio=alpha, rows=rows, kind=kind)
             assert sector.aspect_ratio == pytest.approx(alpha, rel=0.5 / (10 * alpha * rows) + 0.005)
 
 
