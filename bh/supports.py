@@ -198,9 +198,12 @@ def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints) -> None:
     size = np.ones(6)
     size[3:] = mesh.size
     share = np.linalg.norm(left * size[:, None], axis=1)
-    names = ", ".join(MOTIONS[k] for k in np.flatnonzero(share > 0.3))
+    named = np.flatnonzero(share > 0.3)
+    names = ", ".join(MOTIONS[k] for k in named)
+    if len(named) != left.shape[1]:  # none of them alone, such as a turn about a slanted line
+        names = f"combinations of {names}"
     raise ModelError(
-        f"the supports leave {left.shape[1]} rigid motion(s) free ({names}); "
+        f"the supports leave {left.shape[1]} of 6 rigid motions free ({names}); "
         "add supports, or a support at 'rigid-body' that takes them out without force"
     )
 

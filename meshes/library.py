@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import SupportsFloat
 
 import numpy as np
 
@@ -101,9 +100,12 @@ def _between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
 
 
 def _positive(name: str, value: float) -> float:
-    if isinstance(value, str | bool) or not isinstance(value, SupportsFloat):
-        raise PatternError(f"{name} = {value!r} is not a number; give a positive length or angle")
-    value = float(value)
+    try:
+        if isinstance(value, str):
+            raise TypeError
+        value = float(value)
+    except (TypeError, ValueError) as error:
+        raise PatternError(f"{name} = {value!r} is not a number; give a positive length or angle") from error
     if not math.isfinite(value) or value <= 0.0:
         raise PatternError(f"{name} = {value:g} cannot be; give a positive length or angle")
     return value

@@ -134,7 +134,7 @@ def thickness(result: CaseResult) -> Found:
 def slenderness(result: CaseResult) -> Found:
     """alpha from 0.5 to 30: iterations do not grow."""
     for alpha in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0):
-        mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), alpha)
+        mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), aspect_ratio=alpha)
         path = trace(Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=math.pi / 2))
         yield _check("slender cells: iterations from flat to 90 degrees", float(path.iterations), "", None,
                      "at most 60", None, path, alpha=alpha)  # fmt: skip
@@ -217,7 +217,7 @@ def euler_buckling(result: CaseResult) -> Found:
     length, width, t, E = 100.0, 10.0, 0.5, 4000.0
     exact = math.pi**2 * E * width * t**3 / 12.0 / length**2
     for alpha in (2.0, 4.0, 8.0, 16.0):
-        mesh = meshes.structured(meshes.strip(length, width), alpha)
+        mesh = meshes.structured(meshes.strip(length, width), aspect_ratio=alpha)
         model = Model(mesh, Sheet(E=E, t=t)).support("edge:start", "xz").support("edge:end", "z")
         model = model.support("corner:inner-start", "y").support("corner:inner-end", "y")
         squeeze = 3.0 * exact * length / (E * width * t)

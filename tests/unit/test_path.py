@@ -18,6 +18,7 @@ import bh
 import meshes
 from bh import (
     ArcLength,
+    Automatic,
     Displace,
     Fold,
     Force,
@@ -387,7 +388,7 @@ def test_snap_through_is_told(force: float) -> None:
 def test_arc_length_passes_the_limit_point() -> None:
     """The same arch by arc length: down, and the load falls beyond the limit; unstable states are marked so."""
     model, middle = shallow_arch(1.0)
-    path = trace(model, strategy=bh.ArcLength(most=60))
+    path = trace(model, strategy=ArcLength(most=60))
     loads = path.lambdas
     w = np.array([state.displacement(f"node:{middle}")[0, 2] for state in path])
     top = int(np.argmax(loads))
@@ -484,7 +485,9 @@ def test_resumed_after_a_kill(name: str, tmp_path: FilePath) -> None:
 
 
 @pytest.mark.parametrize("states", [4, 7, 11, 15])
-@pytest.mark.parametrize("strategy", [Automatic(arc=ArcLength(most=10)), ArcLength(most=20)], ids=["automatic", "arc"])
+@pytest.mark.parametrize(
+    "strategy", [Automatic(arc=ArcLength(most=10)), ArcLength(most=20)], ids=["automatic", "arc"]
+)
 def test_resumed_while_following_by_arc_length(
     strategy: Automatic | ArcLength, states: int, tmp_path: FilePath
 ) -> None:
