@@ -6,21 +6,31 @@ Exit codes: 0 reached, or done; 1 a path that ended early, or a check that faile
 
 from __future__ import annotations
 
-import os
 import sys
-import traceback
-from collections.abc import Callable, Sequence
-from importlib.metadata import EntryPoint, entry_points, version
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+try:
+    import os
+    import shlex
+    import traceback
+    from collections.abc import Callable, Sequence
+    from importlib.metadata import EntryPoint, entry_points, version
+    from pathlib import Path
+    from typing import TYPE_CHECKING, Annotated, Any
+
+    import typer
+except KeyboardInterrupt:  # `main` tells of it from here on
+    sys.stderr.write("bh: interrupted\n")
+    raise SystemExit(130) from None
 
 if TYPE_CHECKING:
     from bh.path import Path as Trace
     from bh.scene import Scene
 
 COMMANDS = "bh.commands"
+ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
+    "verify": "Check the solvers against theory and published numbers.",
+    "report": "Run the verification cases and write the report page.",
+}
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
@@ -32,14 +42,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         words.remove("--debug")
     try:
         code = app(args=words, prog_name="bh", standalone_mode=False)
+        if code == 130:  # what typer makes of a KeyboardInterrupt
+            return _fail("interrupted", 130, debug)
         return code if isinstance(code, int) else 0
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         return _fail("interrupted", 130, debug)
+    except _InterruptedError as error:
+        return _fail(f"interrupted; {error}", 130, debug)
     except BrokenPipeError:  # whoever read the output has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
         return _explain(error, debug)
+
+
+class _InterruptedError(Exception):
+    """A KeyboardInterrupt with what there is to say about it."""
 
 
 def _explain(error: Exception, debug: bool) -> int:
@@ -48,7 +66,8 @@ def _explain(error: Exception, debug: bool) -> int:
     if isinstance(error, InputError):
         return _fail(str(error), 2, debug)
     if hasattr(error, "format_message"):  # how typer tells a wrong command line
-        return _fail(f"{error.format_message().rstrip('.')}; see 'bh --help'", 2, debug)
+        command = getattr(getattr(error, "ctx", None), "command_path", "bh")
+        return _fail(f"{error.format_message().rstrip('.')}; see '{command} --help'", 2, debug)
     what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     return _fail(f"{what} (a fault of the program, please report it; --debug shows where)", 3, debug)
 
@@ -94,7 +113,7 @@ def run(
     vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
-    """Solve a scene; writes path.bh and result.json into the output folder."""
+    """Solve a scene into a folder: path.bh and result.json."""
     from bh.errors import InputError
     from bh.run import UNFINISHED, extras, holds_states, solve
     from bh.scene import load_scene
@@ -102,13 +121,14 @@ def run(
     loaded = load_scene(scene)
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
-        path, names = solve(loaded, folder, resume=resume, progress=not quiet)
+        path, names, before = solve(loaded, folder, resume=resume, progress=not quiet)
     except KeyboardInterrupt:
-        how = (
-            f"go on with: bh run {scene} -o {folder} --resume" if holds_states(folder) else "nothing is kept"
-        )
-        typer.echo(f"bh: interrupted; {how}", err=True)
-        raise typer.Exit(130) from None
+        again = shlex.join(["bh", "run", str(scene), "-o", str(folder), "--resume"])
+        raise _InterruptedError(
+            f"go on with: {again}" if holds_states(folder) else "nothing is kept"
+        ) from None
+    if before and not quiet:
+        typer.echo(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
     written = [folder / name for name in names]
     for name, write in extras(path, loaded, folder, pictures, vtu).items():
         try:
@@ -142,7 +162,7 @@ def view(
     ] = None,
     state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
 ) -> None:
-    """Show a state of a solved path in a window, or draw it to a file."""
+    """Show a state of a solved path, or draw it to a file."""
     from bh.errors import InputError
     from bh.path import Path as Trace
     from bh.run import path_file
@@ -162,7 +182,8 @@ def view(
         try:
             bh.plotting.show(solved[state])
         except InputError as error:
-            raise InputError(f"{error}, or bh view {path} --picture sheet.png") from error
+            again = shlex.join(["bh", "view", str(path), "--picture", "sheet.png"])
+            raise InputError(f"{error}, or {again}") from error
 
 
 @app.command()
@@ -182,7 +203,7 @@ def _add_commands() -> None:
             "allow_extra_args": True,
             "allow_interspersed_args": False,
         }
-        about = f"From the package {entry.value.split('.')[0]}; see 'bh {entry.name} --help'."
+        about = ABOUT.get(entry.name, f"From the package {entry.value.split('.')[0]}.")
         app.command(entry.name, help=about, add_help_option=False, context_settings=settings)(_proxy(entry))
 
 
@@ -210,11 +231,17 @@ _add_commands()
 def _summary(path: Trace, scene: Scene, written: Sequence[Path]) -> None:
     from math import degrees
 
+    from bh.formulations import takes_nu
+
     energy, last = path[-1].energy, path[-1]
     typer.echo(
         f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
-        f"{path.unknowns} unknowns, {path.wall_time_s:.3g} s"
+        f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
     )
+    if scene.model.sheet.nu != 0.0 and not takes_nu(scene.model.formulation):
+        typer.echo(
+            f"{scene.model.formulation} take Poisson's ratio as 0, not as nu = {scene.model.sheet.nu:g}"
+        )
     typer.echo(
         f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
         f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"

@@ -129,7 +129,9 @@ class Model:
         ):
             value = getattr(self, name)
             if not isinstance(value, kind):
-                what = value.__name__ if isinstance(value, type) else f"a {type(value).__name__}"
+                what = (
+                    f"the class {value.__name__}" if isinstance(value, type) else f"a {type(value).__name__}"
+                )
                 raise ModelError(
                     f"the {name} of a model is {what}; give bh.Model(mesh, sheet) {how} as {name}"
                 )

@@ -105,7 +105,7 @@ class Path:
         return np.array([record.step + record.lam for record in self.records])
 
     def __repr__(self) -> str:
-        """One line: "Path(reached, 6 states, 16 iterations, 1 of 1 steps)"."""
+        """One line: "Path(reached, 6 states, 16 iterations, 1 of 1 step)"."""
         reached = sum(step.outcome == "reached" for step in self.steps)
         return (
             f"Path({self.outcome}, {count(len(self), 'state')}, {count(self.iterations, 'iteration')}, "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from types import TracebackType
 from typing import Any, Protocol
 
@@ -25,9 +27,16 @@ class Silent:
 
 
 class Bar:
-    """A bar in the terminal with lambda, iterations and energy; silent where the output is not a terminal."""
+    """A bar with lambda, iterations and energy on stderr; where that is no terminal, a plain line now and then.
+
+    Attributes:
+        first, every: seconds until the first plain line and between two of them.
+    """
+
+    first, every = 5.0, 15.0
 
     def __init__(self) -> None:
+        from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         self._progress = Progress(
@@ -36,24 +45,40 @@ class Bar:
             TextColumn("lambda {task.completed:.3f}  iterations {task.fields[iterations]}"),
             TextColumn("energy {task.fields[energy]:.4g} N mm"),
             TimeElapsedColumn(),
+            console=Console(stderr=True),
             transient=False,
         )
         self._enabled = self._progress.console.is_terminal
         self._task: Any = None
         self._step = -1
         self._iterations = 0
+        self._began = time.monotonic()
+        self._due = self._began + self.first
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
+        new = step != self._step
+        self._step, self._iterations = step, iterations + (0 if new else self._iterations)
         if not self._enabled:
+            self._tell(step, steps, lam, energy)
             return
-        if step != self._step:
+        if new:
             self._progress.start()
             self._task = self._progress.add_task(
                 "", total=1.0, step=f"{step + 1}/{steps}", iterations=0, energy=0.0
             )
-            self._step, self._iterations = step, 0
-        self._iterations += iterations
         self._progress.update(self._task, completed=lam, iterations=self._iterations, energy=energy)
+
+    def _tell(self, step: int, steps: int, lam: float, energy: float) -> None:
+        now = time.monotonic()
+        if now < self._due:
+            return
+        self._due = now + self.every
+        print(
+            f"step {step + 1}/{steps}  lambda {lam:.3f}  iterations {self._iterations}  energy {energy:.4g} N mm  "
+            f"{now - self._began:.0f} s",
+            file=sys.stderr,
+            flush=True,
+        )
 
     def close(self, outcome: str) -> None:
         if self._enabled:

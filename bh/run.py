@@ -12,7 +12,7 @@ import os
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,17 +29,24 @@ from meshes.io.export import replacing
 FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
 
 
+class Solved(NamedTuple):
+    """A path, the names of the files that hold it and its result, and whether it had been finished before."""
+
+    path: Trace
+    names: tuple[str, str]
+    before: bool
+
+
 def solve(
     scene: Scene, folder: Path, *, resume: bool = False, progress: bool | ProgressMeter = False
-) -> tuple[Trace, tuple[str, str]]:
+) -> Solved:
     """Trace a scene into a folder, which is made if need be.
+
+    Pictures, series and FOLD files that `bh run` has written there of other states are removed.
 
     Args:
         resume: go on from the states in the folder.
         progress: as for `bh.trace`.
-
-    Returns:
-        the path, and the names of the files that hold it and its result.
 
     Raises:
         InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
@@ -48,6 +55,7 @@ def solve(
     names = _names(folder, scene.model, resume)
     made = _make(folder)
     file = folder / names[0]
+    before = resume and _is_whole(file, scene.model)
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
         (folder / names[1]).unlink(missing_ok=True)
     try:
@@ -64,10 +72,20 @@ def solve(
     text = json.dumps(result(path, scene), indent=2, allow_nan=False) + "\n"
     with replacing(folder / names[1]) as draft:
         draft.write_text(text, encoding="utf-8")
+    if not before:
+        remove_extras(folder, "-unfinished" if names == UNFINISHED else "")
     if names == FINISHED and clear:
         for name in UNFINISHED:
             (folder / name).unlink(missing_ok=True)
-    return path, names
+        remove_extras(folder, "-unfinished")
+    return Solved(path, names, before)
+
+
+def _is_whole(file: Path, model: Model) -> bool:
+    """True if all steps of the model are reached in a path file."""
+    with contextlib.closing(PathFile.open(file)) as stored, reading(file):
+        outcomes = [outcome for outcome, _ in stored.steps().values()]
+    return outcomes == ["reached"] * len(model.steps)
 
 
 def path_file(folder: Path) -> Path:
@@ -208,6 +226,17 @@ def result(path: Trace, scene: Scene) -> dict[str, Any]:
 def _number(value: float) -> float | None:
     """A number that JSON can hold; there is none for nan."""
     return float(value) if abs(value) < float("inf") else None
+
+
+def remove_extras(folder: Path, mark: str) -> None:
+    """Remove what `extras` has written for another run, as far as it can be removed; nothing else."""
+    with contextlib.suppress(OSError):
+        for name in (f"folded{mark}.png", f"folded{mark}.fold", f"path{mark}.pvd"):
+            (folder / name).unlink(missing_ok=True)
+        for file in (folder / f"path{mark}").glob("[0-9][0-9][0-9][0-9]*.vtu"):
+            file.unlink()
+        if (folder / f"path{mark}").is_dir():
+            (folder / f"path{mark}").rmdir()
 
 
 def extras(

@@ -83,6 +83,15 @@ def load_scene(path: str | Path) -> Scene:
         SceneError: it cannot be read, or asks for what cannot be; one line that begins with the file's name.
     """
     path = Path(path)
+    if path.suffix.lower() == ".fold":
+        raise SceneError(
+            one_line(
+                f"'{path}' is a pattern, not a scene; name it in a scene file: [pattern] file = \"{path.name}\" "
+                "(see examples/miura.toml)"
+            )
+        )
+    if path.suffix.lower() == ".bh":
+        raise SceneError(one_line(f"'{path}' is a solved path, not a scene; look at it with `bh view`"))
     try:
         with path.open("rb") as file:
             content = file.read(LONGEST_FILE + 1)

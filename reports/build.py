@@ -297,7 +297,8 @@ def shortfall(results: Results) -> str:
     quick = sum(results.quick if info.quick is None else info.quick for info in results.cases)
     words = [f"{len(run)} of {len(known)} cases run"] if len(run) < len(known) else []
     if quick:
-        words.append("quick" if quick == len(results.cases) else f"{quick} of them quick")
+        some = f"{quick} of them quick" if words else f"{quick} of {len(known)} cases quick"
+        words.append("quick" if quick == len(results.cases) else some)
     return ", ".join(words)
 
 
@@ -309,9 +310,9 @@ def _others(results: Results) -> list[tuple[str, str]]:
             continue
         words = [_date(info.date or "")]
         versions = results.versions if info.versions is None else info.versions
-        for key in dict.fromkeys([*versions, *results.versions]):
-            if versions.get(key) != results.versions.get(key):
-                words.append(f"{key} {versions.get(key, 'unknown')}")
+        for key, value in versions.items():
+            if results.versions.get(key, value) != value:
+                words.append(f"{key} {value}")
         found.append((info.name, "; ".join(words)))
     return found
 

@@ -20,7 +20,10 @@ def report(
         bool, typer.Option("--reuse", help="show the results that are there, run nothing")
     ] = False,
 ) -> None:
-    """Run the verification cases and show what they found as one HTML page."""
+    """Run the verification cases and write the report page.
+
+    It is one HTML file that needs nothing else.
+    """
     from reports.build import build, read, shortfall
 
     page = results / "report.html" if out is None else out

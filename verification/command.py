@@ -17,7 +17,11 @@ def verify(
     quick: Annotated[bool, typer.Option("--quick", help="fewer points in every case")] = False,
     listing: Annotated[bool, typer.Option("--list", help="list the cases and stop")] = False,
 ) -> None:
-    """Check the solvers against closed forms and published numbers; exit code 1 if a check fails."""
+    """Check the solvers against theory and published numbers.
+
+    What is found replaces what the results folder has of the cases that are run; the other cases stay. Exit code 1 if
+    a check fails.
+    """
     from verification.cases import CASES
     from verification.run import run, write_json
 

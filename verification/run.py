@@ -17,7 +17,7 @@ from typing import Any
 
 from bh.path import versions
 from meshes.errors import InputError
-from verification.cases import CASES, case
+from verification.cases import ALL_CASES, CASES, case
 from verification.checks import RECORD, CaseResult, Context
 
 OF_A_RUN = ("versions", "date", "machine", "quick")  # kept for every case, as cases may be run one by one
@@ -87,8 +87,8 @@ def _stored(file: Path) -> dict[str, Any]:
     try:
         old = json.loads(file.read_text(encoding="utf-8"))
         of_the_run = {key: old[key] for key in OF_A_RUN}
-        cases = [{**of_the_run, **dict(info)} for info in old["cases"] if info["name"] in CASES]
-        checks = [dict(check) for check in old["checks"] if check["case"] in CASES]
+        cases = [{**of_the_run, **dict(info)} for info in old["cases"] if info["name"] in ALL_CASES]
+        checks = [dict(check) for check in old["checks"] if check["case"] in ALL_CASES]
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return nothing
     summary = CaseResult("", "", "", "").summary()
@@ -102,14 +102,16 @@ def _stored(file: Path) -> dict[str, Any]:
 
 
 def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
-    """The new record with what the old one has of other cases, in the order of `CASES`."""
+    """The new record with what the old one has of other cases, in the order of `ALL_CASES`."""
     ran = {info["name"] for info in new["cases"]}
-    order = list(CASES).index
+    order = list(ALL_CASES).index
     cases = [info for info in old["cases"] if info["name"] not in ran] + new["cases"]
     checks = [check for check in old["checks"] if check["case"] not in ran] + new["checks"]
     return {
         **new,
-        "checks": sorted(checks, key=lambda check: order(check["case"]) if check["case"] in CASES else -1),
+        "checks": sorted(
+            checks, key=lambda check: order(check["case"]) if check["case"] in ALL_CASES else -1
+        ),
         "quick": any(info["quick"] for info in cases),
         "cases": sorted(cases, key=lambda info: order(info["name"])),
     }

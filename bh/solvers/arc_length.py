@@ -60,6 +60,18 @@ class ArcLength:
         origin: Point | None = None,
     ) -> Iterator[Increment]:
         """Follow the path from the last point of `history` until lambda = 1; see `LoadControl.follow`."""
+        last = history[-1]
+        try:
+            for item in self._follow(system, history, increment, origin):
+                last = item.point
+                yield item
+        except IndefiniteError:
+            reason = "the tangent is singular, or has too many constraints to count its modes"
+            yield Increment(last, "stalled", 0, math.nan, None, 0.0, (), reason)
+
+    def _follow(
+        self, system: System, history: Sequence[Point], increment: float | None, origin: Point | None
+    ) -> Iterator[Increment]:
         here = history[-1]
         direction = here.q - history[-2].q if len(history) > 1 else None
         p = system.primal

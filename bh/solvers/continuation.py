@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.increments import Increment, Point, extrapolate, point
+from bh.solvers.matrices import IndefiniteError
 from bh.solvers.newton import Newton, Solution
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import System
@@ -100,7 +101,9 @@ class LoadControl:
             taken = lam - here.lam
             points = [there] if note else [*points[-2:], there]
             growth = min(1.7, max(0.5, math.sqrt(self.goal / max(solution.iterations, 1))))
-            step = min(largest, growth * taken if not cuts else min(growth, 1.0) * taken)
+            # slow but successful increments must not shrink away
+            step = max(10.0 * self.smallest, growth * taken if not cuts else min(growth, 1.0) * taken)
+            step = min(largest, step)
             yield Increment(
                 there,
                 "reached",
@@ -126,7 +129,10 @@ class LoadControl:
 
         def guess() -> tuple[Array, Array]:
             here = points[-1]
-            factor, _ = system.tangent(here.q, here.lam, here.forces).factorise_any()
+            try:
+                factor, _ = system.tangent(here.q, here.lam, here.forces).factorise_any()
+            except IndefiniteError:
+                return here.q, here.forces
             change = -(lam - here.lam) * factor.solve(system.control_rate(here.q, here.lam))
             return here.q + change, system.predicted_forces(here.forces, change)
 

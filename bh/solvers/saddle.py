@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 NOISE = 2e-14  # error of a constraint that is rounding (angles in rad)
 TINY_SHIFT = 1e-12  # shifts up to this only take rounding off
-MOST_DENSE = 4000  # constraints whose Schur complement is still formed as a dense matrix
+MOST_DENSE = 300  # constraints whose Schur complement is still formed as a dense matrix
 
 
 @njit(cache=True, nogil=True)

@@ -2,18 +2,19 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
 import time
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import bh.progress
-from bh.cli import app, main
+from bh.cli import ABOUT, app, main
 from bh.path import Path as Trace
 
 BIN = Path(sys.executable).parent / "bh"
@@ -266,6 +267,116 @@ def test_interrupt_says_how_to_go_on(here, monkeypatch, capsys):
     assert result("out/result.json")["outcome"] == "reached"
 
 
+@pytest.mark.parametrize(
+    ("module", "name"), [("bh.scene", "load_scene"), ("bh.run", "extras"), ("bh.run", "result")]
+)
+def test_interrupt_anywhere_is_one_line(here, monkeypatch, capsys, module, name):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"{module}.{name}", stop)
+    assert main(["run", "good.toml", "-o", "out"]) == 130
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("bh: interrupted")
+    assert err.count("\n") == 1
+
+
+def test_interrupt_of_another_packages_command(here, monkeypatch, capsys):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("verification.run.run", stop)
+    assert main(["verify", "cone"]) == 130
+    assert capsys.readouterr() == ("", "bh: interrupted\n")
+
+
+def test_hints_can_be_pasted(here, monkeypatch, capsys):
+    (here / "my scene.toml").write_text(GOOD)
+    interrupt_after(1, monkeypatch)
+    assert main(["run", "my scene.toml", "-o", "it's out"]) == 130
+    err = capsys.readouterr().err
+    words = shlex.split(err.partition("go on with: ")[2])
+    assert words == ["bh", "run", "my scene.toml", "-o", "it's out", "--resume"]
+    monkeypatch.undo()
+    monkeypatch.chdir(here)
+    assert main([*words[1:], "-q"]) == 0
+
+
+def test_resume_of_a_finished_run_says_so(here, capsys):
+    assert main(["run", "good.toml", "-o", "out"]) == 0
+    assert "nothing was left to solve" not in capsys.readouterr().out
+    assert main(["run", "good.toml", "-o", "out", "--resume"]) == 0
+    assert "this run had reached its end before; nothing was left to solve" in capsys.readouterr().out
+
+
+def test_extras_of_an_older_run_do_not_stay(here):
+    """A picture beside a result is of that result; what others have put there stays."""
+    asked = "[outputs]\nfold = true\n"
+    (here / "asks.toml").write_text(GOOD + asked)
+    old = ("folded.png", "path.pvd", "path/0000.vtu", "path/notes.txt")
+    ours = ["folded.fold", "path.bh", "result.json"]
+
+    def litter():
+        (here / "out" / "path").mkdir(exist_ok=True)
+        for name in old:
+            (here / "out" / name).touch()
+
+    assert main(["run", "asks.toml", "-o", "out", "-q"]) == 0
+    litter()
+    assert (
+        main(["run", "asks.toml", "-o", "out", "-q", "--resume"]) == 0
+    )  # nothing new: they are of this result
+    assert set(os.listdir("out")) == {*ours, "folded.png", "path.pvd", "path"}
+    assert main(["run", "early.toml", "-o", "out", "-q"]) == 1  # nor does a run that is not kept touch them
+    assert {"folded.png", "path.pvd", "folded.fold"} <= set(os.listdir("out"))
+    (here / "out" / "folded-unfinished.png").touch()
+    assert main(["run", "two.toml", "-o", "out", "-q"]) == 0
+    assert sorted(os.listdir("out")) == ["path", "path.bh", "result.json"]
+    assert os.listdir("out/path") == ["notes.txt"]
+    assert main(["run", "asks.toml", "-o", "out", "-q"]) == 0
+    assert sorted(os.listdir("out")) == [ours[0], "path", *ours[1:]]
+
+
+def test_plain_progress_where_there_is_no_terminal(here, monkeypatch, capsys):
+    monkeypatch.setattr(bh.progress.Bar, "first", 0.0)
+    monkeypatch.setattr(bh.progress.Bar, "every", 0.0)
+    assert main(["run", "two.toml", "-o", "out"]) == 0
+    out, err = capsys.readouterr()
+    assert "lambda" not in out
+    lines = err.splitlines()
+    assert len(lines) > 2
+    assert all(line.startswith(("step 1/2  lambda ", "step 2/2  lambda ")) for line in lines)
+    assert main(["run", "two.toml", "-o", "out", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_poissons_ratio_that_is_not_used_is_told(here, capsys):
+    (here / "nu.toml").write_text(GOOD.replace("t = 0.1", "t = 0.1\nnu = 0.3"))
+    assert main(["run", "nu.toml"]) == 0
+    assert "bars-and-hinges take Poisson's ratio as 0, not as nu = 0.3" in capsys.readouterr().out
+    assert main(["run", "good.toml"]) == 0
+    assert "Poisson" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["run"], "see 'bh run --help'"),
+        (["view", "--nothing"], "see 'bh view --help'"),
+        (["verify", "--nothing"], "see 'bh verify --help'"),
+        (["nothing"], "see 'bh --help'"),
+        (["run", "sheet.fold"], 'name it in a scene file: [pattern] file = "sheet.fold"'),
+        (["run", "out/path.bh"], "`bh view`"),
+    ],
+)
+def test_where_a_wrong_command_line_is_sent(here, capsys, words, told):
+    assert main(words) == 2
+    err = capsys.readouterr().err
+    assert told in err
+    assert err.count("\n") == 1
+
+
 # --- requests ----------------------------------------------------------------------------------------------------
 
 
@@ -334,6 +445,13 @@ def test_version_formulations_and_help(capsys):
         assert main(words) == 0
         out = capsys.readouterr().out
         assert all(f"\n  {name} " in out for name in ("run", "view", "formulations", "verify", "report"))
+        assert "..." not in out.replace("[ARGS]...", "")
+        assert all(about in out for about in ABOUT.values())
+
+
+def test_short_help_is_that_of_the_commands():
+    for entry in entry_points(group="bh.commands"):
+        assert entry.load().__doc__.splitlines()[0] == ABOUT[entry.name]
 
 
 def test_starts_fast_and_light():

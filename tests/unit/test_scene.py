@@ -11,6 +11,7 @@ import pytest
 import bh
 from bh.actuation import Displace, Fold, Force, Moment
 from bh.describe import ACTUATIONS as KINDS
+from bh.errors import SceneError
 from bh.model import CreaseLaw
 from bh.program import program
 from bh.scene import Outputs, load_scene, parse_scene
@@ -224,3 +225,10 @@ def test_byte_order_mark_and_windows_line_ends(tmp_path):
     text = (SECTOR + SHEET + MESH + STEP).replace("\n", "\r\n")
     (tmp_path / "windows.toml").write_bytes(b"\xef\xbb\xbf" + text.encode())
     assert load_scene(tmp_path / "windows.toml").name == "windows"
+
+
+def test_a_modulus_in_pascal_is_told_its_unit():
+    with pytest.raises(
+        SceneError, match=r"sheet\.E = 4000000000\.0 cannot be; .* up to 1e9 MPa \(1 GPa is 1000 MPa\)"
+    ):
+        scene(sheet="[sheet]\nE = 4e9\nt = 1\n")

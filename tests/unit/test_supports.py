@@ -215,7 +215,7 @@ def test_missing_supports_are_counted(supports: list, left: int) -> None:
     elif left == 0:
         assert not resolve(SMALL, supports).rigid_body
     else:
-        with pytest.raises(ModelError, match=rf"leave {left} rigid motion") as caught:
+        with pytest.raises(ModelError, match=rf"leave {left} of 6 rigid motions") as caught:
             resolve(SMALL, supports)
         assert "rigid-body" in str(caught.value)
 

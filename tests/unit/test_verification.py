@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import verification.cases as registry
 from meshes import InputError
 from verification import command
-from verification.cases import CASES, case
+from verification.cases import ALL_CASES, CASES, case
 from verification.checks import CaseResult, Check, Context, line, plot
 from verification.run import run, write_json
 
@@ -22,7 +22,7 @@ KEYS = {
     "case", "quantity", "params", "value", "unit", "reference", "source", "error", "tolerance", "passed", "unknowns",
     "iterations", "wall_time_s", "outcome",
 }  # fmt: skip
-SLOW = {"appendix_b", "campaign"}  # over some five seconds on the slowest machine
+SLOW = {"appendix_b", "hard_cases"}  # over some five seconds on a slow machine
 
 
 def check(**changes: Any) -> Check:
@@ -132,7 +132,7 @@ def test_json_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 def test_unknown_case() -> None:
     with pytest.raises(InputError, match="'tori'") as caught:
         case("tori")
-    for name in CASES:
+    for name in ALL_CASES:
         assert name in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -270,6 +270,26 @@ def test_environment_and_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     assert "git commit" not in runner.environment()
 
 
+def test_a_run_keeps_the_other_cases(tmp_path: Path) -> None:
+    """Cases may be run one by one: the file gathers them, and each of them once."""
+    first = run(["shear_calibration"], tmp_path)
+    for _ in range(2):
+        second = run(["derivatives"], tmp_path, quick=True)
+        assert {record["case"] for record in second["checks"]} == {"derivatives"}
+        stored = no_constants((tmp_path / "checks.json").read_text())
+        assert [info["name"] for info in stored["cases"]] == ["shear_calibration", "derivatives"]
+        assert len(stored["checks"]) == len(first["checks"]) + len(second["checks"])
+        assert [info["quick"] for info in stored["cases"]] == [False, True]
+
+
+@pytest.mark.parametrize("broken", ["", "{", "[]", '{"checks": 3}', '{"checks": [{}], "cases": [{}]}'])
+def test_a_broken_file_is_replaced(broken: str, tmp_path: Path) -> None:
+    (tmp_path / "checks.json").write_text(broken)
+    data = run(["shear_calibration"], tmp_path)
+    stored = no_constants((tmp_path / "checks.json").read_text())
+    assert len(stored["checks"]) == len(data["checks"])
+
+
 # --------------------------------------------------------------------------------------- a case that fails
 
 
@@ -286,7 +306,7 @@ def bad_case(monkeypatch: pytest.MonkeyPatch) -> None:
     module = types.ModuleType("verification.bad_for_tests")
     module.run = disagreeing  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setitem(registry.CASES, "bad", module.__name__)
+    monkeypatch.setitem(registry.ALL_CASES, "bad", module.__name__)
 
 
 @pytest.mark.usefixtures("bad_case")

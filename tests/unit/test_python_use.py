@@ -1,0 +1,71 @@
+"""What a user of the library meets: slips are told in one line with the mend, and objects show what they hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import bh
+import meshes
+from bh.scene import load_scene
+from meshes import InputError
+
+SHEET = bh.Sheet(E=4000.0, t=0.127)
+PATTERN = meshes.annulus_sector(100.0, 10.0, 0.5)
+MESH = meshes.structured(PATTERN, along=4)
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "appendix_b_a.toml"
+
+
+@pytest.mark.parametrize(
+    ("slip", "told"),
+    [
+        (lambda: bh.trace(load_scene(EXAMPLE)), "trace takes a model, not a Scene; give scene.model"),
+        (lambda: bh.trace("scene.toml"), "trace takes a model, not a str"),
+        (lambda: bh.Model(PATTERN, SHEET), "mesh of a model is a CreasePattern; give bh.Model(mesh, sheet)"),
+        (lambda: bh.Model(SHEET, MESH), "mesh of a model is a Sheet; give bh.Model(mesh, sheet)"),
+        (lambda: bh.Model(MESH, 0.1), "sheet of a model is a float; give bh.Model(mesh, sheet)"),
+        (lambda: bh.Model(MESH, bh.Sheet), "sheet of a model is the class Sheet; give"),
+        (lambda: bh.Sheet(E=4000.0, t="0.1"), "sheet t = '0.1' cannot be; give a positive number in mm"),
+        (lambda: bh.Sheet(E=4000.0, t=0.1, nu="0.3"), "sheet nu = '0.3' cannot be"),
+        (lambda: meshes.annulus_sector(100, 10, 45), "angles are radians, not degrees"),
+        (lambda: meshes.annulus_sector(100, 10, "45"), "angle = '45' is not a number"),
+        (lambda: meshes.annulus_sector("wide", 10, 0.5), "radius = 'wide' is not a number"),
+        (lambda: meshes.strip(None, 10), "length = None is not a number"),
+        (lambda: meshes.structured(MESH, along=3), "a SheetMesh cannot be meshed; give a pattern"),
+    ],
+)
+def test_slips_are_told_in_one_line(slip: Callable[[], Any], told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        slip()
+    assert told in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_values_of_a_sheet_are_given_by_name() -> None:
+    """`Sheet(4000, 0.38, 0.127)` would read as a thickness of 0.38 mm."""
+    with pytest.raises(TypeError):
+        bh.Sheet(4000.0, 0.38, 0.127)  # type: ignore[misc]
+    with pytest.raises(TypeError):
+        meshes.structured(PATTERN, 8)  # type: ignore[misc]
+
+
+def test_objects_show_what_they_hold_in_one_line() -> None:
+    model = bh.Model(MESH, SHEET).fold("crease", to=3.0)
+    assert repr(MESH) == (
+        f"SheetMesh({len(MESH.points)} nodes, {len(MESH.triangles)} triangles, 1 crease, staggered, "
+        f"aspect ratio {MESH.aspect_ratio:.3g})"
+    )
+    triangles = f"{len(MESH.triangles)} triangles"
+    assert repr(model) == f"Model({triangles}, 1 crease, rigid-body support, 1 step, bars-and-hinges)"
+    assert (
+        repr(model.support("node:0")) == f"Model({triangles}, 1 crease, 1 support, 1 step, bars-and-hinges)"
+    )
+    path = bh.trace(model)
+    assert repr(path) == f"Path(reached, {len(path)} states, {path.iterations} iterations, 1 of 1 step)"
+    shown = repr(path[-1])
+    assert shown.startswith("State(step 0, lambda 1, energy ")
+    assert "N mm" in shown
+    assert repr(bh.Path(model)) == "Path(unfinished, 0 states, 0 iterations, 0 of 1 step)"
