@@ -62,7 +62,7 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
         k_bar = model.stiffness.bars
         k_bend = k_fold = model.stiffness.hinges
     # augmentation comparable to what the bars give a wing: it keeps the condition number and corrects in a step or two
-    gamma = 300.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
+    gamma = 30.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
     stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], gamma)
     held_from = np.where(np.isnan(program.held.start), held_start, program.held.start)
     law = program.law[source]

@@ -333,8 +333,26 @@ def test_multipliers_solve_the_saddle(name: str) -> None:
             expected[:n] -= matrix.augmented.Z @ (matrix.augmented.Z.T @ expected[:n])
         assert np.abs((A @ x - b)[n:]).max() <= 1e-6 * np.abs(b[n:]).max()
         assert np.abs((A @ x - b)[:n]).max() <= 1e-7 * np.abs(A).max() * np.abs(x[:n]).max()
-        assert np.abs(x[:n] - expected[:n]).max() <= 1e-4 * np.abs(expected[:n]).max()
+        assert np.abs(x[:n] - expected[:n]).max() <= 2e-3 * np.abs(expected[:n]).max()  # inexact by design
         assert np.abs(x[n:] - expected[n:]).max() <= 1e-3 * np.abs(expected[n:]).max()
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_linear_response_is_exact_enough(name: str) -> None:
+    """One solve that nobody corrects: against a dense solve, at the flat sheet and where the step ends."""
+    path = solved(name)
+    for index in (0, len(path) - 1):
+        record = path.records[index]
+        system = path._system(record.step)
+        matrix = system.tangent(record.q, record.lam, system.evaluate(record.q, record.lam).forces)
+        rate = system.control_rate(record.q, record.lam)
+        n, A = system.primal, dense(matrix, system.size)
+        expected = np.linalg.lstsq(A, -rate, rcond=1e-13)[0]
+        got = linear_response(system, record.q, record.lam).dq
+        if isinstance(matrix, MultiplierMatrix) and isinstance(matrix.augmented, FreeBodyMatrix):
+            expected[:n] -= matrix.augmented.Z @ (matrix.augmented.Z.T @ expected[:n])
+        assert np.abs(got[:n] - expected[:n]).max() <= 1e-4 * np.abs(expected[:n]).max()
+        assert rate @ got == pytest.approx(rate @ expected, rel=1e-4)
 
 
 @pytest.mark.parametrize("force", [(0.0, 0.0, 1e-4), (1.0, 0.0, 0.0)])
