@@ -30,8 +30,7 @@ from reports.figures import (
 
 SOURCE = (
     "Equation numbers, “the source” and “App. B” refer to the dissertation “How Curved Creases Enhance the "
-    "Stiffness and Enable Shape Morphing of Thin-Sheet Structures” by Steven R. Woodruff (University "
-    "of Michigan, 2022)."
+    "Stiffness and Enable Shape Morphing of Thin-Sheet Structures” by Woodruff."
 )
 VERDICTS = ("holds", "reported", "differs")  # from the best to the worst
 MOST_FAILURES = 25  # that are listed at the top
