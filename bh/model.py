@@ -237,6 +237,8 @@ def _on_edges(mesh: SheetMesh, what: str, rows: ArrayLike, values: ArrayLike) ->
         raise ModelError(
             f"{what}: {pairs.shape} rows do not fit {stiffness.shape} stiffness values; give one a row"
         )
+    if not (np.isfinite(stiffness).all() and (stiffness >= 0.0).all()):
+        raise ModelError(f"stiffness of {what} must be finite and not negative; mend its values")
     edges: Ints = mesh.topology.find_edges(pairs[:, :2])
     if len(np.unique(edges)) != len(edges):
         raise ModelError(f"{what}: an edge is named twice; give every edge one stiffness")
