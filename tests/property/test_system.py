@@ -16,7 +16,7 @@ import meshes
 from bh import Displace, Fold, Force, Model, Moment, Sheet, trace
 from bh.formulations import formulation
 from bh.mechanics import assembly
-from bh.mechanics.bars_and_hinges import BarsAndHingesSystem
+from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
 from bh.model import ElementStiffness
 from bh.program import program
 from bh.solvers.linear import linear_response
