@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import bh
 import meshes
-from bh import Fold, Force, Model, Sheet, trace
+from bh import Displace, Fold, Force, Model, Sheet, trace
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
@@ -124,6 +124,28 @@ def test_renumbered(kind: str, how: str, seed: int) -> None:
     assert_same_energies(base, state)
     assert_same_shape(state.points[new], base.points)
     assert state.dihedral("crease") == pytest.approx(base.dihedral("crease"), abs=1e-7)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@QUICK
+@given(seed=st.integers(0, 10_000))
+def test_renumbered_and_stretched(kind: str, seed: int) -> None:
+    """The same where the bars carry the load: pulled along the sheet and bent up at one corner."""
+
+    def pulled(mesh: SheetMesh) -> bh.State:
+        model = (
+            Model(mesh, SHEET)
+            .support("edge:start")
+            .step(Displace("corner:outer-end", (-1.0, 1.0, 0.0), 0.5), Displace("corner:inner-end", "z", 2.0))
+        )
+        return solve(model)
+
+    base = pulled(sector(kind))
+    assert base.energy.stretching > base.energy.bending
+    mesh, new = renumbered(sector(kind), seed)
+    state = pulled(mesh)
+    assert_same_energies(base, state)
+    assert np.abs(state.points[new] - base.points).max() < 1e-7
 
 
 @every

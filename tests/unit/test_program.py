@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,16 @@ def test_one_angle_an_edge_in_order() -> None:
     assert step.held.end[crease_hinges(ONE, "crease")].tolist() == angles
 
 
+def test_angles_follow_the_crease_whatever_the_numbering() -> None:
+    """A crease that is drawn the other way round takes its angles from the other end."""
+    pairs = ONE.crease_edges("crease")[::-1, ::-1]
+    turned = replace(ONE, edge_sets={**ONE.edge_sets, "crease:crease": pairs})
+    angles = [2.0, 2.2, 2.4, 2.6]
+    (step,) = steps(Model(turned, STEEL).fold("crease", to=angles))
+    assert step.held.end[crease_hinges(turned, "crease")].tolist() == angles
+    assert step.held.end[crease_hinges(ONE, "crease")].tolist() == angles[::-1]
+
+
 def test_spring_from_length_scale_and_from_stiffness() -> None:
     """Eq. 3.12: stiffness a length is E t^3 / (12 L*)."""
     at = crease_hinges(ONE, "crease")
@@ -117,8 +128,6 @@ def test_all_leaves_flat_creases_alone() -> None:
 
 
 def test_drawn_angles() -> None:
-    from dataclasses import replace
-
     drawn = np.array([0.1, 0.2, 0.3, 0.4])
     mesh = replace(ONE, fold_angles={"crease": drawn})
     (step,) = steps(Model(mesh, STEEL).fold("crease", by="drawn"))
