@@ -61,8 +61,6 @@ class _Builder:
         self.model, self.mesh = model, model.mesh
         topology = model.mesh.topology
         hinges, nodes = len(topology.hinges), len(model.mesh.points)
-        self.hinge_of_edge = np.full(len(topology.edges), -1, dtype=np.int64)
-        self.hinge_of_edge[topology.hinge_edges] = np.arange(hinges)
         self.law = np.zeros(hinges, dtype=np.int64)
         self.stiffness = np.zeros(hinges)
         self.rest = np.full(hinges, math.pi)
@@ -94,7 +92,7 @@ class _Builder:
         self.stiffness[hinges] = stiffness
 
     def hinges(self, crease: str) -> Ints:
-        found = self.hinge_of_edge[self.mesh.topology.find_edges(self.mesh.crease_edges(crease))]
+        found = _edge_hinges(self.mesh, crease)
         if (found < 0).any():
             raise ModelError(
                 f"crease '{crease}' runs along the boundary, where nothing can fold; draw it inside"
@@ -225,9 +223,11 @@ def program(model: Model) -> tuple[StepProgram, ...]:
 
 def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:
     """Rows of `mesh.topology.hinges` along a crease, in order."""
-    topology = mesh.topology
-    edges = topology.find_edges(mesh.crease_edges(crease))
-    order = np.full(len(topology.edges), -1, dtype=np.int64)
-    order[topology.hinge_edges] = np.arange(len(topology.hinges))
-    found = order[edges]
+    found = _edge_hinges(mesh, crease)
     return found[found >= 0]
+
+
+def _edge_hinges(mesh: SheetMesh, crease: str) -> Ints:
+    """Hinge of every edge of a crease, in order; -1 where the edge lies on the boundary."""
+    topology = mesh.topology
+    return topology.edge_hinges[topology.find_edges(mesh.crease_edges(crease))]

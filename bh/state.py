@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,6 @@ class State:
     reactions: Array
     crease_moments: Array
     stable: bool | None = None
-    extra: Mapping[str, Array] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line: "State(step 0, lambda 1, energy 0.0534 N mm, stable)"."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,13 @@ class Topology:
             a, b = pairs[int(np.argmax(wrong))]
             raise MeshError(f"nodes {a} and {b} are not joined by an edge of the mesh; mesh along that line")
         return found
+
+    @cached_property
+    def edge_hinges(self) -> Ints:
+        """(e,) row of `hinges` of every edge, -1 on the boundary."""
+        rows = np.full(len(self.edges), -1, dtype=np.int64)
+        rows[self.hinge_edges] = np.arange(len(self.hinges))
+        return rows
 
     @property
     def boundary(self) -> Ints:

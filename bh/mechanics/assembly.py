@@ -21,8 +21,6 @@ from bh.solvers.matrices import BandMatrix, SparseMatrix, reverse_cuthill_mckee
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-BAR_ENTRIES, HINGE_ENTRIES, GROUND_ENTRIES = 21, 78, 45  # lower triangles of 6 x 6, 12 x 12 and 9 x 9
-
 
 @njit(inline="always", **OPTIONS)
 def elongation(length, rest_length, green):  # type: ignore[no-untyped-def]

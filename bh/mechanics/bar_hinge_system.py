@@ -47,7 +47,13 @@ class BarsAndHingesSystem:
         moments = np.zeros(len(held_start)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
         self.elements = sheet_elements(model, program, held_start, moments)
-        self.constraints: Constraints = _begin_where_they_are(program.constraints, start_points - mesh.points)
+        self.turned = np.flatnonzero(program.constraints.frame_of >= 0)
+        self.turned_axes = program.constraints.frames[program.constraints.frame_of[self.turned]]
+        self._displacement_start = self.to_local(start_points - mesh.points)
+        # a displacement whose start is not given begins with what the node has
+        given = program.constraints.start
+        begin = np.where(np.isnan(given), self._displacement_start, given)
+        self.constraints: Constraints = replace(program.constraints, start=begin)
         self.force = program.force
         self.program = program
 
@@ -59,12 +65,9 @@ class BarsAndHingesSystem:
         if self.primal == 0:
             raise ModelError("the supports hold every node; nothing can move, so remove some of them")
         self.size = self.primal + self.elements.held
-        self.turned = np.flatnonzero(self.constraints.frame_of >= 0)
-        self.turned_axes = self.constraints.frames[self.constraints.frame_of[self.turned]]
         self.prescribed_rate = (self.constraints.end - self.constraints.start) * self.constraints.fixed
         self._bar_scale = model.sheet.E * model.sheet.t
-        self._moments_start = None if start is None else start.crease_moments
-        self._start_points = start_points
+        self._moments_start = moments
         self._d_bar = np.empty((len(self.elements.bars), 3))
         self._g_hinge = np.empty((len(self.elements.hinges), 12))
         if self.constraints.rigid_body:
@@ -83,11 +86,9 @@ class BarsAndHingesSystem:
     def start(self) -> Array:
         """Unknowns of the state that the step begins with."""
         q = np.zeros(self.size)
-        q[: self.primal] = self.to_local(self._start_points - self.reference).ravel()[self.free]
-        if self._moments_start is not None and self.elements.held:
-            moments = self._moments_start[self.elements.source[-self.elements.held :]]
-            lengths = self.hinge_lengths[-self.elements.held :]
-            q[self.primal :] = np.nan_to_num(moments) * lengths
+        q[: self.primal] = self._displacement_start.ravel()[self.free]
+        if self.elements.held:
+            q[self.primal :] = self._moments_start[self.elements.source[-self.elements.held :]]
         return q
 
     def positions(self, q: Array, lam: float) -> Array:
@@ -341,15 +342,3 @@ class BarsAndHingesSystem:
                 raise ModelError(
                     "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
                 )
-
-
-def _begin_where_they_are(constraints: Constraints, displacement: Array) -> Constraints:
-    """Prescribed displacements whose start is nan begin with the displacement (n, 3) that the nodes have."""
-    unknown = np.isnan(constraints.start)
-    if not unknown.any():
-        return constraints
-    local = displacement.copy()
-    turned = np.flatnonzero(constraints.frame_of >= 0)
-    axes = constraints.frames[constraints.frame_of[turned]]
-    local[turned] = np.einsum("nij,nj->ni", axes, displacement[turned])
-    return replace(constraints, start=np.where(unknown, local, constraints.start))

@@ -147,7 +147,7 @@ class ArcLength:
                     part = (1.0 - here.lam) / (lam - here.lam)
                     system.tangent(here.q, here.lam, here.forces)  # predictions are from the last tangent
                     return self._arrive(system, here, part * (q - here.q))
-                return point(system, q, lam, MODE), iteration, ""
+                return point(system, q, lam, MODE, now), iteration, ""
             try:
                 factor, _ = system.tangent(q, lam, forces).factorise_any()
             except IndefiniteError:
@@ -175,4 +175,4 @@ class ArcLength:
         turned = system.objection(here.q, here.lam, solution.q, 1.0)
         if turned or far:
             return None, solution.iterations, turned or "jumped to another branch"
-        return point(system, solution.q, 1.0, MODE), solution.iterations, ""
+        return point(system, solution.q, 1.0, MODE, solution.evaluation), solution.iterations, ""

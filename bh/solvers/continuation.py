@@ -79,7 +79,11 @@ class LoadControl:
             if solution.converged and not solution.stable:
                 solution, note = leave_saddle(system, solution, lam, self.newton)
                 iterations += solution.iterations
-            objection = self._objection(system, here, solution, lam, left_saddle=bool(note))
+            # what did not converge may hold anything; nothing is asked of it
+            there = (
+                point(system, solution.q, lam, evaluation=solution.evaluation) if solution.converged else here
+            )
+            objection = self._objection(system, here, there, solution, left_saddle=bool(note))
             if objection:
                 cuts.append(f"lambda {lam:.6g}: {objection}")
                 step = 0.5 * (lam - here.lam)
@@ -97,13 +101,9 @@ class LoadControl:
                     )
                     return
                 continue
-            there = point(system, solution.q, lam)
             taken = lam - here.lam
             points = [there] if note else [*points[-2:], there]
-            growth = min(1.7, max(0.5, math.sqrt(self.goal / max(solution.iterations, 1))))
-            # slow but successful increments must not shrink away
-            step = max(10.0 * self.smallest, growth * taken if not cuts else min(growth, 1.0) * taken)
-            step = min(largest, step)
+            step = self._next(taken, solution.iterations, bool(cuts), largest)
             yield Increment(
                 there,
                 "reached",
@@ -115,6 +115,12 @@ class LoadControl:
                 note,
             )
             cuts, iterations = [], 0
+
+    def _next(self, taken: float, iterations: int, was_cut: bool, largest: float) -> float:
+        """The next increment of lambda after one of size `taken`; one that was cut is not followed by a larger one."""
+        growth = min(1.0 if was_cut else 1.7, max(0.5, math.sqrt(self.goal / max(iterations, 1))))
+        # slow but successful increments must not shrink away
+        return min(largest, max(10.0 * self.smallest, growth * taken))
 
     @staticmethod
     def _tangent_guess(
@@ -139,22 +145,23 @@ class LoadControl:
         return guess
 
     def _objection(
-        self, system: System, here: Point, solution: Solution, lam: float, left_saddle: bool
+        self, system: System, here: Point, there: Point, solution: Solution, left_saddle: bool
     ) -> str:
+        """Why the state that was found is not to be accepted, or an empty string."""
         if not solution.converged:
             return solution.reason
         if left_saddle:
             return ""
         if not solution.stable:
             return solution.reason or "unstable"
-        turned = system.objection(here.q, here.lam, solution.q, lam)
+        turned = system.objection(here.q, here.lam, there.q, there.lam)
         if turned:
             return turned
-        gained = solution.evaluation.energy - here.energy
-        power = system.power(solution.q, lam)
-        work = 0.5 * (here.power + power) * (lam - here.lam)
-        size = max(abs(here.power), abs(power)) * (lam - here.lam)
-        noise = 1e-9 * max(abs(here.energy), abs(solution.evaluation.energy)) + 1e-15 * system.energy_scale
+        gained = there.energy - here.energy
+        taken = there.lam - here.lam
+        work = 0.5 * (here.power + there.power) * taken
+        size = max(abs(here.power), abs(there.power)) * taken
+        noise = 1e-9 * max(abs(here.energy), abs(there.energy)) + 1e-15 * system.energy_scale
         if abs(gained - work) > self.work_mismatch * size + noise:
             return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
         return ""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.system import System
+from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
 
@@ -48,9 +48,11 @@ class Increment:
     negative: int | None = None
 
 
-def point(system: System, q: Array, lam: float, mode: str = "") -> Point:
-    """The point of a path at given unknowns."""
-    evaluation = system.evaluate(q, lam)
+def point(
+    system: System, q: Array, lam: float, mode: str = "", evaluation: Evaluation | None = None
+) -> Point:
+    """The point of a path at given unknowns; `evaluation` is the system's there, if it is known already."""
+    evaluation = evaluation or system.evaluate(q, lam)
     return Point(lam, q, evaluation.forces, evaluation.energy, system.power(q, lam), mode)
 
 

@@ -37,7 +37,7 @@ class Factor(Protocol):
 
     def descend(self, residual: Array) -> Array:
         """A direction in which the primal unknowns lower the energy, and the change of multipliers with it."""
-        ...
+        return -self.solve(residual)
 
 
 class Matrix(Protocol):
@@ -53,6 +53,13 @@ class Matrix(Protocol):
         ...
 
     def __matmul__(self, x: Array) -> Array: ...
+
+
+def unpermuted(rows: Array, order: Ints) -> Array:
+    """Rows in the order of the unknowns again; `order[k]` is the unknown in row k."""
+    out = np.empty_like(rows)
+    out[order] = rows
+    return out
 
 
 # ---------------------------------------------------------------------------------------------- banded
@@ -92,18 +99,14 @@ class BandMatrix:
             row = self.ab[d, : n - d]
             out[d:] += row * y[: n - d]
             out[: n - d] += row * y[d:]
-        result = np.empty_like(out)
-        result[self.order] = out
-        return result
+        return unpermuted(out, self.order)
 
     def diagonal(self) -> Array:
-        out = np.empty(self.ab.shape[1])
-        out[self.order] = self.ab[0]
-        return out
+        return unpermuted(self.ab[0], self.order)
 
 
 @dataclass(frozen=True)
-class BandFactor:
+class BandFactor(Factor):
     ab: Array
     order: Ints
 
@@ -111,12 +114,7 @@ class BandFactor:
         x, info = lapack.dpbtrs(self.ab, b[self.order], lower=1)
         if info != 0:
             raise ArithmeticError(f"LAPACK dpbtrs refused argument {-info}")
-        out = np.empty_like(b)
-        out[self.order] = x
-        return out
-
-    def descend(self, residual: Array) -> Array:
-        return -self.solve(residual)
+        return unpermuted(x, self.order)
 
 
 @njit(cache=True, nogil=True)
@@ -148,7 +146,7 @@ def band_ldl(ab):  # type: ignore[no-untyped-def]
 
 
 @dataclass(frozen=True)
-class BandLDLFactor:
+class BandLDLFactor(Factor):
     """Factor of an indefinite band."""
 
     ab: Array
@@ -159,9 +157,7 @@ class BandLDLFactor:
         x, _ = lapack.dtbtrs(self.ab, b[self.order], trans="N", **unit)
         pivots = self.ab[0] if x.ndim == 1 else self.ab[0][:, None]
         x, _ = lapack.dtbtrs(self.ab, x / pivots, trans="T", **unit)
-        out = np.empty_like(b)
-        out[self.order] = x
-        return out
+        return unpermuted(x, self.order)
 
     def descend(self, residual: Array) -> Array:
         raise IndefiniteError(1)
@@ -207,28 +203,19 @@ class SparseMatrix:
         return SparseFactor(factor, self.order), negative
 
     def __matmul__(self, x: Array) -> Array:
-        out = np.empty_like(x)
-        out[self.order] = self.csc @ x[self.order]
-        return out
+        return unpermuted(self.csc @ x[self.order], self.order)
 
     def diagonal(self) -> Array:
-        out = np.empty(self.csc.shape[0])
-        out[self.order] = self.csc.diagonal()
-        return out
+        return unpermuted(self.csc.diagonal(), self.order)
 
 
 @dataclass(frozen=True)
-class SparseFactor:
+class SparseFactor(Factor):
     superlu: Any
     order: Ints
 
     def solve(self, b: Array) -> Array:
-        out = np.empty_like(b)
-        out[self.order] = self.superlu.solve(np.ascontiguousarray(b[self.order]))
-        return out
-
-    def descend(self, residual: Array) -> Array:
-        return -self.solve(residual)
+        return unpermuted(self.superlu.solve(np.ascontiguousarray(b[self.order])), self.order)
 
 
 # ---------------------------------------------------------------------------------------------- composed
@@ -265,16 +252,13 @@ class FreeBodyMatrix:
 
 
 @dataclass(frozen=True)
-class FreeBodyFactor:
+class FreeBodyFactor(Factor):
     factor: Factor
     Z: Array  # orthonormal columns
 
     def solve(self, b: Array) -> Array:
         x = self.factor.solve(b - self.Z @ (self.Z.T @ b))
         return x - self.Z @ (self.Z.T @ x)
-
-    def descend(self, residual: Array) -> Array:
-        return -self.solve(residual)
 
 
 def reverse_cuthill_mckee(rows: Ints, columns: Ints, n: int) -> tuple[Ints, int]:

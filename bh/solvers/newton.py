@@ -67,7 +67,8 @@ class Newton:
         first = self.solve_boldly(system, q, lam, forces)
         if not first.converged and second_guess is not None:
             spent = first.iterations
-            first = self.solve_boldly(system, *_with_lambda(second_guess(), lam))
+            other, other_forces = second_guess()
+            first = self.solve_boldly(system, other, lam, other_forces)
             first = replace(first, iterations=first.iterations + spent)
         if first.converged or self.careful == 0:
             return first
@@ -151,10 +152,6 @@ class Newton:
         except IndefiniteError:
             stable = False
         return Solution(q, now, iterations, True, "", stable, careful)
-
-
-def _with_lambda(guess: tuple[Array, Array], lam: float) -> tuple[Array, float, Array]:
-    return guess[0], lam, guess[1]
 
 
 def factorise_shifted(

@@ -107,7 +107,7 @@ class MultiplierMatrix:
 
 
 @dataclass(frozen=True)
-class MultiplierFactor:
+class MultiplierFactor(Factor):
     """Solves by conjugate gradients on the Schur complement S = G A^-1 G^T, preconditioned by gamma.
 
     S is 1 / gamma up to the stiffness of the structure against the constraints, so few steps suffice; x and y meet
@@ -162,7 +162,7 @@ class MultiplierFactor:
 
 
 @dataclass(frozen=True)
-class DenseSchurFactor:
+class DenseSchurFactor(Factor):
     """Factor of a saddle matrix whose first block is indefinite; its Schur complement G A^-1 G^T is dense."""
 
     factor: Factor
@@ -184,6 +184,3 @@ class DenseSchurFactor:
         x = self.factor.solve(b[:n])
         y = np.linalg.solve(self.schur, self.G.times(x) - b[n:])
         return np.concatenate((x - self.influence @ y, y))
-
-    def descend(self, residual: Array) -> Array:
-        return -self.solve(residual)
