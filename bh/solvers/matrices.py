@@ -35,9 +35,11 @@ class Factor(Protocol):
         """x with A x = b, b (n,) or (n, k)."""
         ...
 
-    def descend(self, residual: Array) -> Array:
-        """A direction in which the primal unknowns lower the energy, and the change of multipliers with it."""
-        return -self.solve(residual)
+    def descend(self, residual: Array) -> tuple[Array, float]:
+        """A direction in which the primal unknowns lower the merit, with the change of multipliers that goes with it,
+        and the rate of change of the merit along it (negative), N mm."""
+        direction = -self.solve(residual)
+        return direction, float(residual @ direction)
 
 
 class Matrix(Protocol):
@@ -159,7 +161,7 @@ class BandLDLFactor(Factor):
         x, _ = lapack.dtbtrs(self.ab, x / pivots, trans="T", **unit)
         return unpermuted(x, self.order)
 
-    def descend(self, residual: Array) -> Array:
+    def descend(self, residual: Array) -> tuple[Array, float]:
         raise IndefiniteError(1)
 
 

@@ -113,12 +113,12 @@ class Newton:
             factor, shift = factorise_shifted(matrix, shift, least=1e-11)
             if factor is None:
                 return Solution(q, now, iteration, False, "singular tangent", careful=True)
-            dq = factor.descend(now.residual)
+            dq, slope = factor.descend(now.residual)
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, careful=True)
             near = shift < 1e-9 and now.imbalance < 0.1
             step = full_step(system, q, lam, now, -factor.solve(now.residual)) if near else None
-            step = step or line_search(system, q, lam, now, dq)
+            step = step or line_search(system, q, lam, now, dq, slope)
             if step is None:
                 if shift > 1e3:
                     return Solution(q, now, iteration, False, "no descent", careful=True)
@@ -182,25 +182,27 @@ def full_step(
 
 
 def line_search(
-    system: System, q: Array, lam: float, now: Evaluation, dq: Array
+    system: System, q: Array, lam: float, now: Evaluation, dq: Array, slope: float
 ) -> tuple[Array, Evaluation, float] | None:
-    """Step along dq that lowers the energy enough (Armijo), multipliers held while looking; None if there is none."""
+    """Step along dq that lowers the merit enough (Armijo), multipliers held while looking; None if there is none.
+
+    `slope` is the rate of change of the merit along dq, N mm.
+    """
     p = system.primal
-    slope = float(now.residual[:p] @ dq[:p])
-    noise = 1e-13 * max(abs(now.energy), abs(slope))
+    noise = 1e-13 * max(abs(now.merit), abs(slope))
     length = 1.0
     for _ in range(30):
         trial = q.copy()
         trial[:p] += length * dq[:p]
         there = system.evaluate(trial, lam)
         if np.isfinite(there.energy) and (
-            there.energy <= now.energy + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
+            there.merit <= now.merit + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
         ):
             if len(q) > p:
                 trial[p:] += length * dq[p:]
                 there = system.evaluate(trial, lam)
             return trial, there, length
-        gain = there.energy - now.energy - length * slope
+        gain = there.merit - now.merit - length * slope
         best = -0.5 * slope * length**2 / gain if np.isfinite(gain) and gain > 0.0 else 0.0
         length = min(max(best, 0.1 * length), 0.5 * length)
     return None
