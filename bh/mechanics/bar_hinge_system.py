@@ -19,9 +19,10 @@ from bh.mechanics.assembly import (
 )
 from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
+from bh.mechanics.motions import describe_motion
 from bh.model import Model
 from bh.program import StepProgram
-from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import State
@@ -273,6 +274,32 @@ class BarsAndHingesSystem:
         after = dihedral_angles(self.positions(q_new, lam_new), e.hinges)
         turn = float(np.abs(after - before).max(initial=0.0))
         return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
+
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        if not self.constraints.rigid_body or not (self.force.start.any() or self.force.end.any()):
+            return "", ""
+        # an accepted state is in equilibrium; do the forces stay so a little further along the path?
+        try:
+            factor = self.tangent(q, lam, self.evaluate(q, lam).forces).factorise(1e-9)
+        except IndefiniteError:
+            return "", ""
+        ahead = 1e-3 * max(lam, 0.01)
+        moved = q - ahead * factor.solve(self.control_rate(q, lam))
+        lost = self._unbalanced(moved, lam + ahead) - self._unbalanced(q, lam)
+        if lost <= 1e-6 * ahead:
+            return "", ""
+        return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
+
+    def _unbalanced(self, q: Array, lam: float) -> float:
+        """Part of the dead forces that works on rigid motions."""
+        local = self.to_local(self.force.at(lam)).ravel()[self.free]
+        Z = self._rigid(self.positions(q, lam))
+        return float(np.abs(Z.T @ local).max(initial=0.0)) / max(float(np.abs(local).sum()), 1e-300)
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        local = np.zeros_like(self.reference)
+        local.ravel()[self.free] = motion[: self.primal]
+        return describe_motion(self.mesh, self.positions(q, lam), self.to_global(local))
 
     # ------------------------------------------------------------------------------- pattern, grounding, constraints
 

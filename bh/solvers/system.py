@@ -74,6 +74,14 @@ class System(Protocol):
         """Why an increment from one state to the next is not to be trusted, or an empty string."""
         ...
 
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        """Outcome and reason where the state itself tells why a path ends (contact, ...), else empty strings."""
+        ...
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        """A motion (n,) of the unknowns in words, such as "crease 'a' turns freely"."""
+        ...
+
     @property
     def energy_scale(self) -> float:
         """Stiffness times one radian squared over all hinges, N mm; 1e-15 of it is rounding."""
