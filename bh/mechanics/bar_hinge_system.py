@@ -18,9 +18,10 @@ from bh.mechanics.assembly import (
     tangent_values,
 )
 from bh.mechanics.elements import sheet_elements
+from bh.mechanics.hinge_lock import ZONE, until_closed
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
 from bh.model import Model
-from bh.program import StepProgram
+from bh.program import StepProgram, hinge_name
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
@@ -70,6 +71,7 @@ class BarsAndHingesSystem:
         self._moments_start = moments
         self._d_bar = np.empty((len(self.elements.bars), 3))
         self._g_hinge = np.empty((len(self.elements.hinges), 12))
+        self._k_hinge = np.empty(len(self.elements.hinges))  # with the locks, as of the last tangent
         if self.constraints.rigid_body:
             self._check_balance()
 
@@ -168,7 +170,7 @@ class BarsAndHingesSystem:
         f = np.zeros_like(x)
         forces = np.empty(len(e.bars) + len(e.hinges))
         energy, size = nodal_forces(
-            x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, e.hinge_stiffness,
+            x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, e.hinge_stiffness, e.lock,
             e.rest.at(lam), self.couple(q, lam), f, forces[: len(e.bars)], forces[len(e.bars) :],
         )  # fmt: skip
         return energy, size, f, forces
@@ -187,8 +189,8 @@ class BarsAndHingesSystem:
         data = np.zeros(pattern.size)
         tangent_values(
             x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0],
-            e.hinges, e.hinge_stiffness, forces[bars:],
-            pattern.slots[1], self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge,
+            e.hinges, e.hinge_stiffness, e.lock, forces[bars:], pattern.slots[1],
+            self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge, self._k_hinge,
         )  # fmt: skip
         matrix: Matrix
         if self.constraints.rigid_body:
@@ -209,7 +211,7 @@ class BarsAndHingesSystem:
         local.ravel()[self.free] = dq[: self.primal]
         out = np.empty_like(forces)
         predicted_forces(
-            e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, e.hinge_stiffness, forces[bars:],
+            e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, self._k_hinge, forces[bars:],
             self._g_hinge, self.to_global(local), out[:bars], out[bars:],
         )  # fmt: skip
         if e.held:
@@ -237,9 +239,10 @@ class BarsAndHingesSystem:
     def power(self, q: Array, lam: float) -> float:
         e = self.elements
         x = self.positions(q, lam)
-        _, _, f, forces = self.internal_forces(x, q, lam)
+        _, _, f, _ = self.internal_forces(x, q, lam)
         turn = dihedral_angles(x, e.hinges) - e.rest.at(lam)
-        total = float(e.couple.rate @ turn - forces[len(e.bars) :] @ e.rest.rate)
+        moment = e.hinge_stiffness * turn + self.couple(q, lam)  # without the lock, which knows no rest angle
+        total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.reference))
         unbalanced = self.to_local(f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.prescribed_rate))
@@ -265,16 +268,41 @@ class BarsAndHingesSystem:
         out = np.zeros_like(x)
         tangent_times(
             x, v, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars],
-            e.hinges, e.hinge_stiffness, forces[bars:], out,
+            e.hinges, e.hinge_stiffness, e.lock, forces[bars:], out,
         )  # fmt: skip
         return out
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        before, after = self._angles(q, lam), self._angles(q_new, lam_new)
+        change = np.abs(after - before)
+        if len(change) == 0 or change.max() <= LARGEST_TURN:
+            return ""
+        worst = int(np.argmax(change))
+        if change[worst] > np.pi:  # angles are known modulo a turn: the shorter way there leads through closed
+            return f"{self._panels(worst)} would pass through each other"
+        return f"a hinge turned by {np.degrees(change[worst]):.0f} degrees"
+
+    def contact(self, q: Array, lam: float) -> str:
+        """Which panels have met at a hinge (within `hinge_lock.ZONE` of closed), or an empty string.
+
+        Names the hinge that is nearest to 0 or 2 pi. Held creases are not asked, they follow their angle; nor are
+        hinges that are made closed. Where a path cannot go on, this tells whether contact is the reason, with the lock
+        or without.
+        """
         e = self.elements
-        before = dihedral_angles(self.positions(q, lam), e.hinges)
-        after = dihedral_angles(self.positions(q_new, lam_new), e.hinges)
-        turn = float(np.abs(after - before).max(initial=0.0))
-        return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
+        left = until_closed(self._angles(q, lam))
+        left[until_closed(dihedral_angles(self.reference, e.hinges)) < ZONE] = np.inf
+        left = left[: e.bending + e.spring]
+        if len(left) == 0 or left.min() >= ZONE:
+            return ""
+        nearest = int(np.argmin(left))
+        return f"{self._panels(nearest)} touch ({np.degrees(left[nearest]):.2g} degrees from closed)"
+
+    def _angles(self, q: Array, lam: float) -> Array:
+        return dihedral_angles(self.positions(q, lam), self.elements.hinges)
+
+    def _panels(self, hinge: int) -> str:
+        return f"the panels at {hinge_name(self.mesh, int(self.elements.source[hinge]))}"
 
     # ------------------------------------------------------------------------------- pattern, grounding, constraints
 
