@@ -202,6 +202,7 @@ def result(path: Trace, scene: Scene) -> dict[str, Any]:
         "outcome": path.outcome,
         "reason": path.reason,
         "energy": {kind: _number(value) for kind, value in last.energy.as_dict().items()},
+        "lock_energy": _number(last.energy.lock),
         "fold_angle": {
             crease: {"mean": _number(a.mean()), "min": _number(a.min()), "max": _number(a.max())}
             for crease, a in folds.items()

@@ -35,12 +35,12 @@ class Energy:
         return self.stretching + self.bending + self.folding
 
     def as_dict(self) -> dict[str, float]:
+        """Elastic energies by kind and their total, N mm."""
         return {
             "stretching": self.stretching,
             "bending": self.bending,
             "folding": self.folding,
             "total": self.total,
-            "lock": self.lock,
         }
 
 

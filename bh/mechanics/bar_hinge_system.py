@@ -278,7 +278,8 @@ class BarsAndHingesSystem:
         if len(change) == 0 or change.max() <= LARGEST_TURN:
             return ""
         worst = int(np.argmax(change))
-        if change[worst] > np.pi:  # angles are known modulo a turn: the shorter way there leads through closed
+        # angles are known modulo a turn: beyond pi the shorter way leads through closed
+        if change[worst] > np.pi:
             return f"{self._panels(worst)} would pass through each other"
         return f"a hinge turned by {np.degrees(change[worst]):.0f} degrees"
 
