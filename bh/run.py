@@ -31,7 +31,7 @@ FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "resul
 
 
 class Solved(NamedTuple):
-    """A path, the names of its files, whether it had been finished before, and its first self-contact if there is any."""
+    """A path, the names of its files, whether it had been finished before, and its first self-contact if any."""
 
     path: Trace
     names: tuple[str, str]

@@ -149,9 +149,8 @@ def intersecting(points: Array, triangles: Ints, pairs: Ints, tolerance: float) 
         if zeros_b == 3 or zeros_a == 3:
             found[row] = _overlap_in_plane(A, B, n_a if zeros_b == 3 else n_b, tolerance)
             continue
-        if shared >= 2 or (
-            zeros_a == 2 and zeros_b == 2
-        ):  # both have an edge in the line where the planes meet
+        edge_on_edge = zeros_a == 2 and zeros_b == 2  # both have one in the line where the planes meet
+        if shared >= 2 or edge_on_edge:
             continue
         line[0] = n_a[1] * n_b[2] - n_a[2] * n_b[1]
         line[1] = n_a[2] * n_b[0] - n_a[0] * n_b[2]
