@@ -25,7 +25,7 @@ OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 @njit(**OPTIONS)
 def _arrange(points, one, two, A, B):  # type: ignore[no-untyped-def]
-    """Number of shared nodes; copies corners to A and B (3, 3), shared ones first and alike, relative to A[0]."""
+    """Copy the corners of two triangles to A and B (3, 3), relative to A[0]: shared nodes first, and exactly alike."""
     shared = 0
     rest_a, rest_b = 2, 2
     for i in range(3):
@@ -49,7 +49,6 @@ def _arrange(points, one, two, A, B):  # type: ignore[no-untyped-def]
         for i in range(3):
             A[i, c] -= origin
             B[i, c] -= origin
-    return shared
 
 
 @njit(**OPTIONS)
@@ -137,7 +136,7 @@ def intersecting(points: Array, triangles: Ints, pairs: Ints, tolerance: float) 
     n_a, n_b, d_a, d_b, line = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for row in range(len(pairs)):
         i, j = min(pairs[row, 0], pairs[row, 1]), max(pairs[row, 0], pairs[row, 1])
-        shared = _arrange(points, triangles[i], triangles[j], A, B)
+        _arrange(points, triangles[i], triangles[j], A, B)
         _normal(A, n_a)
         zeros_b = _distances(B, A[0], n_a, tolerance, d_b)
         if zeros_b < 0:
@@ -149,8 +148,9 @@ def intersecting(points: Array, triangles: Ints, pairs: Ints, tolerance: float) 
         if zeros_b == 3 or zeros_a == 3:
             found[row] = _overlap_in_plane(A, B, n_a if zeros_b == 3 else n_b, tolerance)
             continue
-        edge_on_edge = zeros_a == 2 and zeros_b == 2  # both have one in the line where the planes meet
-        if shared >= 2 or edge_on_edge:
+        if (
+            zeros_a == 2 and zeros_b == 2
+        ):  # both have an edge in the line where the planes meet, shared or not
             continue
         line[0] = n_a[1] * n_b[2] - n_a[2] * n_b[1]
         line[1] = n_a[2] * n_b[0] - n_a[0] * n_b[2]
