@@ -18,7 +18,9 @@ from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
 from bh.mechanics.hinge_lock import ZONE, lock_terms, until_closed
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.stiffness import bending_hinge_stiffness
-from bh.program import crease_hinges, program
+from bh.model import ElementStiffness
+from bh.program import crease_hinges, hinge_name, program
+from bh.scene import parse_scene
 from verification.derivatives import differences
 
 Array = NDArray[np.float64]
@@ -180,6 +182,38 @@ def test_stiffness_of_the_locks() -> None:
     assert e.lock[: -e.held].all()
 
 
+def test_stiffness_of_the_locks_where_stiffness_is_given() -> None:
+    """The mean of all hinges stands for the sheet."""
+    mesh = flap().mesh
+    hinges = np.random.default_rng(2).uniform(0.0, 2.0, len(mesh.topology.hinges))
+    given = ElementStiffness(np.full(len(mesh.topology.edges), 100.0), hinges)
+    e = first_system(replace(flap().force("edge:outer", total=(0.0, 0.0, -0.01)), stiffness=given)).elements
+    assert e.lock == pytest.approx(np.maximum(hinges, hinges.mean())[e.source], rel=1e-14)
+
+
+def test_what_is_in_contact_is_named() -> None:
+    """Bending hinges by their edge, creases by their shortest name; held creases never."""
+    mesh = flap().mesh
+    held = trace(Model(mesh, SHEET).fold("crease", to=0.2 * ZONE))
+    assert held.outcome == "reached"
+    assert held._system(0).contact(held.records[-1].q, 1.0) == ""
+    plain = Model(mesh, SHEET).support("crease:crease", "xyz").support("edge:inner", "xyz")  # no law: sheet
+    system, q = bent_to(plain.force("edge:outer", total=(0.0, 0.0, -0.01)), 0.2 * ZONE)
+    assert system.elements.spring == 0
+    assert system.contact(q, 0.0).startswith("the panels at crease 'crease' (edge ")
+    nameless = meshes.SheetMesh(mesh.points, mesh.triangles)
+    hinge = int(crease_hinges(mesh, "crease")[0])
+    a, b = mesh.topology.hinges[hinge, 1:3].tolist()
+    assert hinge_name(nameless, hinge) == f"edge {a}-{b}"
+    part = {
+        **mesh.edge_sets,
+        "crease:all of them": mesh.crease_edges("crease"),
+        "crease:c1": np.array([[a, b]]),
+    }
+    named = meshes.SheetMesh(mesh.points, mesh.triangles, edge_sets=part)
+    assert hinge_name(named, hinge) == f"crease 'c1' (edge {a}-{b})"
+
+
 def test_made_closed() -> None:
     """A sheet that is folded by a degree less than a half turn where it is stress-free: its crease has no lock."""
     drawn = flap().mesh
@@ -318,3 +352,26 @@ def test_option_is_kept_and_checked(tmp_path) -> None:  # type: ignore[no-untype
     assert again.provenance["input"] != path.provenance["input"]
     with pytest.raises(bh.ModelError, match="hinge_lock = 1 cannot be; give True or False"):
         replace(model, hinge_lock=1)  # type: ignore[arg-type]
+
+
+def test_option_in_scenes() -> None:
+    scene = """
+[pattern]
+kind = "strip"
+length = 20.0
+width = 10.0
+creases = [5.0]
+[sheet]
+E = 4000.0
+t = 0.2
+[mesh]
+along = 4
+[model]
+%s
+[[steps]]
+fold = { crease = "crease", to = 2.0 }
+"""
+    for text, expected in (("", True), ("hinge_lock = true", True), ("hinge_lock = false", False)):
+        assert parse_scene(scene % text).model.hinge_lock is expected
+    with pytest.raises(bh.SceneError, match=r"model.hinge_lock = 1 cannot be; give true or false"):
+        parse_scene(scene % "hinge_lock = 1")
