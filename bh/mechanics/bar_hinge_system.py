@@ -273,15 +273,22 @@ class BarsAndHingesSystem:
         return out
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        before, after = self._angles(q, lam), self._angles(q_new, lam_new)
-        change = np.abs(after - before)
-        if len(change) == 0 or change.max() <= LARGEST_TURN:
+        through = self.crossing(q, lam, q_new, lam_new)
+        if through:
+            return through
+        turn = float(np.abs(self._angles(q_new, lam_new) - self._angles(q, lam)).max(initial=0.0))
+        return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
+
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Which panels passed through each other at a hinge between two states, or an empty string.
+
+        Angles are known modulo a turn, so a hinge that passes 0 or 2 pi is seen to jump by nearly a turn; it counts as
+        passed where the way through closed is the shorter one (a jump by more than pi).
+        """
+        jump = np.abs(self._angles(q_new, lam_new) - self._angles(q, lam))
+        if jump.max(initial=0.0) <= np.pi:
             return ""
-        worst = int(np.argmax(change))
-        # angles are known modulo a turn: beyond pi the shorter way leads through closed
-        if change[worst] > np.pi:
-            return f"{self._panels(worst)} would pass through each other"
-        return f"a hinge turned by {np.degrees(change[worst]):.0f} degrees"
+        return f"{self._panels(int(np.argmax(jump)))} would pass through each other"
 
     def contact(self, q: Array, lam: float) -> str:
         """Which panels have met at a hinge (within `hinge_lock.ZONE` of closed), or an empty string.
