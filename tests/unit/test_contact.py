@@ -395,6 +395,30 @@ def test_no_false_alarm_in_deep_folds() -> None:
     assert first_contact(path) is None
 
 
+def test_folded_sector_rolls_onto_itself() -> None:
+    """A plane crease curls up by 1 / sin(phi / 2) when folded: its ends meet when it has turned by 2 pi, not before."""
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 4.6), aspect_ratio=6)
+    model = Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
+    path = trace(
+        model.fold("crease", to=math.pi / 2), strategy=bh.LoadControl(largest_rotation=math.radians(5.0))
+    )
+    assert path.outcome == "reached"
+    turned = []
+    for state in path:
+        e = np.diff(state.crease_points("crease"), axis=0)
+        e /= np.linalg.norm(e, axis=1)[:, None]
+        angles = np.arccos(np.clip((e[1:] * e[:-1]).sum(axis=1), -1.0, 1.0))
+        turned.append(angles.sum() * len(e) / len(angles))
+    contact = first_contact(path)
+    assert contact is not None
+    assert turned[contact.state - 1] < 2.0 * math.pi < turned[contact.state]
+    # what meets is the two ends
+    corners = mesh.points[mesh.triangles].mean(axis=1)[contact.triangles]
+    angle = np.mod(np.arctan2(corners[..., 1], corners[..., 0]), 2.0 * math.pi)
+    assert (angle.min(axis=1) < 0.4).all()
+    assert (angle.max(axis=1) > 4.2).all()
+
+
 def roll_of_panels(to: float) -> Model:
     """Four mountain creases; at fold angles beyond 2 pi / 5 the last panel runs into the first."""
     mesh = meshes.structured(meshes.strip(12.0, 50.0, [10.0, 20.0, 30.0, 40.0]), along=3)
