@@ -185,8 +185,8 @@ class LoadControl:
         """Why the state that was found is not to be accepted, or an empty string."""
         if not solution.converged:
             return solution.reason
-        if left_saddle:
-            return ""
+        if left_saddle:  # it may have gone far
+            return system.crossing(here.q, here.lam, there.q, there.lam)
         if not solution.stable and self.at_bifurcation == "stable":
             return solution.reason or "unstable"
         turned = system.objection(here.q, here.lam, there.q, there.lam)
