@@ -181,7 +181,9 @@ class Model:
         creased = np.flatnonzero(~np.isnan(k_fold))
         k_hinge = np.nan_to_num(np.where(np.isnan(k_fold), k_bend, k_fold))[topology.hinge_edges]
         if len(creased):  # an empty crease could be neither folded nor drawn
-            mesh = replace(mesh, edge_sets={"crease:fold": topology.edges[creased]}, folds={"fold": "mountain"})
+            mesh = replace(
+                mesh, edge_sets={"crease:fold": topology.edges[creased]}, folds={"fold": "mountain"}
+            )
         # the sheet only sets the scale of forces here; a mean bar stiffness stands for E t
         model = cls(
             mesh, Sheet(E=float(np.mean(k_bar)), t=1.0), stiffness=ElementStiffness(k_bar, k_hinge, green)

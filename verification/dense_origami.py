@@ -1,8 +1,8 @@
 """Bars and hinges once more: dense, slow and independent, as a referee for limit points of given assemblages.
 
 Written from Liu and Paulino (2017), Proc. R. Soc. A 473:20170348, and shares nothing with `bh`: gradients of the
-dihedral angle in Bridson's form (Bridson, Marino and Fedkiw 2003), Hessians by the complex step (Squire and Trapp 1998),
-dense matrices, and the modified generalised displacement control of Leon et al. (2014). Two sets of laws:
+dihedral angle in Bridson's form (Bridson, Marino and Fedkiw 2003), Hessians by the complex step (Squire and Trapp
+1998), dense matrices, and the modified generalised displacement control of Leon et al. (2014). Two sets of laws:
 
 - "quadratic": 1/2 EA / L (l - L)^2 a bar and 1/2 k L (phi - phi_0)^2 a hinge, the laws of `bh`;
 - "published": Ogden bars, force EA (s^4 - 1) / 4 at stretch s (their section 2.1 with alpha = 5 and 1), and hinges that
@@ -25,17 +25,17 @@ Ints = NDArray[np.int64]
 Law = Literal["quadratic", "published"]
 
 
-def _cross(a: NDArray, b: NDArray) -> NDArray:  # type: ignore[type-arg]
+def _cross(a: NDArray, b: NDArray) -> NDArray:
     return np.stack([a[..., (i + 1) % 3] * b[..., (i + 2) % 3] - a[..., (i + 2) % 3] * b[..., (i + 1) % 3]
                      for i in range(3)], axis=-1)  # fmt: skip
 
 
-def _dot(a: NDArray, b: NDArray) -> NDArray:  # type: ignore[type-arg]
+def _dot(a: NDArray, b: NDArray) -> NDArray:
     return np.sum(a * b, axis=-1, keepdims=True)
 
 
-def hinge_gradients(x: NDArray) -> NDArray:  # type: ignore[type-arg]
-    """(m, 4, 3) gradients of the dihedral angles of hinges at (m, 4, 3) corners (edge, edge, wing, wing); also complex."""
+def hinge_gradients(x: NDArray) -> NDArray:
+    """(m, 4, 3) gradients of dihedral angles; corners (m, 4, 3) are edge, edge, wing, wing, and may be complex."""
     j, k, a, b = (x[:, i] for i in range(4))
     e = k - j
     n1, n2 = _cross(a - j, a - k), _cross(b - k, b - j)
@@ -156,13 +156,15 @@ class DenseOrigami:
         free = ~self.held.ravel()
         F = self.load.ravel()[free]
         u, lam = np.zeros_like(self.points), 0.0
-        before = start = None
+        before: Array | None = None
+        scale, sign = 0.0, 1.0
         for _ in range(increments):
-            predictor = np.linalg.solve(self.stiffness(u).reshape(-1, len(free))[np.ix_(free, free)], F)
-            start = predictor if start is None else start
-            sign = 1.0 if before is None else sign * math.copysign(1.0, float(before @ predictor))  # noqa: F821
+            predictor = np.asarray(np.linalg.solve(self.stiffness(u)[np.ix_(free, free)], F), dtype=float)
+            scale = scale or float(predictor @ predictor)
+            if before is not None:
+                sign *= math.copysign(1.0, float(before @ predictor))
             before = predictor
-            change = sign * first * math.sqrt(float(start @ start) / float(predictor @ predictor))
+            change = sign * first * math.sqrt(scale / float(predictor @ predictor))
             step = change * predictor
             for iteration in range(31):
                 lam += change
@@ -180,5 +182,5 @@ class DenseOrigami:
 
 
 def _scatter(K: Array, nodes: Ints, blocks: Array) -> None:
-    dof = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
+    dof = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), 3 * nodes.shape[1])
     np.add.at(K, (dof[:, :, None], dof[:, None, :]), blocks)

@@ -1,7 +1,7 @@
 """The bistable Miura fold and the eggbox under bending of Liu and Paulino (2017), from the data of their program.
 
-Geometry, stiffness, supports and loads are those of its scripts Miura_Bistable and Eggbox_Bending (one diagonal a panel,
-the shorter one). Their bars are Ogden's and their hinges stiffen near closure, which `bh` has not; the referee
+Geometry, stiffness, supports and loads are those of its scripts Miura_Bistable and Eggbox_Bending (one diagonal a
+panel, the shorter one). Their bars are Ogden's and their hinges stiffen near closure, which `bh` has not; the referee
 `verification.dense_origami` follows the same data with the laws of `bh` and with the published ones.
 """
 
@@ -77,8 +77,6 @@ class Assemblage:
         model = Model.from_arrays(
             x, self.mesh.triangles, edges, self.EA / lengths, hinges, stiffness * widths, [], [], supports
         )
-        from bh import Force
-
         loaded = np.flatnonzero(np.abs(self.load).any(axis=1)).tolist()
         return model.step(*(Force([node], each=(factor * self.load[node]).tolist()) for node in loaded))
 
@@ -134,7 +132,7 @@ def eggbox_bending() -> Assemblage:
 
 
 def extremes(load: Array, fall: Array) -> list[tuple[float, float]]:
-    """(load, fall) at the limit points of a curve, from parabolas through three states each, over their chord length."""
+    """(load, fall) at the limit points of a curve, each from parabolas through three states over chord length."""
     found = []
     for i in np.flatnonzero(np.diff(np.sign(np.diff(load)))) + 1:
         three = slice(i - 1, i + 2)

@@ -1,4 +1,4 @@
-"""Pinches: of a single crease to pi / 14 (source 5.3), and of a pleated fan until its pleats buckle together (3.5.3)."""
+"""Pinches: of one crease to pi / 14 (source 5.3), and of a pleated fan until its pleats buckle together (3.5.3)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import meshes
-from bh import Displace, Fold, Force, Model, Path, Sheet, State, trace
+from bh import Displace, Force, Model, Path, Sheet, State, trace
 from bh.formulations import formulation
 from bh.program import program
 from bh.solvers.linear import linear_response
@@ -49,7 +49,7 @@ def pinched_crease(kappa_0: float, length: float = LENGTH, t: float = 0.5, along
 
 
 def crease_curvature(points: Array, reach: int = 3) -> Array:
-    """(k - 2 reach,) curvature at the inner points of a polyline (k, 3), from circles through 2 reach + 1 points, 1/mm."""
+    """(k - 2 reach,) curvature along a polyline (k, 3), from circles through 2 reach + 1 points, 1/mm."""
     return np.array(
         [1.0 / circle_radius(points[i - reach : i + reach + 1]) for i in range(reach, len(points) - reach)]
     )

@@ -1,8 +1,9 @@
 """A strip rolled to a full circle by end moments, against the elastica.
 
-A model knows couples on creases only, so each end has a crease to a handle that cannot turn: a fixed panel at one end,
-and at the other a carriage that slides along x. The couple on such a crease does work on the turn of the end and on nothing
-else: it is a dead end moment. Both ends stay on the x axis, each turns by pi, and they meet when the circle is closed.
+A model knows couples on creases only, so each end has a crease to a handle that cannot turn: a fixed panel at one
+end, and at the other a carriage that slides along x. The couple on such a crease does work on the turn of the end and
+on nothing else: it is a dead end moment. Both ends stay on the x axis, each turns by pi, and they meet when the circle
+is closed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A straight elastica under equal and opposite end moments is an arc of a circle (Euler 1744; Love 1927, section 262)."""
+"""A straight elastica under equal and opposite end moments is an arc of a circle (Love 1927, section 262)."""
 
 from __future__ import annotations
 
