@@ -127,6 +127,31 @@ def test_referee_follows_the_truss() -> None:
 
 
 @ASSEMBLAGES
+def test_assemblages_are_those_of_the_paper(make: type[Assemblage]) -> None:
+    """Panels of edge 2 and 60 degrees; loads and supports as its text and figures show them."""
+    given = make()
+    x = given.points[given.panels]
+    sides = np.roll(x, -1, axis=1) - x
+    assert np.linalg.norm(sides, axis=2) == pytest.approx(np.full((100, 4), 2.0))
+    corner = np.degrees(np.arccos(np.abs(np.sum(sides[:, 0] * sides[:, 1], axis=1)) / 4.0))
+    assert corner == pytest.approx(np.full(100, 60.0))
+    assert (
+        np.abs(np.einsum("pi,pi->p", np.cross(sides[:, 0], sides[:, 1]), sides[:, 2])).max() < 1e-12
+    )  # flat
+    loaded = np.flatnonzero(given.load.any(axis=1))
+    assert given.load[loaded].tolist() == [[0.0, 0.0, -1.0]] * len(loaded)
+    supported = np.flatnonzero(given.held.any(axis=1)).tolist()
+    if make is miura_bistable:  # nodes are numbered column by column, 11 in each
+        assert loaded.tolist() == [60]
+        assert supported == [*range(0, 11, 2), *range(110, 121, 2)]
+        assert given.held.sum() == 3 + 5 * 2 + 2 + 5
+    else:
+        assert loaded.tolist() == [5, 115]
+        assert supported == [26, 28, 92, 94]
+        assert given.held.sum() == 3 + 2 + 2 + 1
+
+
+@ASSEMBLAGES
 def test_small_load_balances_in_the_referee(make: type[Assemblage]) -> None:
     given = make()
     path = trace(given.model(0.4))
