@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import meshes
 from bh import Force, Model, Path, Sheet, trace
 from verification.checks import CaseResult, line, plot
-from verification.hard_cases.common import Found, check
+from verification.hard_cases.common import Found, check, located
 from verification.theory.arch import SineArch
 from verification.toys import VonMisesTruss
 
@@ -56,16 +56,6 @@ def amplitudes(path: Path) -> tuple[Array, Array]:
     return found[:, 0], found[:, 1]
 
 
-def limit_load(b: Array, load: Array) -> float:
-    """Largest load before the first fall, from the parabola through its three highest states."""
-    falls = np.flatnonzero(np.diff(load) < 0.0)
-    if len(falls) == 0 or falls[0] == 0:
-        return math.nan
-    i = int(falls[0])
-    curve = np.polyfit(b[i - 1 : i + 2], load[i - 1 : i + 2], 2)
-    return float(np.polyval(curve, -0.5 * curve[1] / curve[0]))
-
-
 def arch(result: CaseResult) -> Found:
     """Through snap-through along the symmetric path (rise 1.2 t), and over a bifurcation (rise 3 t)."""
     source = "Fung and Kaplan 1952 (closed form, shallow arch)"
@@ -80,8 +70,7 @@ def arch(result: CaseResult) -> Found:
         yield check("arch: largest distance from the exact path, in limit loads",
                     float(np.abs(load - low.load(b)).max() / peak), "", 0.0, source, 0.01 if judged else None, path,
                     along=along)  # fmt: skip
-        yield check("arch: limit load", limit_load(b, load), "N/mm", peak, source, 0.01 if judged else None, path,
-                    along=along)  # fmt: skip
+        yield from _critical(low, path, peak, source, judged, along)
         unstable = [bool(abs(x) < low.limits()[0]) for x in b[1:]]
         told = [record.stable is False for record in path.records[1:]]
         near = np.abs(np.abs(b[1:]) - low.limits()[0]) < 0.05 * low.h
@@ -99,18 +88,40 @@ def arch(result: CaseResult) -> Found:
     yield from _tall_arch(source)
 
 
+def _critical(low: SineArch, path: Path, peak: float, source: str, judged: bool, along: int) -> Found:
+    """Loads and kinds of the four critical points of the low arch: behind its limit points it could also sway."""
+    top, bottom = low.limits()
+    sway = low.bifurcation()
+    exact = (("limit", top), ("bifurcation", sway), ("bifurcation", -sway), ("limit", bottom))
+    found = [at for _, at in path.critical_points]
+    yield check(
+        "arch: critical points",
+        float(len(found)),
+        "",
+        4.0,
+        source,
+        0.0 if judged else None,
+        path,
+        along=along,
+    )
+    for number, ((kind, b), at) in enumerate(zip(exact, found, strict=False), 1):
+        params = {"along": along, "number": number, "kind": kind}
+        off = abs(1.5 * at.lam - float(low.load(b)) / peak)
+        yield check("arch: distance of a critical load from the exact one, in limit loads", off, "", 0.0, source,
+                    0.02 if judged else None, path, **params)  # fmt: skip
+        yield check("arch: critical point called what it is", float(at.kind == kind), "", 1.0, source,
+                    0.0 if judged else None, path, **params)  # fmt: skip
+
+
 def _tall_arch(source: str) -> Found:
     """The arch sways before its limit point; the default then goes to the stable state beyond."""
     tall = arch_theory(3.0 * THICKNESS)
     sway = float(tall.load(tall.bifurcation()))
     path = trace(arch_model(tall.h, 256, 1.5 * sway))
     b, _ = amplitudes(path)
-    upright = path.lambdas[b > 0.0].max()
-    snapped = path.lambdas[b < 0.0].min(initial=math.inf)
-    between = upright <= 1.01 / 1.5 and snapped >= 0.99 / 1.5
-    yield check("arch: bifurcation between the last upright and the first snapped state", float(between), "", 1.0,
-                source, 0.0, path, upright=round(1.5 * float(upright), 4),
-                snapped=round(1.5 * float(snapped), 4))  # fmt: skip
+    found = located(path, "bifurcation") + located(path, "limit")
+    first = min((lam for lam, _ in found), default=math.nan)
+    yield check("arch: load where it sways", 1.5 * first * sway, "N/mm", sway, source, 0.01, path)
     load = 1.5 * sway * path.lambdas[-1]
     yield check("arch: load that belongs to the snapped shape", float(tall.load(b[-1])), "N/mm", load, source, 0.01,
                 path)  # fmt: skip
@@ -159,6 +170,12 @@ def truss_with_spring(result: CaseResult) -> Found:
                         path, **params)  # fmt: skip
             yield check("truss in a model: snapped through", float(top[-1] > truss.rise), "", 1.0, "closed form", 0.0,
                         path, **params)  # fmt: skip
+            if drive == "force":
+                found = [lam for lam, _ in located(path, "limit")]
+                for number, exact in enumerate((truss.limit(), -truss.limit())):
+                    lam = found[number] if number < len(found) else math.nan
+                    yield check("truss in a model: limit load", truss.force * lam, "N", truss.force * exact,
+                                "closed form", 1e-5, path, number=number + 1, **params)  # fmt: skip
             series.append(line(f"spring {spring:g}, {drive}", end.tolist(), pull.tolist()))
     result.plots.append(
         plot("hard-truss-model", "Truss with a spring, as a model", "displacement of the spring's end, mm", "force, N",

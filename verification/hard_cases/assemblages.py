@@ -17,7 +17,7 @@ from bh import Force, Model, Path, trace
 from meshes import SheetMesh
 from verification.checks import CaseResult, line, plot
 from verification.dense_origami import DenseOrigami, Law
-from verification.hard_cases.common import Found, check
+from verification.hard_cases.common import Found, check, located
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -155,14 +155,18 @@ def _published(given: Assemblage, node: int, first: float, upto: float) -> tuple
 
 
 def _refereed(given: Assemblage, path: Path, factor: float, name: str) -> Found:
-    """Equilibrium and number of negative eigenvalues of every state of `bh`, told by the referee."""
+    """Equilibrium, number of negative eigenvalues and limit points of `bh`, told by the referee."""
     referee, free = given.referee("quadratic"), ~given.held
+
+    def lowest(points: Array) -> float:
+        K = referee.stiffness(points - given.points)[np.ix_(free.ravel(), free.ravel())]
+        return float(np.linalg.eigvalsh(K)[0])
+
     worst, wrong = 0.0, 0
     for record, state in zip(path.records[1:], path[1:], strict=True):
-        u = state.points - given.points
-        worst = max(worst, float(np.abs((factor * record.lam * given.load - referee.forces(u))[free]).max()))
-        K = referee.stiffness(u)[np.ix_(free.ravel(), free.ravel())]
-        wrong += (float(np.linalg.eigvalsh(K)[0]) > 0.0) is not record.stable
+        unbalanced = factor * record.lam * given.load - referee.forces(state.points - given.points)
+        worst = max(worst, float(np.abs(unbalanced[free]).max()))
+        wrong += (lowest(state.points) > 0.0) is not record.stable
     source = "independent dense implementation (Liu and Paulino 2017), laws of bh"
     yield check(
         f"{name}: largest residual of the referee over the load", worst / factor, "", 0.0, source, 1e-6, path
@@ -176,6 +180,10 @@ def _refereed(given: Assemblage, path: Path, factor: float, name: str) -> Found:
         0.0,
         path,
     )
+    begin = lowest(given.points)
+    for number, (_, points) in enumerate(located(path, "limit"), 1):
+        yield check(f"{name}: lowest eigenvalue at a limit point, over that of the start", lowest(points) / begin, "",
+                    0.0, source, 1e-3, path, number=number)  # fmt: skip
 
 
 def assemblages(result: CaseResult) -> Found:
@@ -190,8 +198,9 @@ def assemblages(result: CaseResult) -> Found:
     yield from _refereed(miura, path, factor, "bistable Miura")
     load = factor * path.lambdas
     fall = np.array([miura.points[node, 2] - state.points[node, 2] for state in path])
-    their_load, their_fall = _published(miura, node, 0.15, factor)
-    ours, theirs = extremes(load, fall), extremes(their_load, their_fall)
+    their_load, their_fall = _published(miura, node, 0.1, factor)
+    ours = [(factor * lam, float(miura.points[node, 2] - x[node, 2])) for lam, x in located(path, "limit")]
+    theirs = extremes(their_load, their_fall)
     yield check(
         "bistable Miura: limit points", float(len(ours)), "", float(len(theirs)), published, 0.0, path
     )
@@ -211,7 +220,7 @@ def assemblages(result: CaseResult) -> Found:
     yield from _refereed(eggbox, path, factor, "eggbox")
     their_load, their_fall = _published(eggbox, node, 0.25, factor)
     source = published.replace("Miura_Bistable", "Eggbox_Bending")
-    yield check("eggbox: limit points", float(len(extremes(path.lambdas, path.lambdas))), "",
+    yield check("eggbox: limit points", float(len(located(path, "limit"))), "",
                 float(len(extremes(their_load, their_fall))), source, 0.0, path)  # fmt: skip
     fall_at_end = float(eggbox.points[node, 2] - path[-1].points[node, 2])
     yield check("eggbox: fall of the loaded node", fall_at_end, "mm", float(np.interp(factor, their_load, their_fall)),

@@ -6,11 +6,15 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 import meshes
 from bh import Model, Path, Sheet
 from verification.checks import Check, cost_of
 
 Found = Iterator[Check]
+Array = NDArray[np.float64]
 
 
 def check(
@@ -23,6 +27,15 @@ def check(
     return Check(
         "hard_cases", quantity, params, value, unit, reference, source, tolerance, outcome=outcome, **cost
     )
+
+
+def located(path: Path, kind: str) -> list[tuple[float, Array]]:
+    """Lambda and node positions (n, 3), mm, of every "limit" or "bifurcation" point that the path has passed."""
+    return [
+        (at.lam, path._system(step).positions(at.q, at.lam))
+        for step, at in path.critical_points
+        if at.kind == kind
+    ]
 
 
 def annulus(along: int = 48, t: float = 0.127, kind: Any = "staggered", **sector: float) -> Model:
