@@ -185,7 +185,10 @@ class Model:
         k_fold = _on_edges(mesh, "folding hinges", folding_hinges, folding_stiffness)
         creased = np.flatnonzero(~np.isnan(k_fold))
         k_hinge = np.nan_to_num(np.where(np.isnan(k_fold), k_bend, k_fold))[topology.hinge_edges]
-        mesh = replace(mesh, edge_sets={"crease:fold": topology.edges[creased]}, folds={"fold": "mountain"})
+        if len(creased):  # an empty crease could be neither folded nor drawn
+            mesh = replace(
+                mesh, edge_sets={"crease:fold": topology.edges[creased]}, folds={"fold": "mountain"}
+            )
         # the sheet only sets the scale of forces here; a mean bar stiffness stands for E t
         model = cls(
             mesh, Sheet(E=float(np.mean(k_bar)), t=1.0), stiffness=ElementStiffness(k_bar, k_hinge, green)
