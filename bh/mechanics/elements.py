@@ -23,8 +23,8 @@ PENALTY = 300.0  # of a held crease, in parts of E t h^2 with h the height of it
 class Elements:
     """Element arrays of one step. Hinges are ordered: bending, spring creases, held creases.
 
-    `source` (h,) is the row of `mesh.topology.hinges` of each hinge, `lock` (h,) the stiffness of its lock. Held creases
-    have no stiffness (their moment is a multiplier); `penalty` (held,) is their weight in the augmented tangent,
+    `source` (h,) is the row of `mesh.topology.hinges` of each hinge, `lock` (h,) the stiffness of its lock. Held
+    creases have no stiffness (their moment is a multiplier); `penalty` (held,) is their weight in the tangent,
     N mm / rad.
     """
 
