@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point
 from bh.solvers.matrices import IndefiniteError
-from bh.solvers.newton import Newton, Solution, count_negative
+from bh.solvers.modes import count_negative
+from bh.solvers.newton import Newton, Solution
 from bh.solvers.stability import leave_saddle, locate
 from bh.solvers.system import System
 
@@ -95,7 +96,8 @@ class LoadControl:
             solution = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
             iterations += solution.iterations
             note, primary = "", solution
-            if solution.converged and not solution.stable and self.at_bifurcation == "stable":
+            trusted = solution.converged and not self._mistrust(system, here, solution, lam)
+            if trusted and not solution.stable and self.at_bifurcation == "stable":
                 solution, note = leave_saddle(system, solution, lam, self.newton)
                 iterations += solution.iterations
             # what did not converge may hold anything; nothing is asked of it
@@ -193,7 +195,17 @@ class LoadControl:
         if left_saddle:  # it may have gone far
             return system.crossing(here.q, here.lam, there.q, there.lam)
         if not solution.stable and self.at_bifurcation == "stable":
-            return solution.reason or "unstable"
+            return solution.reason or self._jump(system, here, there) or "unstable"
+        return self._jump(system, here, there)
+
+    def _mistrust(self, system: System, here: Point, found: Solution, lam: float) -> str:
+        """Why an unstable state is not on the branch of the last one, before anybody leaves it."""
+        if found.stable:
+            return ""
+        return self._jump(system, here, point(system, found.q, lam, evaluation=found.evaluation))
+
+    def _jump(self, system: System, here: Point, there: Point) -> str:
+        """Why two states are not neighbours on one branch, or an empty string."""
         turned = system.objection(here.q, here.lam, there.q, there.lam)
         if turned:
             return turned

@@ -8,7 +8,7 @@ import numpy as np
 
 from bh.solvers.increments import Increment
 from bh.solvers.matrices import IndefiniteError
-from bh.solvers.stability import lowest_mode
+from bh.solvers.modes import lowest_mode
 from bh.solvers.system import System
 
 FREE = 1e-11  # stiffness of a motion, in parts of the largest, that is rounding

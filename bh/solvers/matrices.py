@@ -36,8 +36,8 @@ class Factor(Protocol):
         ...
 
     def descend(self, residual: Array) -> tuple[Array, float]:
-        """A direction in which the primal unknowns lower the merit, with the change of multipliers that goes with it,
-        and the rate of change of the merit along it (negative), N mm."""
+        """Newton's direction, and the rate of change of the merit (N mm) along its primal part once the multipliers
+        have been changed as it says: negative."""
         direction = -self.solve(residual)
         return direction, float(residual @ direction)
 

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.matrices import Factor, IndefiniteError, Matrix
+from bh.solvers.modes import count_negative, factorise_shifted, lowest_mode
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
-NEUTRAL = 1e-13  # shift, in parts of the diagonal, at which an eigenvalue is zero but for rounding
+NEAR_SADDLE = 1e-3  # imbalance below which an indefinite tangent is that of a saddle
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,8 @@ class Newton:
         bold_shift: largest shift of the bold way; a tangent that is more indefinite asks for the careful one.
         transient: the last resort; None to do without.
         unstable: take indefinite tangents as they are and go boldly only, to stay on a branch that is not stable.
+        saddles: where the careful way comes close to a saddle, solve for it, so that whoever asked can see what
+            lies there; False rolls on downhill.
     """
 
     tolerance: float = 1e-8
@@ -63,6 +66,7 @@ class Newton:
     bold_shift: float = 1e-5
     transient: PseudoTransient | None = field(default_factory=PseudoTransient)
     unstable: bool = False
+    saddles: bool = True
 
     def solve(
         self,
@@ -129,6 +133,7 @@ class Newton:
         """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns."""
         now = system.evaluate(q, lam)
         shift, before = 0.0, np.inf
+        saddles = self.saddles
         for iteration in range(self.careful):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=True)
@@ -139,6 +144,17 @@ class Newton:
             dq, slope = factor.descend(now.residual)
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, careful=True)
+            if shift > 1e-9 and now.imbalance < NEAR_SADDLE:
+                # nearly at rest where the tangent is indefinite: without a push it would take for ever to roll off
+                if saddles:
+                    there = replace(self, unstable=True, bold=6).solve_boldly(system, q, lam, now.forces)
+                    if there.converged:
+                        return replace(there, iterations=iteration + there.iterations, careful=True)
+                    saddles = False
+                rolled = roll_off(system, q, lam, now, matrix)
+                if rolled is not None:
+                    q, now = rolled
+                    continue
             near = shift < 1e-9 and now.imbalance < 0.1
             step = full_step(system, q, lam, now, -factor.solve(now.residual)) if near else None
             step = step or line_search(system, q, lam, now, dq, slope)
@@ -173,38 +189,30 @@ class Newton:
         return Solution(q, now, iterations, True, "", negative, careful)
 
 
-def count_negative(matrix: Matrix) -> int:
-    """Number of negative eigenvalues on the null space of the constraints; those that are rounding count as zero.
+def roll_off(
+    system: System, q: Array, lam: float, now: Evaluation, matrix: Matrix
+) -> tuple[Array, Evaluation] | None:
+    """From next to a saddle down along the direction of most negative curvature, as far as the merit falls.
 
-    Where there are too many constraints for an exact count it is that of the augmented matrix, an upper bound.
+    None where no curvature is negative but for rounding (More and Sorensen 1979 use such steps).
     """
+    p = system.primal
     try:
-        matrix.factorise(NEUTRAL)
-        return 0
+        curvature, mode = lowest_mode(matrix, len(q), p, tolerance=1e-3)
     except IndefiniteError:
-        try:
-            return max(matrix.factorise_any()[1], 1)
-        except IndefiniteError as error:
-            return max(error.negative, 1)
-
-
-def factorise_shifted(
-    matrix: Matrix, shift: float, largest: float = 1e6, least: float = 0.0
-) -> tuple[Factor | None, float]:
-    """The factor with the smallest tried shift (in parts of the diagonal) that makes the matrix positive definite.
-
-    Neutral modes, such as the phase of the waves of a buckled ring, are first given a stiffness at the level of
-    rounding. Returns None where the shift would exceed `largest`.
-    """
-    if shift < 1e-9:
-        shift = least
-    while shift <= largest:
-        try:
-            return matrix.factorise(shift), shift
-        except IndefiniteError:
-            # a matrix that is indefinite at zero has been looked at closely; go past what it calls rounding
-            shift = 1e-11 if shift == 0.0 else max(4.0 * shift, 1e-9)
-    return None, shift
+        return None
+    if curvature >= 0.0:
+        return None
+    sense = -1.0 if float(now.residual[:p] @ mode[:p]) > 0.0 else 1.0
+    step = sense * 1e-3 * (float(np.ptp(q[:p])) or 1.0) / float(np.abs(mode).max()) * mode
+    best, found = now.merit, None
+    for _ in range(12):
+        there = system.evaluate(q + step, lam)
+        if not (np.isfinite(there.merit) and there.merit < best):
+            break
+        best, found = there.merit, (q + step, there)
+        step = 2.0 * step
+    return found
 
 
 def full_step(
@@ -218,23 +226,26 @@ def full_step(
 def line_search(
     system: System, q: Array, lam: float, now: Evaluation, dq: Array, slope: float
 ) -> tuple[Array, Evaluation, float] | None:
-    """Step along dq that lowers the merit enough (Armijo), multipliers held while looking; None if there is none.
+    """Step along dq that lowers the merit enough (Armijo); None if there is none.
 
-    `slope` is the rate of change of the merit along dq, N mm.
+    Multipliers are changed at once and held while looking; `slope` is the rate of change of the merit along the primal
+    part of dq after that, N mm.
     """
     p = system.primal
+    start = q
+    if len(q) > p:
+        start = q.copy()
+        start[p:] += dq[p:]
+        now = system.evaluate(start, lam)
     noise = 1e-13 * max(abs(now.merit), abs(slope))
     length = 1.0
     for _ in range(30):
-        trial = q.copy()
+        trial = start.copy()
         trial[:p] += length * dq[:p]
         there = system.evaluate(trial, lam)
         if np.isfinite(there.energy) and (
             there.merit <= now.merit + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
         ):
-            if len(q) > p:
-                trial[p:] += length * dq[p:]
-                there = system.evaluate(trial, lam)
             return trial, there, length
         gain = there.merit - now.merit - length * slope
         best = -0.5 * slope * length**2 / gain if np.isfinite(gain) and gain > 0.0 else 0.0

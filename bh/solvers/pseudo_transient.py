@@ -45,17 +45,17 @@ class PseudoTransient:
                 shift = max(4.0 * shift, 1e-9)
                 continue
             dq, _ = factor.descend(now.residual)
-            trial = q.copy()
-            trial[:p] += dq[:p]
-            held = system.evaluate(trial, lam)
-            noise = 1e-12 * max(abs(now.merit), abs(held.merit))
-            if not (np.isfinite(held.energy) and held.merit <= now.merit + noise):
+            base = now
+            if len(q) > p:  # multipliers first; with them the displacements go downhill
+                start = q.copy()
+                start[p:] += dq[p:]
+                base = system.evaluate(start, lam)
+            trial = q + dq
+            there = system.evaluate(trial, lam)
+            noise = 1e-12 * max(abs(base.merit), abs(there.merit))
+            if not (np.isfinite(there.energy) and there.merit <= base.merit + noise):
                 shift = max(4.0 * shift, 1e-9)
                 continue
-            there = held
-            if len(q) > p:
-                trial[p:] += dq[p:]
-                there = system.evaluate(trial, lam)
             steps += 1
             ratio = there.imbalance / now.imbalance
             shift *= min(2.0, max(0.1, ratio))

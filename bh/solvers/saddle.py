@@ -163,16 +163,17 @@ class MultiplierFactor(Factor):
         return np.concatenate((x, y / scale + self.gamma * miss))
 
     def descend(self, residual: Array) -> tuple[Array, float]:
-        """Newton's direction of the augmented Lagrangian at fixed multipliers, and their first-order update.
+        """Newton's direction of the saddle. Its displacements go downhill once its multipliers are set.
 
-        The saddle's own direction meets the constraints at once, but may go uphill where the tangent was shifted.
+        With those the gradient of the augmented Lagrangian is -(K + gamma G^T G) x, as G x = -gap; so its slope along x
+        is negative wherever the (shifted) augmented matrix is definite. Updating the multipliers to first order only
+        (gamma times what is missed) crawls where the sheet is stiffer against the constraint than gamma.
         """
         n = self.G.n
-        gap = residual[n:]
-        gradient = residual[:n] + self.G.transpose_times(self.gamma * gap)
-        x = -self.factor.solve(gradient)
-        change = self.gamma * (gap + self.G.times(x))
-        return np.concatenate((x, change)), float(gradient @ x)
+        direction = -self.solve(residual)
+        moments = direction[n:] + self.gamma * residual[n:]
+        gradient = residual[:n] + self.G.transpose_times(moments)
+        return direction, float(gradient @ direction[:n])
 
 
 @dataclass(frozen=True)

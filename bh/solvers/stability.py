@@ -9,58 +9,11 @@ from numpy.typing import NDArray
 
 from bh.solvers.hyperplane import correct
 from bh.solvers.increments import CriticalPoint, Point, point
-from bh.solvers.matrices import IndefiniteError, Matrix
-from bh.solvers.newton import Newton, Solution, count_negative, factorise_shifted
-from bh.solvers.saddle import MultiplierMatrix
+from bh.solvers.modes import count_negative, lowest_mode, nearest_mode
+from bh.solvers.newton import Newton, Solution
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
-
-
-def lowest_mode(
-    matrix: Matrix, size: int, primal: int, iterations: int = 60, tolerance: float = 1e-6
-) -> tuple[float, Array]:
-    """Rayleigh quotient and mode (size,) of the lowest eigenvalue; multipliers (after `primal`) are zero in it.
-
-    Inverse iteration with the shifted matrix K + s D (D = |diag K|), started from a fixed pseudo-random vector so that
-    the same input gives the same mode. The mode has unit length and its largest component is positive.
-    """
-    # the penalty of the augmented matrix keeps its low modes in the null space of the constraints
-    matrix = matrix.augmented if isinstance(matrix, MultiplierMatrix) else matrix
-    factor, _ = factorise_shifted(matrix, 0.0, least=1e-11)
-    if factor is None:
-        raise IndefiniteError(1)
-    mode = np.random.default_rng(20).normal(size=primal)
-    quotient = np.inf
-    for _ in range(iterations):
-        mode = factor.solve(mode)
-        mode /= np.linalg.norm(mode)
-        before, quotient = quotient, float(mode @ (matrix @ mode))
-        if abs(quotient - before) <= tolerance * abs(quotient):
-            break
-    return quotient, _signed(mode, size)
-
-
-def nearest_mode(matrix: Matrix, size: int, primal: int, iterations: int = 6) -> Array:
-    """(size,) mode of the eigenvalue nearest to zero, of unit length in its displacements, largest component positive.
-
-    Inverse iteration with the matrix as it is, definite or not: for tangents that are nearly singular.
-    """
-    factor, _ = matrix.factorise_any()
-    mode = np.zeros(size)
-    mode[:primal] = np.random.default_rng(20).normal(size=primal)
-    for _ in range(iterations):
-        load = np.zeros(size)
-        load[:primal] = mode[:primal]
-        mode = factor.solve(load)
-        mode /= np.linalg.norm(mode[:primal])
-    return _signed(mode, size, primal)
-
-
-def _signed(mode: Array, size: int, primal: int | None = None) -> Array:
-    whole = np.zeros(size)
-    whole[: len(mode)] = mode * np.sign(mode[np.argmax(np.abs(mode[:primal]))])
-    return whole
 
 
 def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -> tuple[Solution, str]:
@@ -73,6 +26,7 @@ def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -
     _, mode = lowest_mode(tangent, len(saddle.q), system.primal)
     mode /= max(float(np.abs(mode).max()), 1e-300)
     size = float(np.ptp(saddle.q[: system.primal])) or 1.0
+    newton = replace(newton, saddles=False)
     spent = 0
     for amplitude in (1e-2, 5e-2, 2e-1):
         starts = [saddle.q + sense * amplitude * size * mode for sense in (1.0, -1.0)]

@@ -13,8 +13,9 @@ from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, Point, extrapolate, point
 from bh.solvers.linear import linear_response
 from bh.solvers.matrices import BandMatrix
-from bh.solvers.newton import Newton, Solution, factorise_shifted, line_search
-from bh.solvers.stability import leave_saddle, lowest_mode
+from bh.solvers.modes import factorise_shifted, lowest_mode
+from bh.solvers.newton import Newton, Solution, line_search
+from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
 from bh.solvers.trace import Walk, walk
 
