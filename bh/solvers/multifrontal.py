@@ -1,0 +1,354 @@
+"""Sparse L D L^T by the multifrontal method (Duff and Reid 1983; Liu 1992) on the tree of a nested dissection.
+
+A front is a dense symmetric matrix: first the unknowns that it eliminates, then those of its ancestors that they touch
+(its border). It gathers the entries of its own columns and the updates of its children, eliminates by blocks (level-3
+BLAS), and hands what is left of the border to its parent. Pivots are 1 x 1 and stay on the diagonal, so their signs are
+the inertia (Sylvester) and the pattern never changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bh.solvers.blas import addresses, constants, solve_right, subtract_product
+from bh.solvers.dissection import Dissection
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+BLOCK = 32  # columns eliminated at once
+STRIP = 128  # columns of an update made by one product: below the diagonal it makes little that is not needed
+
+
+@dataclass(frozen=True)
+class Fronts:
+    """What the pattern alone decides about a factorisation.
+
+    Attributes:
+        start: (f + 1,) front k eliminates the unknowns start[k] to start[k + 1] of the order.
+        border_start: (f + 1,) bounds of the border of front k in `border` and `to_parent`.
+        border: unknowns (places in the order) of the borders, ascending.
+        to_parent: their rows in the parent's front.
+        panel: (f + 1,) where the columns of front k begin in the factor, rows first.
+        children: (f,) number of children.
+        entries: place in the factor of every value of the lower triangle.
+        stack: most values that updates take at a time.
+    """
+
+    start: Ints
+    border_start: Ints
+    border: NDArray[np.int32]
+    to_parent: NDArray[np.int32]
+    panel: Ints
+    children: Ints
+    entries: Ints
+    stack: int
+
+    @property
+    def rows(self) -> Ints:
+        """(f,) size of every front."""
+        return np.diff(self.start) + np.diff(self.border_start)
+
+    @property
+    def operations(self) -> float:
+        """Multiplications of one factorisation."""
+        columns, rows = np.diff(self.start).astype(float), self.rows.astype(float)
+        border = rows - columns
+        return float((columns * border**2 / 2 + columns**2 * border / 2 + columns**3 / 6).sum())
+
+
+def fronts(tree: Dissection, indptr: Ints, indices: Ints, first: Ints, lower: tuple[Any, Any]) -> Fronts:
+    """Symbolic factorisation.
+
+    Args:
+        tree: dissection of the graph `indptr`, `indices`; vertices are nodes with a few unknowns each.
+        first: (v + 1,) first unknown (place in the order) of the node at every place of the order.
+        lower: (indptr, indices) of the lower triangle in compressed columns, in the order.
+    """
+    place = np.empty(len(tree.order), dtype=np.int64)
+    place[tree.order] = np.arange(len(tree.order))
+    border_start, nodes = _borders(tree.order, place, tree.start, tree.parent, indptr, indices)
+    sizes = np.diff(first)[nodes]
+    bounds = np.concatenate(([0], np.cumsum(sizes)))
+    border = (np.repeat(first[nodes] - bounds[:-1], sizes) + np.arange(bounds[-1])).astype(np.int32)
+    border_start = bounds[border_start]
+    start = first[tree.start]
+    columns = np.diff(start)
+    panel = np.concatenate(([0], np.cumsum(columns * (columns + np.diff(border_start)))))
+    to_parent = _rows_in_parent(start, border_start, border, tree.parent)
+    children = np.bincount(tree.parent[tree.parent >= 0], minlength=len(tree.parent))
+    entries = _entry_places(lower[0], lower[1], start, border_start, border, panel)
+    stack = _stack_size(np.diff(border_start), children)
+    return Fronts(start, border_start, border, to_parent, panel, children, entries, stack)
+
+
+@njit(cache=True, nogil=True)
+def _borders(order, place, start, parent, indptr, indices):  # type: ignore[no-untyped-def]
+    """Places of the nodes in the border of every front: neighbours and children's borders that come later."""
+    count = len(parent)
+    bounds = np.zeros(count + 1, dtype=np.int64)
+    found = np.empty(max(16 * len(order), 16), dtype=np.int64)
+    seen = np.full(len(order), -1, dtype=np.int64)
+    head, following = np.full(count, -1, dtype=np.int64), np.full(count, -1, dtype=np.int64)
+    for k in range(count):
+        at = begin = bounds[k]
+        end = start[k + 1]
+        room = len(order) - end
+        if at + room > len(found):
+            larger = np.empty(2 * len(found) + room, dtype=np.int64)
+            larger[:at] = found[:at]
+            found = larger
+        for p in range(start[k], end):
+            v = order[p]
+            for e in range(indptr[v], indptr[v + 1]):
+                w = place[indices[e]]
+                if w >= end and seen[w] != k:
+                    seen[w] = k
+                    found[at] = w
+                    at += 1
+        child = head[k]
+        while child >= 0:
+            for e in range(bounds[child], bounds[child + 1]):
+                w = found[e]
+                if w >= end and seen[w] != k:
+                    seen[w] = k
+                    found[at] = w
+                    at += 1
+            child = following[child]
+        found[begin:at] = np.sort(found[begin:at])
+        bounds[k + 1] = at
+        if parent[k] >= 0:
+            following[k] = head[parent[k]]
+            head[parent[k]] = k
+    return bounds, found[: bounds[count]].copy()
+
+
+@njit(cache=True, nogil=True)
+def _rows_in_parent(start, border_start, border, parent):  # type: ignore[no-untyped-def]
+    rows = np.zeros(len(border), dtype=np.int32)
+    for k in range(len(parent)):
+        up = parent[k]
+        if up < 0:
+            continue
+        own_end = start[up + 1]
+        at = border_start[up]
+        for e in range(border_start[k], border_start[k + 1]):
+            if border[e] < own_end:
+                rows[e] = border[e] - start[up]
+            else:
+                while border[at] != border[e]:
+                    at += 1
+                rows[e] = own_end - start[up] + at - border_start[up]
+    return rows
+
+
+@njit(cache=True, nogil=True)
+def _entry_places(indptr, indices, start, border_start, border, panel):  # type: ignore[no-untyped-def]
+    places = np.empty(len(indices), dtype=np.int64)
+    for k in range(len(start) - 1):
+        columns, own_end = start[k + 1] - start[k], start[k + 1]
+        rows = columns + border_start[k + 1] - border_start[k]
+        for c in range(start[k], own_end):
+            at = border_start[k]
+            column = panel[k] + (c - start[k]) * rows
+            for e in range(indptr[c], indptr[c + 1]):
+                r = indices[e]
+                if r < own_end:
+                    places[e] = column + r - start[k]
+                else:
+                    while border[at] != r:
+                        at += 1
+                    places[e] = column + columns + at - border_start[k]
+    return places
+
+
+@njit(cache=True, nogil=True)
+def _stack_size(borders, children):  # type: ignore[no-untyped-def]
+    sizes = np.zeros(len(borders) + 1, dtype=np.int64)
+    depth, used, most = 0, 0, 0
+    for k in range(len(borders)):
+        own = borders[k] * borders[k]
+        most = max(most, used + own)
+        for _ in range(children[k]):
+            depth -= 1
+            used -= sizes[depth]
+        sizes[depth] = own
+        depth += 1
+        used += own
+    return most
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _eliminate_block(L, at, rows, size):  # type: ignore[no-untyped-def]
+    """L D L^T in place of the (size, size) block at `at`; the number of negative pivots, -1 if one is zero."""
+    negative = 0
+    for j in range(size):
+        column = at + j * rows
+        pivot = L[column + j]
+        if not abs(pivot) > 0.0 or not np.isfinite(pivot):
+            return -1
+        if pivot < 0.0:
+            negative += 1
+        for k in range(j + 1, size):
+            scaled = L[column + k] / pivot
+            target = at + k * rows
+            for i in range(k, size):
+                L[target + i] -= scaled * L[column + i]
+        for i in range(j + 1, size):
+            L[column + i] /= pivot
+    return negative
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _eliminate(L, at, rows, columns, U, u_at, W, blas, whole, real):  # type: ignore[no-untyped-def]
+    """Eliminate the columns of one front; its border's update (border, border) at `u_at` of U. Negative pivots, or -1."""
+    negative = 0
+    base, work, ublas = np.int64(L.ctypes.data), np.int64(W.ctypes.data), np.int64(U.ctypes.data)
+    for j in range(0, columns, BLOCK):
+        size = min(BLOCK, columns - j)
+        corner = at + j * rows + j
+        found = _eliminate_block(L, corner, rows, size)
+        if found < 0:
+            return -1
+        negative += found
+        below = rows - j - size
+        if below == 0:
+            continue
+        solve_right(blas, whole, real, below, size, base + 8 * corner, rows, base + 8 * (corner + size), rows)
+        # W keeps L D of this block, the panel L
+        for c in range(size):
+            pivot = 1.0 / L[corner + c * rows + c]
+            source, target = corner + size + c * rows, j * rows + c * rows + j + size
+            for i in range(below):
+                W[target + i] = L[source + i]
+                L[source + i] *= pivot
+        for c in range(j + size, columns, STRIP):
+            width = min(STRIP, columns - c)
+            subtract_product(
+                blas, whole, real, rows - c, width, size,
+                base + 8 * (at + j * rows + c), rows, work + 8 * (j * rows + c), rows,
+                base + 8 * (at + c * rows + c), rows,
+            )  # fmt: skip
+    border = rows - columns
+    for c in range(0, border, STRIP):
+        width = min(STRIP, border - c)
+        subtract_product(
+            blas, whole, real, border - c, width, columns,
+            base + 8 * (at + columns + c), rows, work + 8 * (columns + c), rows,
+            ublas + 8 * (u_at + c * border + c), border,
+        )  # fmt: skip
+    return negative
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_child(child, child_border, rows_of, L, at, rows, columns, U, u_at):  # type: ignore[no-untyped-def]
+    border = rows - columns
+    for j in range(child_border):
+        column = rows_of[j]
+        source = child + j * child_border
+        if column < columns:
+            target = at + column * rows
+            for i in range(j, child_border):
+                L[target + rows_of[i]] += U[source + i]
+        else:
+            target = u_at + (column - columns) * border - columns
+            for i in range(j, child_border):
+                U[target + rows_of[i]] += U[source + i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _factorise(  # type: ignore[no-untyped-def]
+    data, start, border_start, to_parent, panel, children, entries, stack, widest, L, blas, whole, real
+):
+    """Numerical factorisation into L, which is zero on entry; number of negative pivots, -1 if one is zero."""
+    count = len(start) - 1
+    for e in range(len(data)):
+        L[entries[e]] = data[e]
+    U = np.empty(max(stack, 1))
+    W = np.empty(max(widest, 1))
+    waiting, where = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
+    depth, used, negative = 0, 0, 0
+    for k in range(count):
+        columns = start[k + 1] - start[k]
+        border = border_start[k + 1] - border_start[k]
+        rows = columns + border
+        own = border * border
+        U[used : used + own] = 0.0
+        low = used
+        for _ in range(children[k]):
+            depth -= 1
+            child = waiting[depth]
+            low = where[depth]
+            first, last = border_start[child], border_start[child + 1]
+            _add_child(low, last - first, to_parent[first:last], L, panel[k], rows, columns, U, used)
+        found = _eliminate(L, panel[k], rows, columns, U, used, W, blas, whole, real)
+        if found < 0:
+            return -1
+        negative += found
+        if low < used:
+            for i in range(own):
+                U[low + i] = U[used + i]
+        waiting[depth], where[depth] = k, low
+        depth += 1
+        used = low + own
+    return negative
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
+def _solve(L, start, border_start, border, panel, tall, x):  # type: ignore[no-untyped-def]
+    """x <- (L D L^T)^-1 x, in the order."""
+    y = np.empty(max(tall, 1))
+    for k in range(len(start) - 1):
+        s, columns = start[k], start[k + 1] - start[k]
+        first, below = border_start[k], border_start[k + 1] - border_start[k]
+        rows = columns + below
+        y[:columns] = x[s : s + columns]
+        y[columns:rows] = 0.0
+        for j in range(columns):
+            at = panel[k] + j * rows
+            v = y[j]
+            for i in range(j + 1, rows):
+                y[i] -= L[at + i] * v
+        for j in range(columns):
+            x[s + j] = y[j] / L[panel[k] + j * rows + j]
+        for i in range(below):
+            x[border[first + i]] += y[columns + i]
+    for k in range(len(start) - 2, -1, -1):
+        s, columns = start[k], start[k + 1] - start[k]
+        first, below = border_start[k], border_start[k + 1] - border_start[k]
+        rows = columns + below
+        y[:columns] = x[s : s + columns]
+        for i in range(below):
+            y[columns + i] = x[border[first + i]]
+        for j in range(columns - 1, -1, -1):
+            at = panel[k] + j * rows
+            total = 0.0
+            for i in range(j + 1, rows):
+                total += L[at + i] * y[i]
+            y[j] -= total
+        x[s : s + columns] = y[:columns]
+
+
+def factorise(data: Array, f: Fronts) -> tuple[Array, int]:
+    """Factor of the lower values `data`, and its number of negative pivots (-1: a pivot is zero)."""
+    L = np.zeros(int(f.panel[-1]))
+    rows = f.rows
+    widest = int((rows * np.diff(f.start)).max(initial=1))
+    negative = _factorise(
+        data, f.start, f.border_start, f.to_parent, f.panel, f.children, f.entries, f.stack, widest, L,
+        addresses(), *constants(),
+    )  # fmt: skip
+    return L, int(negative)
+
+
+def solve(L: Array, f: Fronts, b: Array) -> Array:
+    """Solution (n,) or (n, k) in the order of elimination."""
+    tall = int(f.rows.max(initial=1))
+    x = np.array(b, dtype=float, order="F")
+    for column in x.T if x.ndim == 2 else (x,):
+        _solve(L, f.start, f.border_start, f.border, f.panel, tall, column)
+    return x
