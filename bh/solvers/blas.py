@@ -1,4 +1,4 @@
-"""Two level-3 BLAS routines for compiled kernels: those that SciPy carries, called at their address.
+"""A few BLAS routines for compiled kernels: those that SciPy carries, called at their address.
 
 numba's own matrix product neither accumulates nor writes into a part of an array, and it has no triangular solve.
 The address is an argument, so kernels that use it can be cached. All matrices are column-major, float64.
@@ -21,10 +21,9 @@ Addresses = NDArray[np.int64]
 
 @cache
 def addresses() -> Addresses:
-    """(2,) addresses of dgemm and dtrsm of SciPy's BLAS."""
-    return np.array(
-        [get_cython_function_address("scipy.linalg.cython_blas", name) for name in ("dgemm", "dtrsm")]
-    )
+    """(4,) addresses of dgemm, dtrsm, dtrsv and dgemv of SciPy's BLAS."""
+    names = ("dgemm", "dtrsm", "dtrsv", "dgemv")
+    return np.array([get_cython_function_address("scipy.linalg.cython_blas", name) for name in names])
 
 
 @intrinsic
@@ -42,13 +41,14 @@ def _call(typing: Any, address: Any, arguments: Any) -> Any:
 
 
 # What BLAS is told through pointers lives in two arrays of the caller, so that it outlives the call:
-# `whole` (8,) int32: characters N, T, R, L, U as bytes of their own, then the sizes; `real` (2,): -1 and 1.
+# `whole` (16,) int32: characters N, T, R, L, U as words of their own, the number 1, then sizes; `real` (2,): -1 and 1.
 
 
 def constants() -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """The two arrays (see above) that the calls below need."""
     whole = np.zeros(16, dtype=np.int32)
     whole[:5] = [ord(letter) for letter in "NTRLU"]  # little endian: the first byte is the letter
+    whole[5] = 1  # step between the entries of a vector
     return whole, np.array([-1.0, 1.0])
 
 
@@ -72,3 +72,35 @@ def solve_right(blas, whole, real, m, n, a, lda, b, ldb):  # type: ignore[no-unt
         blas[1],
         (w + 8, w + 12, w + 4, w + 16, w + 32, w + 36, r + 8, a, w + 40, b, w + 44),
     )
+
+
+@njit(inline="always")
+def solve_lower(blas, whole, n, a, lda, x):  # type: ignore[no-untyped-def]
+    """x <- L^-1 x with L the unit lower triangle at address a."""
+    whole[8], whole[9] = n, lda
+    w = np.int64(whole.ctypes.data)
+    _call(blas[2], (w + 12, w, w + 16, w + 32, a, w + 36, x, w + 20))
+
+
+@njit(inline="always")
+def solve_upper(blas, whole, n, a, lda, x):  # type: ignore[no-untyped-def]
+    """x <- L^-T x with L the unit lower triangle at address a."""
+    whole[8], whole[9] = n, lda
+    w = np.int64(whole.ctypes.data)
+    _call(blas[2], (w + 12, w + 4, w + 16, w + 32, a, w + 36, x, w + 20))
+
+
+@njit(inline="always")
+def add_times(blas, whole, real, m, n, a, lda, x, y):  # type: ignore[no-untyped-def]
+    """y += A x with A (m, n)."""
+    whole[8], whole[9], whole[10] = m, n, lda
+    w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
+    _call(blas[3], (w, w + 32, w + 36, r + 8, a, w + 40, x, w + 20, r + 8, y, w + 20))
+
+
+@njit(inline="always")
+def subtract_transpose_times(blas, whole, real, m, n, a, lda, x, y):  # type: ignore[no-untyped-def]
+    """y -= A^T x with A (m, n)."""
+    whole[8], whole[9], whole[10] = m, n, lda
+    w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
+    _call(blas[3], (w + 4, w + 32, w + 36, r, a, w + 40, x, w + 20, r + 8, y, w + 20))

@@ -15,7 +15,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.solvers.blas import addresses, constants, solve_right, subtract_product
+from bh.solvers.blas import (
+    add_times,
+    addresses,
+    constants,
+    solve_lower,
+    solve_right,
+    solve_upper,
+    subtract_product,
+    subtract_transpose_times,
+)
 from bh.solvers.dissection import Dissection
 
 Array = NDArray[np.float64]
@@ -36,6 +45,7 @@ class Fronts:
         panel: (f + 1,) where the columns of front k begin in the factor, rows first.
         children: (f,) number of children.
         entries: place in the factor of every value of the lower triangle.
+        updates: (f,) where the update of every front is kept while its parent waits for it.
         stack: most values that updates take at a time.
     """
 
@@ -46,6 +56,7 @@ class Fronts:
     panel: Ints
     children: Ints
     entries: Ints
+    updates: Ints
     stack: int
 
     @property
@@ -82,8 +93,8 @@ def fronts(tree: Dissection, indptr: Ints, indices: Ints, first: Ints, lower: tu
     to_parent = _rows_in_parent(start, border_start, border, tree.parent)
     children = np.bincount(tree.parent[tree.parent >= 0], minlength=len(tree.parent))
     entries = _entry_places(lower[0], lower[1], start, border_start, border, panel)
-    stack = _stack_size(np.diff(border_start), children)
-    return Fronts(start, border_start, border, to_parent, panel, children, entries, stack)
+    updates, stack = _update_places(np.diff(border_start), tree.parent)
+    return Fronts(start, border_start, border, to_parent, panel, children, entries, updates, int(stack))
 
 
 @njit(cache=True, nogil=True)
@@ -167,19 +178,30 @@ def _entry_places(indptr, indices, start, border_start, border, panel):  # type:
 
 
 @njit(cache=True, nogil=True)
-def _stack_size(borders, children):  # type: ignore[no-untyped-def]
-    sizes = np.zeros(len(borders) + 1, dtype=np.int64)
-    depth, used, most = 0, 0, 0
-    for k in range(len(borders)):
-        own = borders[k] * borders[k]
-        most = max(most, used + own)
-        for _ in range(children[k]):
-            depth -= 1
-            used -= sizes[depth]
-        sizes[depth] = own
-        depth += 1
-        used += own
-    return most
+def _update_places(borders, parent):  # type: ignore[no-untyped-def]
+    """Where the update of every front is kept, and how much room all of them need.
+
+    Fronts at even and at odd depth have a stack each, one growing up and one growing down: a front is made on one while
+    its children are taken off the other, so that nothing needs to be moved.
+    """
+    count = len(borders)
+    odd = np.zeros(count, dtype=np.bool_)
+    for k in range(count - 1, -1, -1):
+        odd[k] = parent[k] >= 0 and not odd[parent[k]]
+    places, used, most = np.zeros(count, dtype=np.int64), np.zeros(2, np.int64), np.zeros(2, np.int64)
+    freed = np.zeros(count, dtype=np.int64)  # what the children of a front take
+    for k in range(count):
+        own, mine = borders[k] * borders[k], int(odd[k])
+        places[k] = used[mine]
+        used[mine] += own
+        most[mine] = max(most[mine], used[mine])
+        used[1 - mine] -= freed[k]
+        if parent[k] >= 0:
+            freed[parent[k]] += own
+    for k in range(count):
+        if odd[k]:
+            places[k] += most[0]
+    return places, most[0] + most[1]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -245,24 +267,32 @@ def _eliminate(L, at, rows, columns, U, u_at, W, blas, whole, real):  # type: ig
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_child(child, child_border, rows_of, L, at, rows, columns, U, u_at):  # type: ignore[no-untyped-def]
-    border = rows - columns
-    for j in range(child_border):
-        column = rows_of[j]
-        source = child + j * child_border
-        if column < columns:
-            target = at + column * rows
-            for i in range(j, child_border):
-                L[target + rows_of[i]] += U[source + i]
-        else:
-            target = u_at + (column - columns) * border - columns
-            for i in range(j, child_border):
-                U[target + rows_of[i]] += U[source + i]
+def _add_child(child, to_parent, runs, L, at, rows, columns, U, u_at):  # type: ignore[no-untyped-def]
+    """Add a child's update, at `child` of U, to the front of its parent; rows of its border that stay together are a run."""
+    size, border, count = len(to_parent), rows - columns, 0
+    for i in range(size):
+        if i == 0 or to_parent[i] != to_parent[i - 1] + 1 or to_parent[i] == columns:
+            runs[count] = i
+            count += 1
+    runs[count] = size
+    for run in range(count):
+        for j in range(runs[run], runs[run + 1]):
+            column = to_parent[j]
+            if column < columns:
+                V, target = L, at + column * rows
+            else:
+                V, target = U, u_at + (column - columns) * border - columns
+            source = child + j * size
+            for other in range(run, count):
+                first = max(runs[other], j)
+                shift = target + to_parent[first] - first
+                for i in range(first, runs[other + 1]):
+                    V[shift + i] += U[source + i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _factorise(  # type: ignore[no-untyped-def]
-    data, start, border_start, to_parent, panel, children, entries, stack, widest, L, blas, whole, real
+    data, start, border_start, to_parent, panel, children, entries, updates, stack, widest, L, blas, whole, real
 ):
     """Numerical factorisation into L, which is zero on entry; number of negative pivots, -1 if one is zero."""
     count = len(start) - 1
@@ -270,67 +300,57 @@ def _factorise(  # type: ignore[no-untyped-def]
         L[entries[e]] = data[e]
     U = np.empty(max(stack, 1))
     W = np.empty(max(widest, 1))
-    waiting, where = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
-    depth, used, negative = 0, 0, 0
+    waiting = np.empty(count + 1, dtype=np.int64)
+    runs = np.empty(len(start) + start[count] + 1, dtype=np.int64)
+    depth, negative = 0, 0
     for k in range(count):
         columns = start[k + 1] - start[k]
         border = border_start[k + 1] - border_start[k]
         rows = columns + border
-        own = border * border
-        U[used : used + own] = 0.0
-        low = used
+        for j in range(border):
+            begin = updates[k] + j * border
+            U[begin + j : begin + border] = 0.0
         for _ in range(children[k]):
             depth -= 1
             child = waiting[depth]
-            low = where[depth]
             first, last = border_start[child], border_start[child + 1]
-            _add_child(low, last - first, to_parent[first:last], L, panel[k], rows, columns, U, used)
-        found = _eliminate(L, panel[k], rows, columns, U, used, W, blas, whole, real)
+            _add_child(updates[child], to_parent[first:last], runs, L, panel[k], rows, columns, U, updates[k])
+        found = _eliminate(L, panel[k], rows, columns, U, updates[k], W, blas, whole, real)
         if found < 0:
             return -1
         negative += found
-        if low < used:
-            for i in range(own):
-                U[low + i] = U[used + i]
-        waiting[depth], where[depth] = k, low
+        waiting[depth] = k
         depth += 1
-        used = low + own
     return negative
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _solve(L, start, border_start, border, panel, tall, x):  # type: ignore[no-untyped-def]
-    """x <- (L D L^T)^-1 x, in the order."""
-    y = np.empty(max(tall, 1))
+@njit(cache=True, nogil=True, error_model="numpy")
+def _solve(L, start, border_start, border, panel, x, y, blas, whole, real):  # type: ignore[no-untyped-def]
+    """x <- (L D L^T)^-1 x, in the order; y is room for the tallest border."""
+    base, at_x, at_y = np.int64(L.ctypes.data), np.int64(x.ctypes.data), np.int64(y.ctypes.data)
     for k in range(len(start) - 1):
         s, columns = start[k], start[k + 1] - start[k]
         first, below = border_start[k], border_start[k + 1] - border_start[k]
-        rows = columns + below
-        y[:columns] = x[s : s + columns]
-        y[columns:rows] = 0.0
-        for j in range(columns):
-            at = panel[k] + j * rows
-            v = y[j]
-            for i in range(j + 1, rows):
-                y[i] -= L[at + i] * v
-        for j in range(columns):
-            x[s + j] = y[j] / L[panel[k] + j * rows + j]
+        rows, own = columns + below, base + 8 * panel[k]
+        if columns == 0:
+            continue
+        solve_lower(blas, whole, columns, own, rows, at_x + 8 * s)
+        y[:below] = 0.0
+        add_times(blas, whole, real, below, columns, own + 8 * columns, rows, at_x + 8 * s, at_y)
         for i in range(below):
-            x[border[first + i]] += y[columns + i]
+            x[border[first + i]] -= y[i]
+        for j in range(columns):
+            x[s + j] /= L[panel[k] + j * rows + j]
     for k in range(len(start) - 2, -1, -1):
         s, columns = start[k], start[k + 1] - start[k]
         first, below = border_start[k], border_start[k + 1] - border_start[k]
-        rows = columns + below
-        y[:columns] = x[s : s + columns]
+        rows, own = columns + below, base + 8 * panel[k]
+        if columns == 0:
+            continue
         for i in range(below):
-            y[columns + i] = x[border[first + i]]
-        for j in range(columns - 1, -1, -1):
-            at = panel[k] + j * rows
-            total = 0.0
-            for i in range(j + 1, rows):
-                total += L[at + i] * y[i]
-            y[j] -= total
-        x[s : s + columns] = y[:columns]
+            y[i] = x[border[first + i]]
+        subtract_transpose_times(blas, whole, real, below, columns, own + 8 * columns, rows, at_y, at_x + 8 * s)
+        solve_upper(blas, whole, columns, own, rows, at_x + 8 * s)
 
 
 def factorise(data: Array, f: Fronts) -> tuple[Array, int]:
@@ -339,7 +359,7 @@ def factorise(data: Array, f: Fronts) -> tuple[Array, int]:
     rows = f.rows
     widest = int((rows * np.diff(f.start)).max(initial=1))
     negative = _factorise(
-        data, f.start, f.border_start, f.to_parent, f.panel, f.children, f.entries, f.stack, widest, L,
+        data, f.start, f.border_start, f.to_parent, f.panel, f.children, f.entries, f.updates, f.stack, widest, L,
         addresses(), *constants(),
     )  # fmt: skip
     return L, int(negative)
@@ -347,8 +367,8 @@ def factorise(data: Array, f: Fronts) -> tuple[Array, int]:
 
 def solve(L: Array, f: Fronts, b: Array) -> Array:
     """Solution (n,) or (n, k) in the order of elimination."""
-    tall = int(f.rows.max(initial=1))
+    room = np.empty(int(f.rows.max(initial=1)))
     x = np.array(b, dtype=float, order="F")
     for column in x.T if x.ndim == 2 else (x,):
-        _solve(L, f.start, f.border_start, f.border, f.panel, tall, column)
+        _solve(L, f.start, f.border_start, f.border, f.panel, column, room, addresses(), *constants())
     return x
