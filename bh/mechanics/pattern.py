@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from bh.solvers.matrices import BandMatrix, reverse_cuthill_mckee
-from bh.solvers.sparse import SparseMatrix, SparsePattern, sparse_is_cheaper
+from bh.solvers.sparse import SparseMatrix, SparsePattern, band_is_cheaper
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -65,7 +65,7 @@ def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None =
     place, first = _places(order, sizes)
     reach = first[np.maximum(place[high], place[low]) + 1] - first[np.minimum(place[high], place[low])]
     bandwidth = int(max(reach.max(initial=0), sizes.max(initial=0))) - 1 if n else 0
-    if not sparse_is_cheaper(n, bandwidth):
+    if band_is_cheaper(n, bandwidth):
         starts = np.arange(n, dtype=np.int64) * (bandwidth + 1)
         slots = tuple(_band_slots(group, number, place, first, starts) for group in groups)
         return Pattern(_unknowns(number, order), bandwidth, slots, (bandwidth + 1) * n, None)

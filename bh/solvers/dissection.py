@@ -1,6 +1,6 @@
-"""Nested dissection of a graph whose vertices have places (George 1973): the order in which a wide sheet is eliminated.
+"""Nested dissection of a graph (George 1973): the order in which a wide sheet is eliminated.
 
-A set of vertices is cut in half along the best of a few straight lines; the vertices on one side of the cut that touch
+A set of vertices is cut in half along the best of a few lines; the vertices on one side of the cut that touch
 the other one are its separator, which is eliminated after both halves. What depends on what is then a binary tree.
 """
 
@@ -33,20 +33,25 @@ class Dissection:
     parent: Ints
 
 
-def dissect(indptr: Ints, indices: Ints, places: Array) -> Dissection:
+def dissect(indptr: Ints, indices: Ints, places: Array | None = None) -> Dissection:
     """Nested dissection of the graph with neighbours indices[indptr[v] : indptr[v + 1]] of vertex v.
 
-    `places` (v, d) decide the cuts: positions in the flat sheet, or `graph_places` where there are none.
+    `places` (v, d) are positions in the flat sheet, if there are any. Cuts follow straight lines there, which are
+    short, or lines of equal distance in the graph, which follow cells that are slender or lie on a bow.
     """
-    count = len(indptr) - 1
-    angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    centred = places - places.mean(axis=0) if count else places
-    axes = np.linalg.svd(centred.T @ centred)[0][:, :2] if count else np.zeros((places.shape[1], 2))
-    if axes.shape[1] == 1:
-        axes = np.column_stack((axes, np.zeros(len(axes))))
-    keys = np.ascontiguousarray((centred @ axes) @ np.vstack((np.cos(angles), np.sin(angles))))
-    order, start, parent = _dissect(indptr, indices, keys, LEAF)
+    keys = _graph_keys(indptr, indices)
+    if places is not None and len(places):
+        keys = np.column_stack((_lines(places), keys))
+    order, start, parent = _dissect(indptr, indices, np.ascontiguousarray(keys), LEAF)
     return Dissection(order, start, parent)
+
+
+def _lines(places: Array) -> Array:
+    """(v, DIRECTIONS) distances from lines in the plane of the two longest axes of all places."""
+    centred = places - places.mean(axis=0)
+    axes = np.linalg.svd(centred.T @ centred)[0][:, :2]
+    angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    return np.asarray((centred @ axes) @ np.vstack((np.cos(angles), np.sin(angles)))[: axes.shape[1]])
 
 
 @njit(cache=True, nogil=True)
@@ -148,15 +153,14 @@ def _distances(indptr, indices, source):  # type: ignore[no-untyped-def]
     return distance
 
 
-def graph_places(indptr: Ints, indices: Ints) -> Array:
-    """(v, 3) places of the vertices of a graph without positions: distances from three vertices far apart."""
+def _graph_keys(indptr: Ints, indices: Ints) -> Array:
+    """(v, 5) distances in the graph from three vertices far apart, and two of their differences."""
     count = len(indptr) - 1
     if count == 0:
-        return np.zeros((0, 3))
-    columns = []
+        return np.zeros((0, 5))
+    far: list[Ints] = []
     nearest = _distances(indptr, indices, 0)
     for _ in range(3):
-        far = _distances(indptr, indices, int(np.argmax(nearest)))
-        nearest = far if not columns else np.minimum(nearest, far)
-        columns.append(far)
-    return np.column_stack(columns).astype(float)
+        far.append(_distances(indptr, indices, int(np.argmax(nearest))))
+        nearest = np.minimum(nearest, far[-1]) if len(far) > 1 else far[-1]
+    return np.column_stack((*far, far[0] - far[1], far[1] - far[2])).astype(float)

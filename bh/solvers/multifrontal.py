@@ -227,7 +227,7 @@ def _eliminate_block(L, at, rows, size):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _eliminate(L, at, rows, columns, U, u_at, W, blas, whole, real):  # type: ignore[no-untyped-def]
-    """Eliminate the columns of one front; its border's update (border, border) at `u_at` of U. Negative pivots, or -1."""
+    """Eliminate the columns of one front; U has its border's update at `u_at`. Negative pivots, -1 if one is zero."""
     negative = 0
     base, work, ublas = np.int64(L.ctypes.data), np.int64(W.ctypes.data), np.int64(U.ctypes.data)
     for j in range(0, columns, BLOCK):
@@ -268,7 +268,7 @@ def _eliminate(L, at, rows, columns, U, u_at, W, blas, whole, real):  # type: ig
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_child(child, to_parent, runs, L, at, rows, columns, U, u_at):  # type: ignore[no-untyped-def]
-    """Add a child's update, at `child` of U, to the front of its parent; rows of its border that stay together are a run."""
+    """Add a child's update, at `child` of U, to its parent's front, by runs of rows that stay neighbours there."""
     size, border, count = len(to_parent), rows - columns, 0
     for i in range(size):
         if i == 0 or to_parent[i] != to_parent[i - 1] + 1 or to_parent[i] == columns:
@@ -292,7 +292,20 @@ def _add_child(child, to_parent, runs, L, at, rows, columns, U, u_at):  # type: 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _factorise(  # type: ignore[no-untyped-def]
-    data, start, border_start, to_parent, panel, children, entries, updates, stack, widest, L, blas, whole, real
+    data,
+    start,
+    border_start,
+    to_parent,
+    panel,
+    children,
+    entries,
+    updates,
+    stack,
+    widest,
+    L,
+    blas,
+    whole,
+    real,
 ):
     """Numerical factorisation into L, which is zero on entry; number of negative pivots, -1 if one is zero."""
     count = len(start) - 1
@@ -301,7 +314,7 @@ def _factorise(  # type: ignore[no-untyped-def]
     U = np.empty(max(stack, 1))
     W = np.empty(max(widest, 1))
     waiting = np.empty(count + 1, dtype=np.int64)
-    runs = np.empty(len(start) + start[count] + 1, dtype=np.int64)
+    runs = np.empty(start[count] + 1, dtype=np.int64)
     depth, negative = 0, 0
     for k in range(count):
         columns = start[k + 1] - start[k]
@@ -349,7 +362,9 @@ def _solve(L, start, border_start, border, panel, x, y, blas, whole, real):  # t
             continue
         for i in range(below):
             y[i] = x[border[first + i]]
-        subtract_transpose_times(blas, whole, real, below, columns, own + 8 * columns, rows, at_y, at_x + 8 * s)
+        subtract_transpose_times(
+            blas, whole, real, below, columns, own + 8 * columns, rows, at_y, at_x + 8 * s
+        )
         solve_upper(blas, whole, columns, own, rows, at_x + 8 * s)
 
 

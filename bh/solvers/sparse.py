@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from bh.solvers import multifrontal, pardiso
-from bh.solvers.dissection import Dissection, dissect, graph_places
+from bh.solvers.dissection import Dissection, dissect
 from bh.solvers.factor import Factor, IndefiniteError, unpermuted
 
 Array = NDArray[np.float64]
@@ -23,10 +23,16 @@ Ints = NDArray[np.int64]
 Index = NDArray[np.int32]
 
 
-def sparse_is_cheaper(n: int, bandwidth: int) -> bool:
-    """Choice between LAPACK's band and a sparse factor by their measured costs, unless the band is too large to keep."""
-    fits = 8 * n * (bandwidth + 1) < 2e9
-    return not fits or 2.6e-11 * n * (bandwidth + 1.0) ** 2 > 1.5e-7 * n**1.3
+WIDEST = 180  # half-bandwidth up to which LAPACK's band is faster than a sparse factor (docs/performance.md)
+
+
+def band_is_cheaper(n: int, bandwidth: int) -> bool:
+    """Choice between LAPACK's band and a sparse factor by measurement, unless the band would not fit into memory.
+
+    Per unknown the band costs 3e-11 (b + 1)^2 s and more for narrow ones, the sparse factor about 1e-6 s on sheets of
+    that width, whatever their length; on sheets of 1,000 to 50,000 unknowns the two meet at b = 140 to 220.
+    """
+    return bandwidth <= WIDEST and 8 * n * (bandwidth + 1) < 2e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +72,7 @@ class SparsePattern:
         ones = np.ones(2 * len(high), dtype=np.int8)
         both = sp.csr_array((ones, (np.r_[high, low], np.r_[low, high])), shape=(count, count))
         graph = both.indptr.astype(np.int64), both.indices.astype(np.int64)
-        tree = dissect(*graph, graph_places(*graph) if places is None else places)
+        tree = dissect(*graph, places)
         first = np.concatenate(([0], np.cumsum(sizes[tree.order])))
         place = np.empty(count, dtype=np.int64)
         place[tree.order] = np.arange(count)
@@ -96,7 +102,9 @@ class SparseMatrix:
         entries = sp.coo_array(matrix)
         off = entries.row > entries.col
         keys = np.unique(entries.row[off].astype(np.int64) * n + entries.col[off])
-        pattern, _ = SparsePattern.dissected(keys // n, keys % n, np.ones(n, dtype=np.int64), None, lambda o: o)
+        pattern, _ = SparsePattern.dissected(
+            keys // n, keys % n, np.ones(n, dtype=np.int64), None, lambda o: o
+        )
         permuted = sp.csc_array(sp.csc_array(matrix)[pattern.order][:, pattern.order])
         columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
         return cls(np.asarray(permuted[pattern.indices, columns]).ravel().astype(float), pattern)
@@ -116,7 +124,7 @@ class SparseMatrix:
             data = data.copy()
             diagonal = np.abs(data[self.pattern.indptr[:-1]])
             data[self.pattern.indptr[:-1]] += shift * np.maximum(diagonal, 1e-3 * diagonal.mean())
-        if pardiso.available():
+        if pardiso.pays(len(self.pattern.order)):
             return self.pattern.pardiso.factorise(data, self.pattern.order)
         L, negative = multifrontal.factorise(data, self.pattern.fronts)
         if negative < 0:
