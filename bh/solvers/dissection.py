@@ -101,15 +101,27 @@ def _dissect(indptr, indices, keys, leaf):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def _gap(key, ranks):  # type: ignore[no-untyped-def]
+    """Where to cut so that the halves are most alike but rows of equal keys are not torn, if that can be."""
+    middle = len(ranks) // 2
+    tie = 1e-6 * (key[ranks[-1]] - key[ranks[0]])
+    for away in range(len(ranks) // 6 + 1):
+        for half in (middle - away, middle + away):
+            if key[ranks[half]] - key[ranks[half - 1]] > tie:
+                return half
+    return middle
+
+
+@njit(cache=True, nogil=True)
 def _best_cut(members, indptr, indices, keys, side, best):  # type: ignore[no-untyped-def]
     """Writes 0, 1 (halves) or 2 (separator) into `best` for all members, for the direction of fewest separators."""
-    half = len(members) // 2
     fewest = len(members) + 1
     key = np.empty(len(members))
     for direction in range(keys.shape[1]):
         for i in range(len(members)):
             key[i] = keys[members[i], direction]
-        ranks = np.argsort(key)
+        ranks = np.argsort(key, kind="mergesort")
+        half = _gap(key, ranks)
         for i in range(len(members)):
             side[members[ranks[i]]] = 0 if i < half else 1
         touching = np.zeros(2, np.int64)
