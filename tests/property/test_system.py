@@ -15,7 +15,7 @@ import bh
 import meshes
 from bh import Displace, Fold, Force, Model, Moment, Sheet, trace
 from bh.formulations import formulation
-from bh.mechanics import assembly
+from bh.mechanics import pattern as patterns
 from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
 from bh.model import ElementStiffness
 from bh.program import program
@@ -213,7 +213,7 @@ def test_states_are_in_equilibrium(name: str) -> None:
 
 
 def force_storage(monkeypatch: pytest.MonkeyPatch, banded: bool) -> None:
-    monkeypatch.setattr(assembly, "band_is_cheaper", lambda n, bandwidth: banded)
+    monkeypatch.setattr(patterns, "band_is_cheaper", lambda n, bandwidth: banded)
 
 
 @pytest.mark.parametrize("name", KINDS)
