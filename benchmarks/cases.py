@@ -33,7 +33,7 @@ def supported(mesh: meshes.SheetMesh) -> bh.Model:
 
 def strip(along: int) -> bh.Model:
     """One row of cells a side, as App. B (a), lengthened at fixed cells."""
-    pattern = meshes.annulus_sector(100.0 * along / 64, 10.0, math.pi / 4)
+    pattern = meshes.annulus_sector(100.0 * max(along, 16) / 64, 10.0, math.pi / 4)
     return supported(meshes.structured(pattern, along=along))
 
 

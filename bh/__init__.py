@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bh.model import CreaseLaw, Model, Sheet
     from bh.path import Path, trace
     from bh.scene import load_scene
-    from bh.solvers.arc_length import ArcLength
+    from bh.solvers.arc_length import ArcLength, DisplacementControl
     from bh.solvers.automatic import Automatic
     from bh.solvers.continuation import LoadControl
     from bh.solvers.newton import Newton
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 _HOME = {
     "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic", "CreaseLaw": "bh.model",
-    "Displace": "bh.actuation", "Energy": "bh.state", "Fold": "bh.actuation",
+    "Displace": "bh.actuation", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.state",
+    "Fold": "bh.actuation",
     "Force": "bh.actuation", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
     "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
     "Path": "bh.path", "PathFileError": "bh.errors", "RigidBody": "bh.supports", "SceneError": "bh.errors",
@@ -35,7 +36,7 @@ _HOME = {
 _SUBMODULES = ("plotting",)
 
 __all__ = [
-    "ArcLength", "Automatic", "CreaseLaw", "Displace", "Energy", "Fold", "Force",
+    "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
     "InputError", "LoadControl", "Model", "ModelError", "Moment",
     "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "load_scene", "trace",
 ]  # fmt: skip

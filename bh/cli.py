@@ -238,6 +238,8 @@ def _summary(path: Trace, scene: Scene, written: Sequence[Path]) -> None:
         f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
         f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
     )
+    for remark in path.remarks[:6]:
+        typer.echo(remark)
     if scene.model.sheet.nu != 0.0 and not takes_nu(scene.model.formulation):
         typer.echo(
             f"{scene.model.formulation} take Poisson's ratio as 0, not as nu = {scene.model.sheet.nu:g}"

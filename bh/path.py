@@ -6,7 +6,7 @@ import platform
 import time
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path as FilePath
@@ -22,10 +22,10 @@ from bh.model import Model
 from bh.program import StepProgram, program
 from bh.progress import ProgressMeter, meter
 from bh.solvers.automatic import Automatic
-from bh.solvers.increments import Increment, Point, point
+from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
-from bh.storage import PathFile, StateRow, reading
+from bh.storage import CriticalRow, PathFile, StateRow, reading
 from bh.threads import one_blas_thread
 from meshes.mesh import count
 
@@ -38,22 +38,35 @@ class StepOutcome:
 
     outcome: str
     reason: str = ""
+    iterations: int = 0  # of the increment that failed
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One accepted state in the solver's terms."""
+    """One accepted state in the solver's terms; see `bh.solvers.increments.Increment`.
+
+    `negative` counts the negative modes of the tangent, `mode` says how to go on from here, `jumped` that the state
+    lies on another branch than the one before, `critical` holds the limit and bifurcation points passed before it.
+    """
 
     step: int
     lam: float
     q: Array
     iterations: int
     imbalance: float
-    stable: bool | None
     wall_time_s: float
     next_increment: float
+    negative: int | None = None
+    mode: str = LOAD
     note: str = ""
     cuts: tuple[str, ...] = ()
+    jumped: bool = False
+    critical: tuple[CriticalPoint, ...] = ()
+
+    @property
+    def stable(self) -> bool | None:
+        """True if no mode is negative, None where that was not looked at."""
+        return None if self.negative is None else self.negative == 0
 
 
 class Path:
@@ -88,8 +101,34 @@ class Path:
         return next((step.reason for step in self.steps if step.outcome != "reached"), "")
 
     @property
+    def stable(self) -> bool | None:
+        """Is the last state stable? None where that was not looked at."""
+        return self.records[-1].stable if self.records else None
+
+    @property
+    def critical_points(self) -> list[tuple[int, CriticalPoint]]:
+        """(step, point) of every limit and bifurcation point that was passed, in order."""
+        return [(record.step, point) for record in self.records for point in record.critical]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What happened on the way that a reader of the last state should know, one line each."""
+        found = []
+        for step, passed in self.critical_points:
+            found.append(f"step {step + 1}: {passed.kind} point passed at lambda {passed.lam:.6g}")
+        arc = [record for record in self.records if record.note.startswith(ARC)]
+        if arc:
+            found.append(f"{count(len(arc), 'state')} found by arc length")
+        found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
+        modes = self.records[-1].negative if self.records else None
+        if modes:
+            found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
+        return found
+
+    @property
     def iterations(self) -> int:
-        return sum(record.iterations for record in self.records)
+        """Iterations of all increments, the one that failed included."""
+        return sum(record.iterations for record in self.records) + sum(end.iterations for end in self.steps)
 
     @property
     def wall_time_s(self) -> float:
@@ -153,7 +192,7 @@ class Path:
         for index, record in enumerate(self.records):
             target.add(self._row(index, record))
         for step, end in enumerate(self.steps):
-            target.finish_step(step, end.outcome, end.reason)
+            target.finish_step(step, *astuple(end))
         target.close()
 
     @classmethod
@@ -175,10 +214,13 @@ class Path:
 
     def _row(self, index: int, record: Record) -> StateRow:
         energy = self[index].energy
+        critical = tuple(
+            CriticalRow(record.step, c.kind, c.lam, c.error, c.negative, c.q, c.mode) for c in record.critical
+        )
         return StateRow(
-            record.step, record.lam, record.iterations, record.imbalance, record.stable, record.wall_time_s,
-            record.next_increment, (energy.stretching, energy.bending, energy.folding), record.note, record.cuts,
-            record.q, self[index].points,
+            record.step, record.lam, record.iterations, record.imbalance, record.negative, record.mode, record.jumped,
+            record.wall_time_s, record.next_increment, (energy.stretching, energy.bending, energy.folding),
+            record.note, record.cuts, record.q, self[index].points, critical,
         )  # fmt: skip
 
     def _system(self, step: int) -> Any:
@@ -237,7 +279,7 @@ def trace(
                 end = _run_step(path, step, strategy, report, target)
             path.steps.append(end)
             if target is not None:
-                target.finish_step(step, end.outcome, end.reason)
+                target.finish_step(step, *astuple(end))
             if end.outcome != "reached":
                 break
     finally:
@@ -260,48 +302,48 @@ def _run_step(
 
     increment: float | None = None
     done = [record for record in path.records if record.step == step]
+    origin = point(system, system.start(), 0.0)
     if not done:
-        q = system.start()
-        here = point(system, q, 0.0)
+        history = [origin]
         if step == 0:
-            imbalance = system.evaluate(q, 0.0).imbalance
+            imbalance = system.evaluate(origin.q, 0.0).imbalance
             accept(
-                Record(0, 0.0, q, 0, imbalance, None, time.perf_counter() - began, strategy.limits(system)[0])
+                Record(
+                    0, 0.0, origin.q, 0, imbalance, time.perf_counter() - began, strategy.limits(system)[0]
+                )
             )
             began = time.perf_counter()
-        history = [here]
     else:
-        here = point(system, system.start(), 0.0)
-        # after a jump to another branch the extrapolation began anew there (`LoadControl.follow`)
-        jumps = [index for index, record in enumerate(done) if record.note not in ("", "arc length")]
-        recent = done[max(len(done) - 3, jumps[-1] if jumps else 0) :]
-        history = [point(system, record.q, record.lam, record.note) for record in recent]
+        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in _recent(done)]
         increment = done[-1].next_increment
-        if len(history) < 3 and step > 0 and not jumps:  # later steps do not store where they begin
-            history.insert(0, here)
-    journey: Iterator[Increment] = walk(Walk(system, strategy, tuple(history), increment, here))
-    for increment_ in journey:
+        if (
+            len(history) < 3 and step > 0 and not any(r.jumped for r in done)
+        ):  # later steps do not store their start
+            history.insert(0, origin)
+    for item in walk(Walk(system, strategy, tuple(history), increment, origin)):
         now = time.perf_counter()
-        if increment_.outcome != "reached":
-            return StepOutcome(increment_.outcome, increment_.note)
-        at: Point = increment_.point
+        if item.outcome != "reached":
+            return StepOutcome(item.outcome, item.note, item.iterations)
+        at = item.point
         accept(
             Record(
-                step,
-                at.lam,
-                at.q,
-                increment_.iterations,
-                increment_.imbalance,
-                increment_.stable,
-                now - began,
-                increment_.next_increment,
-                increment_.note,
-                increment_.cuts,
+                step, at.lam, at.q, item.iterations, item.imbalance, now - began, item.next_increment,
+                negative=at.negative, mode=at.mode, note=item.note, cuts=item.cuts, jumped=item.jumped,
+                critical=item.critical,
             )
-        )
-        report.update(step, len(path.model.steps), at.lam, increment_.iterations, at.energy)
+        )  # fmt: skip
+        report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
         began = time.perf_counter()
     return StepOutcome("reached")
+
+
+def _recent(done: list[Record]) -> list[Record]:
+    """Records that a resumed step needs: three since the last jump, and all of a run by arc length that goes on."""
+    jumps = [index for index, record in enumerate(done) if record.jumped]
+    arc = len(done)
+    while arc > 0 and done[arc - 1].mode != LOAD:
+        arc -= 1
+    return done[max(arc - 3, jumps[-1] if jumps else 0, 0) :]
 
 
 def _new_file(path: Path, file: FilePath) -> PathFile:
@@ -330,8 +372,9 @@ def _with_model(path: Path, model: Model) -> Path:
 
 def _record(row: StateRow) -> Record:
     return Record(
-        row.step, row.lam, row.q, row.iterations, row.imbalance, row.stable, row.wall_time_s, row.next_increment,
-        row.note, row.cuts,
+        row.step, row.lam, row.q, row.iterations, row.imbalance, row.wall_time_s, row.next_increment,
+        negative=row.negative, mode=row.mode, note=row.note, cuts=row.cuts, jumped=row.jumped,
+        critical=tuple(CriticalPoint(c.kind, c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical),
     )  # fmt: skip
 
 

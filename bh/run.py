@@ -84,7 +84,7 @@ def solve(
 def _is_whole(file: Path, model: Model) -> bool:
     """True if all steps of the model are reached in a path file."""
     with contextlib.closing(PathFile.open(file)) as stored, reading(file):
-        outcomes = [outcome for outcome, _ in stored.steps().values()]
+        outcomes = [outcome for outcome, *_ in stored.steps().values()]
     return outcomes == ["reached"] * len(model.steps)
 
 
@@ -201,6 +201,18 @@ def result(path: Trace, scene: Scene) -> dict[str, Any]:
     return {
         "outcome": path.outcome,
         "reason": path.reason,
+        "stable": path.stable,
+        "remarks": path.remarks,
+        "critical_points": [
+            {
+                "step": step,
+                "kind": c.kind,
+                "lambda": c.lam,
+                "error": c.error,
+                "negative_modes": list(c.negative),
+            }
+            for step, c in path.critical_points
+        ],
         "energy": {kind: _number(value) for kind, value in last.energy.as_dict().items()},
         "fold_angle": {
             crease: {"mean": _number(a.mean()), "min": _number(a.min()), "max": _number(a.max())}

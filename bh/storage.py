@@ -1,9 +1,9 @@
 """One file for a path: an SQLite data base, so that a state that is accepted is on disk, whole, whatever happens next.
 
 Tables: `meta` (key, JSON value), `arrays` (name, dtype, shape, data) with the model, `states` with one row for each
-accepted state (step, lambda, energies in N mm, unknowns and node positions as little-endian float64), `steps` with the
-outcome of every finished step. Any SQLite reader opens it; a killed run leaves a file that is complete up to its
-last state.
+accepted state (step, lambda, energies in N mm, unknowns and node positions as little-endian float64), `critical` with
+the limit and bifurcation points that were passed, `steps` with the outcome of every finished step. Any SQLite reader
+opens it; a killed run leaves a file that is complete up to its last state.
 """
 
 from __future__ import annotations
@@ -22,16 +22,35 @@ from bh.describe import AnyArray
 from bh.errors import InputError, PathFileError
 
 Array = NDArray[np.float64]
+FORMAT = 2  # of the tables; raised with every change
 SCHEMA = """
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE arrays (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL, data BLOB NOT NULL);
 CREATE TABLE states (
     id INTEGER PRIMARY KEY, step INTEGER NOT NULL, lambda REAL NOT NULL, iterations INTEGER NOT NULL,
-    imbalance REAL NOT NULL, stable INTEGER, wall_time_s REAL NOT NULL, next_increment REAL NOT NULL,
+    imbalance REAL NOT NULL, negative INTEGER, mode TEXT NOT NULL, jumped INTEGER NOT NULL,
+    wall_time_s REAL NOT NULL, next_increment REAL NOT NULL,
     stretching REAL NOT NULL, bending REAL NOT NULL, folding REAL NOT NULL,
     note TEXT NOT NULL, cuts TEXT NOT NULL, unknowns BLOB NOT NULL, points BLOB NOT NULL);
-CREATE TABLE steps (step INTEGER PRIMARY KEY, outcome TEXT NOT NULL, reason TEXT NOT NULL);
+CREATE TABLE critical (
+    id INTEGER PRIMARY KEY, state INTEGER NOT NULL REFERENCES states (id), step INTEGER NOT NULL, kind TEXT NOT NULL,
+    lambda REAL NOT NULL, error REAL NOT NULL, negative_before INTEGER NOT NULL, negative_behind INTEGER NOT NULL,
+    unknowns BLOB NOT NULL, mode BLOB NOT NULL);
+CREATE TABLE steps (
+    step INTEGER PRIMARY KEY, outcome TEXT NOT NULL, reason TEXT NOT NULL, iterations INTEGER NOT NULL);
 """
+
+
+class CriticalRow(NamedTuple):
+    """A limit or bifurcation point that was passed just before a state; see the columns of `critical`."""
+
+    step: int
+    kind: str
+    lam: float
+    error: float
+    negative: tuple[int, int]
+    q: Array
+    mode: Array
 
 
 class StateRow(NamedTuple):
@@ -41,7 +60,9 @@ class StateRow(NamedTuple):
     lam: float
     iterations: int
     imbalance: float
-    stable: bool | None
+    negative: int | None
+    mode: str
+    jumped: bool
     wall_time_s: float
     next_increment: float
     energies: tuple[float, float, float]
@@ -49,6 +70,7 @@ class StateRow(NamedTuple):
     cuts: tuple[str, ...]
     q: Array
     points: Array
+    critical: tuple[CriticalRow, ...] = ()
 
 
 class PathFile:
@@ -75,7 +97,7 @@ class PathFile:
                 old.unlink(missing_ok=True)
             db = _connect(draft)
             with db:
-                db.executescript(SCHEMA)
+                db.executescript(SCHEMA + f"PRAGMA user_version = {FORMAT};")
                 db.executemany(
                     "INSERT INTO meta VALUES (?, ?)", [(k, json.dumps(v)) for k, v in meta.items()]
                 )
@@ -112,26 +134,51 @@ class PathFile:
         with reading(file):
             db = _connect(file)
             db.execute("SELECT count(*) FROM states").fetchone()
+            found = db.execute("PRAGMA user_version").fetchone()[0]
+        if found != FORMAT:
+            db.close()
+            raise PathFileError(
+                f"'{file}' was written by another version (format {found}, this one reads {FORMAT}); run it again"
+            )
         return cls(file, db)
 
     def add(self, row: StateRow) -> None:
         """Append one accepted state; it is on disk when this returns."""
-        stable = None if row.stable is None else int(row.stable)
         values = (
-            row.step, row.lam, row.iterations, row.imbalance, stable, row.wall_time_s, row.next_increment,
-            *row.energies, row.note, json.dumps(row.cuts), _little(row.q).tobytes(), _little(row.points).tobytes(),
+            row.step, row.lam, row.iterations, row.imbalance, row.negative, row.mode, int(row.jumped),
+            row.wall_time_s, row.next_increment, *row.energies, row.note, json.dumps(row.cuts),
+            _little(row.q).tobytes(), _little(row.points).tobytes(),
         )  # fmt: skip
         with self._guard():
-            self._db.execute(
-                "INSERT INTO states (step, lambda, iterations, imbalance, stable, wall_time_s, next_increment,"
-                " stretching, bending, folding, note, cuts, unknowns, points)"
-                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            state = self._db.execute(
+                "INSERT INTO states (step, lambda, iterations, imbalance, negative, mode, jumped, wall_time_s,"
+                " next_increment, stretching, bending, folding, note, cuts, unknowns, points)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 values,
+            ).lastrowid
+            self._db.executemany(
+                "INSERT INTO critical (state, step, kind, lambda, error, negative_before, negative_behind, unknowns,"
+                " mode) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                [
+                    (
+                        state,
+                        c.step,
+                        c.kind,
+                        c.lam,
+                        c.error,
+                        *c.negative,
+                        *(_little(a).tobytes() for a in (c.q, c.mode)),
+                    )
+                    for c in row.critical
+                ],
             )
 
-    def finish_step(self, step: int, outcome: str, reason: str) -> None:
+    def finish_step(self, step: int, outcome: str, reason: str, iterations: int) -> None:
+        """Store how a step ended; `iterations` are those of an increment that failed."""
         with self._guard():
-            self._db.execute("INSERT OR REPLACE INTO steps VALUES (?, ?, ?)", (step, outcome, reason))
+            self._db.execute(
+                "INSERT OR REPLACE INTO steps VALUES (?, ?, ?, ?)", (step, outcome, reason, iterations)
+            )
 
     def forget_failed_steps(self) -> None:
         """Steps that did not reach their end are tried again when a run is resumed."""
@@ -149,20 +196,51 @@ class PathFile:
         }
 
     def states(self) -> Iterator[StateRow]:
+        critical = self._critical()
         rows = self._db.execute(
-            "SELECT step, lambda, iterations, imbalance, stable, wall_time_s, next_increment, stretching, bending,"
-            " folding, note, cuts, unknowns, points FROM states ORDER BY id"
+            "SELECT id, step, lambda, iterations, imbalance, negative, mode, jumped, wall_time_s, next_increment,"
+            " stretching, bending, folding, note, cuts, unknowns, points FROM states ORDER BY id"
         )
-        for step, lam, its, imbalance, stable, wall, nxt, s, b, f, note, cuts, q, points in rows:
+        for (
+            row,
+            step,
+            lam,
+            its,
+            imbalance,
+            negative,
+            mode,
+            jumped,
+            wall,
+            nxt,
+            s,
+            b,
+            f,
+            note,
+            cuts,
+            q,
+            points,
+        ) in rows:
             yield StateRow(
-                step, lam, its, imbalance, None if stable is None else bool(stable), wall, nxt, (s, b, f), note,
-                tuple(json.loads(cuts)), np.frombuffer(q, "<f8").copy(),
-                np.frombuffer(points, "<f8").reshape(-1, 3).copy(),
+                step, lam, its, imbalance, negative, mode, bool(jumped), wall, nxt, (s, b, f), note,
+                tuple(json.loads(cuts)), _floats(q), _floats(points).reshape(-1, 3), tuple(critical.get(row, ())),
             )  # fmt: skip
 
-    def steps(self) -> dict[int, tuple[str, str]]:
-        rows = self._db.execute("SELECT step, outcome, reason FROM steps")
-        return {step: (outcome, reason) for step, outcome, reason in rows}
+    def _critical(self) -> dict[int, list[CriticalRow]]:
+        """Critical points by the row of the state that they were passed before."""
+        found: dict[int, list[CriticalRow]] = {}
+        rows = self._db.execute(
+            "SELECT state, step, kind, lambda, error, negative_before, negative_behind, unknowns, mode FROM critical"
+            " ORDER BY id"
+        )
+        for state, step, kind, lam, error, before, behind, q, mode in rows:
+            row = CriticalRow(step, kind, lam, error, (before, behind), _floats(q), _floats(mode))
+            found.setdefault(state, []).append(row)
+        return found
+
+    def steps(self) -> dict[int, tuple[str, str, int]]:
+        """Outcome, reason and lost iterations of every step that ended."""
+        rows = self._db.execute("SELECT step, outcome, reason, iterations FROM steps")
+        return {step: (outcome, reason, iterations) for step, outcome, reason, iterations in rows}
 
     def close(self) -> None:
         with suppress(sqlite3.Error):  # takes the empty journal away; it is in nobody's way if that fails
@@ -212,6 +290,10 @@ def _connect(file: FilePath) -> sqlite3.Connection:
     db.execute("PRAGMA journal_mode = TRUNCATE")
     db.execute("PRAGMA synchronous = OFF")
     return db
+
+
+def _floats(data: bytes) -> Array:
+    return np.frombuffer(data, "<f8").copy()
 
 
 def _little(array: AnyArray) -> AnyArray:

@@ -16,6 +16,7 @@ from bh.formulations import formulation
 from bh.mechanics.elements import sheet_elements
 from bh.model import ElementStiffness
 from bh.program import program
+from bh.solvers.arc_length import Cylindrical, Generalised
 from bh.solvers.increments import point
 from bh.solvers.linear import linear_response
 from verification.campaign import FINE
@@ -189,7 +190,9 @@ def trusses(result: CaseResult) -> Found:
         toy = VonMisesTruss(spring=spring)
         start = point(toy, np.zeros(toy.size), 0.0)
         for generalised in (False, True):
-            found = list(ArcLength(generalised=generalised).follow(toy, [start]))
+            found = list(
+                ArcLength(control=Generalised() if generalised else Cylindrical()).follow(toy, [start])
+            )
             lam = np.array([item.point.lam for item in found])
             w = np.array([item.point.q[0] for item in found])
             off = float(np.abs(toy.load(w) - lam).max()) if found[-1].outcome == "reached" else math.nan

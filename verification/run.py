@@ -6,22 +6,19 @@ import json
 import math
 import os
 import platform
-import shutil
-import subprocess
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from bh.path import versions
 from meshes.errors import InputError
-from verification.cases import ALL_CASES, CASES, case
+from verification.cases import ALL_CASES, CASES, LONG_CASES, case
 from verification.checks import RECORD, CaseResult, Context
+from verification.environment import environment
 
 OF_A_RUN = ("versions", "date", "machine", "quick")  # kept for every case, as cases may be run one by one
-PROJECT = Path(__file__).resolve().parents[1]
+RECORDS = Path(__file__).with_name("records")
 
 
 def run(
@@ -59,8 +56,18 @@ def run(
         report(f"{name}: {result.verdict}, {passed} of {judged} checks passed, {result.wall_time_s:.1f} s")
         found.append(result)
     data = _record(found, quick)
-    write_json(folder / "checks.json", _merged(_stored(folder / "checks.json"), data))
+    write_json(folder / "checks.json", _merged(_known(folder / "checks.json"), data))
     return data
+
+
+def _known(file: Path) -> dict[str, Any]:
+    """What an earlier run has left, and of long cases that it has not the run that is kept with the project."""
+    known = _stored(file)
+    for name in LONG_CASES:
+        if all(info["name"] != name for info in known["cases"]):
+            record = _stored(RECORDS / f"{name}.json")
+            known = {key: known[key] + record[key] for key in known}
+    return known
 
 
 def _record(found: Sequence[CaseResult], quick: bool) -> dict[str, Any]:
@@ -115,39 +122,6 @@ def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
         "quick": any(info["quick"] for info in cases),
         "cases": sorted(cases, key=lambda info: order(info["name"])),
     }
-
-
-def environment() -> dict[str, str]:
-    """Versions of what numbers and pictures depend on, and the commit if this is a working copy."""
-    found = dict(versions())
-    for name in ("pyvista", "vtk", "matplotlib"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    commit = _commit()
-    return {**found, "git commit": commit} if commit else found
-
-
-def _commit() -> str:
-    """The commit of the working copy, or an empty string where there is none to be told."""
-    git = shutil.which("git")
-    if git is None or not (PROJECT / ".git").exists():
-        return ""
-
-    def ask(*words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [git, *words], cwd=PROJECT, capture_output=True, text=True, timeout=10, check=False
-        )
-
-    try:
-        head = ask("rev-parse", "--short=12", "HEAD")
-        if head.returncode != 0:
-            return ""
-        changed = ask("diff", "--quiet", "HEAD").returncode == 1
-    except (OSError, ValueError, subprocess.SubprocessError):
-        return ""
-    return head.stdout.strip() + (" with changes" if changed else "")
 
 
 def write_json(file: Path, data: Any) -> None:

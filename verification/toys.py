@@ -90,3 +90,9 @@ class VonMisesTruss:
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         return ""
+
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        return "", ""
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        return "the toy moves"

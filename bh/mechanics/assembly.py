@@ -24,11 +24,11 @@ def elongation(length, rest_length, green):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def nodal_forces(x, bars, rest_length, k_bar, green, hinges, k_hinge, rest, couple, f, s_bar, s_hinge):  # type: ignore[no-untyped-def]
+def nodal_forces(x, bars, rest_length, k_bar, green, hinges, k_hinge, rest, couple, f, s_bar, s_hinge, turns):  # type: ignore[no-untyped-def]
     """Energy (N mm) and the mean size of element forces (N); adds the gradient of the energy to `f` (n, 3).
 
     Writes the force of each bar, k times its elongation (see `elongation`), and the moment of each hinge,
-    k (phi - rest) + couple.
+    k (phi - rest) + couple, with its turn phi - rest.
     """
     g = np.empty(12)
     energy, size, count = 0.0, 0.0, 0
@@ -54,6 +54,7 @@ def nodal_forces(x, bars, rest_length, k_bar, green, hinges, k_hinge, rest, coup
         turn = geometry[0] - rest[i]
         s = k_hinge[i] * turn + couple[i]
         s_hinge[i] = s
+        turns[i] = turn
         energy += (0.5 * k_hinge[i] * turn + couple[i]) * turn
         size += s * s * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
         for p in range(4):

@@ -19,9 +19,10 @@ from bh.mechanics.assembly import (
 )
 from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
+from bh.mechanics.motions import describe_motion
 from bh.model import Model
 from bh.program import StepProgram
-from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import State
@@ -120,27 +121,23 @@ class BarsAndHingesSystem:
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         x = self.positions(q, lam)
-        energy, size, f, forces = self.internal_forces(x, q, lam)
+        energy, size, f, forces, turn = self.internal_forces(x, q, lam)
         load = (1.0 - lam) * self.force.start + lam * self.force.end
         energy -= float(np.vdot(load, x - self.reference))
         f -= load
         residual = np.empty(self.size)
         residual[: self.primal] = self.to_local(f).ravel()[self.free]
-        gap = 0.0
+        gap = penalty = 0.0
         if self.elements.held:
-            held = slice(-self.elements.held, None)
-            turn = (forces[held] - q[self.primal :]) / self.elements.hinge_stiffness[held]
-            residual[self.primal :] = turn - self._compliance * q[self.primal :]
+            missed = turn[-self.elements.held :]
+            residual[self.primal :] = missed - self._compliance * q[self.primal :]
             energy -= 0.5 * float(self._compliance @ q[self.primal :] ** 2)
+            penalty = 0.5 * float(self.elements.penalty @ missed**2)
             # a held angle is to be met to 1e-12 rad: what is left of it, times the stiffness of the bars, is a moment
             gap = 1e4 * max(float(np.abs(residual[self.primal :]).max()) - ROUNDING, 0.0)
-            gap = max(
-                gap, 10.0 * float(np.abs(turn).max())
-            )  # the compliance is no excuse for an angle that is not met
-            # the independent force of a held hinge is its multiplier; the penalty gamma * turn is no physical moment
-            # and would only spoil the geometric stiffness while the angle is not yet met
-            forces[held] = q[self.primal :]
-        return Evaluation(energy, residual, self._imbalance(residual, size, load, x, gap), forces)
+            # the compliance is no excuse for an angle that is not met
+            gap = max(gap, 10.0 * float(np.abs(missed).max()))
+        return Evaluation(energy, residual, self._imbalance(residual, size, load, x, gap), forces, penalty)
 
     def _imbalance(self, residual: Array, size: float, load: Array, x: Array, gap: float) -> float:
         largest = float(np.abs(residual[: self.primal]).max(initial=0.0))
@@ -162,16 +159,20 @@ class BarsAndHingesSystem:
         heights = 2.0 * self.mesh.areas.min() / self.hinge_lengths if len(self.hinge_lengths) else np.ones(1)
         return float((self.elements.hinge_stiffness / heights).max(initial=0.0))
 
-    def internal_forces(self, x: Array, q: Array, lam: float) -> tuple[float, float, Array, Array]:
-        """Energy, typical element force, nodal forces (n, 3) and element forces (bars, then hinges)."""
+    def internal_forces(self, x: Array, q: Array, lam: float) -> tuple[float, float, Array, Array, Array]:
+        """Energy, typical element force, nodal forces (n, 3), element forces (bars, then hinges) and turns (h,), rad.
+
+        The turn of a hinge is its dihedral angle less the one at rest.
+        """
         e = self.elements
         f = np.zeros_like(x)
+        turn = np.empty(len(e.hinges))
         forces = np.empty(len(e.bars) + len(e.hinges))
         energy, size = nodal_forces(
             x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, e.hinge_stiffness,
-            e.rest.at(lam), self.couple(q, lam), f, forces[: len(e.bars)], forces[len(e.bars) :],
+            e.rest.at(lam), self.couple(q, lam), f, forces[: len(e.bars)], forces[len(e.bars) :], turn,
         )  # fmt: skip
-        return energy, size, f, forces
+        return energy, size, f, forces, turn
 
     def couple(self, q: Array, lam: float) -> Array:
         """(h,) couples on the hinges, N mm: applied moments, and the multipliers of held creases."""
@@ -187,7 +188,7 @@ class BarsAndHingesSystem:
         data = np.zeros(pattern.size)
         tangent_values(
             x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0],
-            e.hinges, e.hinge_stiffness, forces[bars:],
+            e.hinges, self._augmented_stiffness, forces[bars:],
             pattern.slots[1], self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge,
         )  # fmt: skip
         matrix: Matrix
@@ -199,8 +200,7 @@ class BarsAndHingesSystem:
             matrix = pattern.matrix(data)
         if not e.held:
             return matrix
-        gamma = e.hinge_stiffness[-e.held :]
-        return MultiplierMatrix(matrix, self._constraint_rows(), gamma, self._compliance)
+        return MultiplierMatrix(matrix, self._constraint_rows(), e.penalty, self._compliance)
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         e = self.elements
@@ -219,7 +219,7 @@ class BarsAndHingesSystem:
     def control_rate(self, q: Array, lam: float) -> Array:
         e = self.elements
         x = self.positions(q, lam)
-        _, _, _, forces = self.internal_forces(x, q, lam)
+        _, _, _, forces, _ = self.internal_forces(x, q, lam)
         g = dihedral_gradients(x, e.hinges)
         moment_rate = e.couple.rate - e.hinge_stiffness * e.rest.rate
         out = -self.force.rate.copy()
@@ -237,8 +237,7 @@ class BarsAndHingesSystem:
     def power(self, q: Array, lam: float) -> float:
         e = self.elements
         x = self.positions(q, lam)
-        _, _, f, forces = self.internal_forces(x, q, lam)
-        turn = dihedral_angles(x, e.hinges) - e.rest.at(lam)
+        _, _, f, forces, turn = self.internal_forces(x, q, lam)
         total = float(e.couple.rate @ turn - forces[len(e.bars) :] @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.reference))
         unbalanced = self.to_local(f - self.force.at(lam))
@@ -251,7 +250,7 @@ class BarsAndHingesSystem:
         total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
         moving = self.to_global(self.prescribed_rate)
         if moving.any():
-            _, _, _, forces = self.internal_forces(x, q, lam)
+            _, _, _, forces, _ = self.internal_forces(x, q, lam)
             out = self._tangent_times(x, moving, forces)
             g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
             turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
@@ -276,6 +275,32 @@ class BarsAndHingesSystem:
         turn = float(np.abs(after - before).max(initial=0.0))
         return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
 
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        if not self.constraints.rigid_body or not (self.force.start.any() or self.force.end.any()):
+            return "", ""
+        # an accepted state is in equilibrium; do the forces stay so a little further along the path?
+        try:
+            factor = self.tangent(q, lam, self.evaluate(q, lam).forces).factorise(1e-9)
+        except IndefiniteError:
+            return "", ""
+        ahead = 1e-3 * max(lam, 0.01)
+        moved = q - ahead * factor.solve(self.control_rate(q, lam))
+        lost = self._unbalanced(moved, lam + ahead) - self._unbalanced(q, lam)
+        if lost <= 1e-6 * ahead:
+            return "", ""
+        return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
+
+    def _unbalanced(self, q: Array, lam: float) -> float:
+        """Part of the dead forces that works on rigid motions."""
+        local = self.to_local(self.force.at(lam)).ravel()[self.free]
+        Z = self._rigid(self.positions(q, lam))
+        return float(np.abs(Z.T @ local).max(initial=0.0)) / max(float(np.abs(local).sum()), 1e-300)
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        local = np.zeros_like(self.reference)
+        local.ravel()[self.free] = motion[: self.primal]
+        return describe_motion(self.mesh, self.positions(q, lam), self.to_global(local))
+
     # ------------------------------------------------------------------------------- pattern, grounding, constraints
 
     @cached_property
@@ -292,7 +317,12 @@ class BarsAndHingesSystem:
         Where panels are rigid, a straight crease can carry moments that balance each other at no cost; it picks the
         smallest ones.
         """
-        return COMPLIANCE / self.elements.hinge_stiffness[-self.elements.held :]
+        return COMPLIANCE / self.elements.penalty
+
+    @cached_property
+    def _augmented_stiffness(self) -> Array:
+        e = self.elements
+        return np.concatenate((e.hinge_stiffness[: len(e.hinges) - e.held], e.penalty))
 
     @cached_property
     def _held_columns(self) -> Ints:

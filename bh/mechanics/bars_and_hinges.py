@@ -40,9 +40,8 @@ class BarsAndHinges:
         """Everything that can be read from the unknowns `q` at `lam`."""
         e, mesh = system.elements, system.mesh
         x = system.positions(q, lam)
-        _, _, f, forces = system.internal_forces(x, q, lam)
+        _, _, f, forces, turn = system.internal_forces(x, q, lam)
         phi = dihedral_angles(x, e.hinges)
-        turn = phi - e.rest.at(lam)
         s_bar, s_hinge = forces[: len(e.bars)], forces[len(e.bars) :]
         stretch = 0.5 * s_bar**2 / np.maximum(e.bar_stiffness, 1e-300)
         bend = slice(0, e.bending)

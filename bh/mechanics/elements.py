@@ -15,13 +15,15 @@ from bh.program import HELD, SHEET, SPRING, StepProgram
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
+PENALTY = 300.0  # of a held crease, in parts of E t h^2 with h the height of its wings
 
 
 @dataclass(frozen=True, eq=False)
 class Elements:
     """Element arrays of one step. Hinges are ordered: bending, spring creases, held creases.
 
-    `source` (h,) is the row of `mesh.topology.hinges` of each hinge.
+    `source` (h,) is the row of `mesh.topology.hinges` of each hinge. Held creases have no stiffness (their moment is a
+    multiplier); `penalty` (held,) is their weight in the augmented tangent, N mm / rad.
     """
 
     bars: Ints
@@ -35,6 +37,7 @@ class Elements:
     bending: int
     spring: int
     held: int
+    penalty: Array
     green: bool = False
 
 
@@ -61,9 +64,9 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
     if model.stiffness is not None:
         k_bar = model.stiffness.bars
         k_bend = k_fold = model.stiffness.hinges
-    # augmentation comparable to what the bars give a wing: it keeps the condition number and corrects in a step or two
-    gamma = 30.0 * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
-    stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], gamma)
+    # augmentation well above what the bars give a wing
+    gamma = PENALTY * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
+    stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], 0.0)
     held_from = np.where(np.isnan(program.held.start), held_start, program.held.start)
     law = program.law[source]
 
@@ -80,7 +83,7 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
         bars=topology.edges, bar_length=lengths, bar_stiffness=k_bar,
         hinges=np.ascontiguousarray(topology.hinges[source]), source=source,
         hinge_stiffness=stiffness[source], rest=rest, couple=couple,
-        bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]),
+        bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]), penalty=gamma[groups[2]],
         green=model.stiffness is not None and model.stiffness.green,
     )  # fmt: skip
 

@@ -1,26 +1,112 @@
-"""Arc length: lambda is an unknown too, so that limit points are passed, backwards where the path turns back.
+"""Lambda as an unknown too, so that limit points are passed, backwards where the path turns back.
 
-Every iterate stays on the hyperplane through the predictor, normal to the first tangent (Riks 1979; Wempner 1971).
-With the increment of lambda scaled by the generalised stiffness parameter this is the generalised displacement
-control of Leon et al. (2012, "MGDCM"), in which the same orthogonality is written the other way round.
+Every iterate stays on a hyperplane through the predictor: normal to the first tangent for arc length (Riks 1979;
+Wempner 1971), normal to one unknown for displacement control (Batoz and Dhatt 1979). With the increment of lambda
+scaled by the generalised stiffness parameter arc length is the generalised displacement control of Leon et al. (2012,
+"MGDCM"), in which the same orthogonality is written the other way round.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.increments import Increment, Point, point
+from bh.solvers.hyperplane import correct
+from bh.solvers.increments import ARC, DISPLACEMENT, CriticalPoint, Increment, Point, point
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.newton import Newton
-from bh.solvers.system import System
+from bh.solvers.stability import locate
+from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
-MODE = "arc length"
+
+
+class Control(Protocol):
+    """What is prescribed in place of lambda: a hyperplane, and how far an increment goes."""
+
+    @property
+    def mode(self) -> str:
+        """How states found so are marked in the path."""
+        ...
+
+    def normal(self, system: System, tangent: Array) -> Array:
+        """(primal,) normal of the hyperplane, from the tangent dq / dlambda of the path."""
+        ...
+
+    def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        """Increment of lambda for a given length; `measure` is |normal . tangent| / |normal|, also at the start."""
+        ...
+
+
+@dataclass(frozen=True)
+class Cylindrical:
+    """A constant arc in the unknowns, lambda left out of its length."""
+
+    mode = ARC
+
+    def normal(self, system: System, tangent: Array) -> Array:
+        return tangent[: system.primal]
+
+    def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        return length / measure
+
+
+@dataclass(frozen=True)
+class Generalised(Cylindrical):
+    """Increments of lambda scaled by the root of the generalised stiffness parameter (MGDCM).
+
+    They shorten where the path softens and never exceed the first one.
+    """
+
+    def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        return min(length, first * first_measure) / measure
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """One displacement grows by a given amount in every increment.
+
+    `along` gives weights (primal,) of the unknowns for a system; None takes, anew in each increment, the unknown
+    that moves most.
+    """
+
+    along: Callable[[System], Array] | None = None
+    mode = DISPLACEMENT
+
+    def normal(self, system: System, tangent: Array) -> Array:
+        if self.along is not None:
+            return self.along(system)
+        normal = np.zeros(system.primal)
+        normal[int(np.argmax(np.abs(tangent[: system.primal])))] = 1.0
+        return normal
+
+    def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        return length / measure
+
+
+@dataclass(frozen=True)
+class _Tangent:
+    """The path's own tangent dq / dlambda at an accepted state, its hyperplane and number of negative modes."""
+
+    rate: Array
+    normal: Array
+    measure: float
+    negative: int
+
+
+@dataclass(frozen=True)
+class _Arrival:
+    """An accepted increment, or why there is none."""
+
+    point: Point | None
+    evaluation: Evaluation | None
+    iterations: int
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -29,17 +115,17 @@ class ArcLength:
 
     Attributes:
         first: increment of lambda that sets the first arc.
-        generalised: scale the increment of lambda by the root of the generalised stiffness parameter (MGDCM) in place
-            of keeping the arc; it shortens where the path stiffens and needs no length of its own.
+        control: what is prescribed in place of lambda.
         goal: iterations that an increment should take; `iterations` the most.
         growth: largest arc, in parts of the one that `first` makes at the start of the step.
         most: increments before giving up.
         lowest: lambda at which a path that runs backwards is given up.
         newton: tolerance, and the solver for the last point at lambda = 1.
+        locate: find limit and bifurcation points by bisection where the number of negative modes changes.
     """
 
     first: float = 0.05
-    generalised: bool = False
+    control: Control = field(default_factory=Cylindrical)
     goal: int = 5
     iterations: int = 14
     growth: float = 3.0
@@ -47,6 +133,7 @@ class ArcLength:
     most: int = 1000
     lowest: float = -2.0
     newton: Newton = field(default_factory=Newton)
+    locate: bool = True
 
     def limits(self, system: System) -> tuple[float, float]:
         """First and largest increment of lambda for a system; arcs have no largest one in lambda."""
@@ -67,7 +154,7 @@ class ArcLength:
                 yield item
         except IndefiniteError:
             reason = "the tangent is singular, or has too many constraints to count its modes"
-            yield Increment(last, "stalled", 0, math.nan, None, 0.0, (), reason)
+            yield Increment(last, "stalled", 0, math.nan, 0.0, note=reason)
 
     def _follow(
         self, system: System, history: Sequence[Point], increment: float | None, origin: Point | None
@@ -75,104 +162,98 @@ class ArcLength:
         here = history[-1]
         direction = here.q - history[-2].q if len(history) > 1 else None
         p = system.primal
-        start, _ = self._tangent(system, origin or history[0])
-        largest = self.growth * self.first * float(np.linalg.norm(start[:p]))
-        length: float | None = increment if here.mode == MODE else None
-        shortest: float | None = None
-        first_tangent: Array | None = None
+        start = self._tangent(system, origin or history[0])
+        largest = self.growth * self.first * start.measure
+        tangent = self._tangent(system, here)
+        length = increment if here.mode == self.control.mode else None
+        length = (increment or self.first) * tangent.measure if length is None else length
+        shortest = self.smallest * length
+        iterations = 0
         for _ in range(self.most):
-            tangent, negative = self._tangent(system, here)
-            size = float(np.linalg.norm(tangent[:p]))
-            if length is None:
-                length = (increment or self.first) * size
-            if shortest is None or first_tangent is None:
-                shortest, first_tangent = self.smallest * length, tangent
-            sign = 1.0 if direction is None else math.copysign(1.0, float(tangent[:p] @ direction[:p]))
-            scale = length / max(size, 1e-300)
-            if self.generalised and first_tangent is not None:
-                scale = min(scale, self.first * float(np.linalg.norm(first_tangent[:p])) / max(size, 1e-300))
-            there, iterations, reason = self._increment(system, here, tangent, sign * scale)
-            if there is None:
+            sign = 1.0 if direction is None else math.copysign(1.0, float(tangent.rate[:p] @ direction[:p]))
+            scale = self.control.scale(length, max(tangent.measure, 1e-300), self.first, start.measure)
+            found = self._increment(system, here, tangent, sign * scale)
+            iterations += found.iterations
+            there = found.point
+            if there is None or found.evaluation is None:
                 length *= 0.4
                 if length < shortest:
-                    yield Increment(here, "stalled", iterations, math.nan, None, length, (), reason)
+                    yield Increment(here, "stalled", iterations, math.nan, length, note=found.reason)
                     return
                 continue
-            direction = there.q - here.q
-            done = there.lam >= 1.0
             if there.lam < self.lowest:
                 note = f"the path runs back below lambda {self.lowest:g}"
-                yield Increment(here, "limit-point", iterations, math.nan, None, length, (), note)
+                yield Increment(here, "limit-point", iterations, math.nan, length, note=note)
                 return
-            length = min(largest, length * min(1.8, math.sqrt(self.goal / max(iterations, 1))))
-            here = there
-            _, negative = self._tangent(system, here)
-            evaluation = system.evaluate(here.q, here.lam)
+            before = tangent.negative
+            direction = there.q - here.q
+            length = min(largest, length * min(1.8, math.sqrt(self.goal / max(found.iterations, 1))))
+            critical: tuple[CriticalPoint, ...] = ()
+            tangent = self._tangent(system, there)
+            if self.locate and tangent.negative != before:
+                critical = locate(system, here, there, (before, tangent.negative), self.newton.tolerance)
+                tangent = self._tangent(system, there)  # predictions are made with the last tangent
+            here = replace(there, negative=tangent.negative)
+            imbalance = found.evaluation.imbalance
             yield Increment(
-                here, "reached", iterations, evaluation.imbalance, negative == 0, length, (),
-                MODE, negative,
-            )  # fmt: skip
-            if done:
+                here, "reached", iterations, imbalance, length, note=self.control.mode, critical=critical
+            )
+            iterations = 0
+            if here.lam >= 1.0:
                 return
-        yield Increment(here, "stalled", 0, math.nan, None, 0.0, (), f"{self.most} increments of arc length")
+        yield Increment(
+            here, "stalled", 0, math.nan, 0.0, note=f"{self.most} increments of {self.control.mode}"
+        )
 
-    @staticmethod
-    def _tangent(system: System, here: Point) -> tuple[Array, int]:
-        """d q / d lambda along the path and the number of negative modes there."""
+    def _tangent(self, system: System, here: Point) -> _Tangent:
         factor, negative = system.tangent(here.q, here.lam, here.forces).factorise_any()
-        return -factor.solve(system.control_rate(here.q, here.lam)), negative
+        rate = -factor.solve(system.control_rate(here.q, here.lam))
+        normal = self.control.normal(system, rate)
+        measure = abs(float(normal @ rate[: system.primal])) / max(float(np.linalg.norm(normal)), 1e-300)
+        return _Tangent(rate, normal, measure, negative)
 
-    def _increment(
-        self, system: System, here: Point, tangent: Array, step: float
-    ) -> tuple[Point | None, int, str]:
+    def _increment(self, system: System, here: Point, tangent: _Tangent, step: float) -> _Arrival:
         """One predictor of size `step` in lambda and its corrections; the last one ends at lambda = 1 exactly."""
         p = system.primal
-        normal = tangent[:p]
-        q, lam = here.q + step * tangent, here.lam + step
+        lam = here.lam + step
         if lam > 1.0:
-            part = (1.0 - here.lam) / step
-            return self._arrive(system, here, part * step * tangent)
-        forces = system.predicted_forces(here.forces, step * tangent)
-        for iteration in range(self.iterations):
-            now = system.evaluate(q, lam)
-            if not np.isfinite(now.energy):
-                return None, iteration, "diverged"
-            if now.imbalance <= self.newton.tolerance:
-                turned = system.objection(here.q, here.lam, q, lam)
-                # off the tangent by more than 34 degrees: the path turns sharply, and could be followed backwards
-                sharp = np.linalg.norm((q - here.q)[:p]) > 1.2 * abs(step) * np.linalg.norm(normal)
-                if turned or sharp:
-                    return None, iteration, turned or "sharp turn"
-                if lam > 1.0:
-                    part = (1.0 - here.lam) / (lam - here.lam)
-                    system.tangent(here.q, here.lam, here.forces)  # predictions are from the last tangent
-                    return self._arrive(system, here, part * (q - here.q))
-                return point(system, q, lam, MODE, now), iteration, ""
-            try:
-                factor, _ = system.tangent(q, lam, forces).factorise_any()
-            except IndefiniteError:
-                return None, iteration, "singular tangent"
-            a = -factor.solve(now.residual)
-            b = -factor.solve(system.control_rate(q, lam))
-            slope = float(normal @ b[:p])
-            if slope == 0.0:
-                return None, iteration, "singular tangent"
-            change = -float(normal @ a[:p]) / slope
-            dq = a + change * b
-            forces = system.predicted_forces(now.forces, dq)
-            q, lam = q + dq, lam + change
-        return None, self.iterations, "iteration limit"
+            return self._arrive(system, here, (1.0 - here.lam) * tangent.rate)
+        guess = here.q + step * tangent.rate
+        forces = system.predicted_forces(here.forces, step * tangent.rate)
+        found = correct(system, guess, lam, forces, tangent.normal, self.newton.tolerance, self.iterations)
+        if found.reason:
+            return _Arrival(None, None, found.iterations, found.reason)
+        turned = system.objection(here.q, here.lam, found.q, found.lam)
+        # off the tangent by more than 34 degrees: the path turns sharply, and could be followed backwards
+        sharp = np.linalg.norm((found.q - here.q)[:p]) > 1.2 * abs(step) * np.linalg.norm(tangent.rate[:p])
+        if turned or sharp:
+            return _Arrival(None, None, found.iterations, turned or "sharp turn")
+        if found.lam > 1.0:
+            part = (1.0 - here.lam) / (found.lam - here.lam)
+            system.tangent(here.q, here.lam, here.forces)  # predictions are made with the last tangent
+            return self._arrive(system, here, part * (found.q - here.q))
+        there = point(system, found.q, found.lam, self.control.mode, found.evaluation)
+        return _Arrival(there, found.evaluation, found.iterations)
 
-    def _arrive(self, system: System, here: Point, change: Array) -> tuple[Point | None, int, str]:
+    def _arrive(self, system: System, here: Point, change: Array) -> _Arrival:
         """The state at lambda = 1 from a guess, if it lies ahead on the path and not on another branch."""
         q = here.q + change
-        solution = self.newton.solve_boldly(system, q, 1.0, system.predicted_forces(here.forces, change))
+        newton = replace(self.newton, unstable=True)
+        solution = newton.solve_boldly(system, q, 1.0, system.predicted_forces(here.forces, change))
         if not solution.converged:
-            return None, solution.iterations, solution.reason
+            return _Arrival(None, None, solution.iterations, solution.reason)
         p = system.primal
         expected, moved = (q - here.q)[:p], (solution.q - here.q)[:p]
         far = np.linalg.norm(moved - expected) > 0.5 * np.linalg.norm(expected)
         turned = system.objection(here.q, here.lam, solution.q, 1.0)
         if turned or far:
-            return None, solution.iterations, turned or "jumped to another branch"
-        return point(system, solution.q, 1.0, MODE, solution.evaluation), solution.iterations, ""
+            return _Arrival(None, None, solution.iterations, turned or "jumped to another branch")
+        there = point(system, solution.q, 1.0, self.control.mode, solution.evaluation)
+        return _Arrival(there, solution.evaluation, solution.iterations)
+
+
+@dataclass(frozen=True)
+class DisplacementControl(ArcLength):
+    """Increments of one displacement (see `Displacement`): passes limit points of lambda, not those of its own."""
+
+    control: Control = field(default_factory=Displacement)

@@ -1,14 +1,17 @@
-"""The default strategy: load control, and arc length where a limit point stops it."""
+"""The default strategy: load control, arc length over limit points, and load control again behind them."""
 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
-from bh.solvers.arc_length import MODE, ArcLength
-from bh.solvers.continuation import LoadControl
-from bh.solvers.increments import Increment, Point
+from bh.solvers.arc_length import ArcLength
+from bh.solvers.continuation import AtBifurcation, LoadControl
+from bh.solvers.increments import ARC, LOAD, Increment, Point
 from bh.solvers.system import System
+
+FAR = 8  # states by arc length that rise steadily: there is no limit point
 
 
 @dataclass(frozen=True)
@@ -19,11 +22,13 @@ class Automatic:
         load: the way that nearly every step goes. Its smallest increment here is only where arc length is tried.
         arc: how limit points are passed. It starts with the last increment that load control had accepted.
         patience: smallest increment of load control, in parts of the step, before arc length is tried.
+        at_bifurcation: see `LoadControl`.
     """
 
     load: LoadControl = field(default_factory=LoadControl)
     arc: ArcLength = field(default_factory=lambda: ArcLength(most=200))
     patience: float = 2e-3
+    at_bifurcation: AtBifurcation = "stable"
 
     def limits(self, system: System) -> tuple[float, float]:
         """First and largest increment of lambda for a system."""
@@ -38,27 +43,34 @@ class Automatic:
     ) -> Iterator[Increment]:
         """See `LoadControl.follow`; increments by arc length say so in their note."""
         points = list(history)
-        if points[-1].mode == MODE and points[-1].lam < 1.0:  # a resumed run goes on the way it went
-            passed = yield from self._run(self.arc.follow(system, points, increment, origin), points)
-            if passed is not None:
-                yield passed
-            return
-        first = replace(self.load, smallest=max(self.patience, self.load.smallest))
-        failure = yield from self._run(first.follow(system, points, increment), points)
-        if failure is None:
-            return
-        if len(points) > 1:
-            step = max(points[-1].lam - points[-2].lam, self.patience)
-            passed = yield from self._run(self.arc.follow(system, points, step, origin), points)
-            if passed is None:
+        load = replace(self.load, at_bifurcation=self.at_bifurcation)
+        bold = replace(load, smallest=max(self.patience, load.smallest), foresee=True)
+        failure: Increment | None = None
+        while True:
+            if points[-1].mode != ARC:
+                failure = yield from self._run(bold.follow(system, points[-3:], increment), points)
+                if failure is None:
+                    return
+                if (failure.outcome == "bifurcation" and self.at_bifurcation == "stop") or len(points) < 2:
+                    break
+                increment = max(points[-1].lam - points[-2].lam, self.patience)
+            passed = yield from self._pass(
+                self.arc.follow(system, points, increment, origin), points, load, system
+            )
+            if passed is None and points[-1].lam >= 1.0:
                 return
-            failure = replace(passed, note=f"{failure.note}; by arc length: {passed.note}")
-        if points[-1].lam < 1.0 and points[-1].lam >= history[-1].lam:
-            last = yield from self._run(self.load.follow(system, points[-3:], self.patience), points)
+            if passed is not None:
+                note = f"by arc length: {passed.note}"
+                failure = replace(passed, note=f"{failure.note}; {note}" if failure else note)
+                break
+            increment = self.load.limits(system)[0]
+        if points[-1].mode != ARC and points[-1].lam < 1.0:
+            last = yield from self._run(load.follow(system, points[-3:], self.patience), points)
             if last is None:
                 return
-            failure = replace(last, note=f"{failure.note}; {last.note}")
-        yield failure
+            failure = replace(last, note=f"{failure.note}; {last.note}" if failure else last.note)
+        if failure is not None:
+            yield failure
 
     @staticmethod
     def _run(
@@ -68,6 +80,40 @@ class Automatic:
         for item in increments:
             if item.outcome != "reached":
                 return item
+            if item.jumped:
+                points.clear()
             points.append(item.point)
             yield item
         return None
+
+    def _pass(
+        self, increments: Iterator[Increment], points: list[Point], load: LoadControl, system: System
+    ) -> Generator[Increment, None, Increment | None]:
+        """As `_run`, but stops where load control can take over again, and marks that state so."""
+        for item in increments:
+            if item.outcome != "reached":
+                return item
+            points.append(item.point)
+            if behind_limit(points) and item.point.lam < 1.0:
+                points[:] = [replace(item.point, mode=LOAD)]
+                note = f"{item.note}; load control from here on"
+                first = load.limits(system)[0]
+                yield replace(item, point=points[0], next_increment=first, note=note, jumped=True)
+                return None
+            yield item
+        return None
+
+
+def behind_limit(points: Sequence[Point]) -> bool:
+    """Is the last state stable, rising, and above all that load control had reached before arc length took over?
+
+    Arc length begins below the limit point, so it must have fallen or been unstable on the way, or have come far
+    without: then there was no limit point.
+    """
+    arc = next((i for i in range(len(points), 0, -1) if points[i - 1].mode != ARC), 0)
+    run = points[max(arc - 1, 0) :]
+    if len(run) < 3 or run[-1].negative != 0:
+        return False
+    passed = len(run) > FAR or any(b.lam < a.lam or bool(b.negative) for a, b in pairwise(run))
+    top = max(p.lam for p in points[:arc]) if arc else run[0].lam
+    return passed and run[-1].lam > max(run[-2].lam, top)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.increments import Increment, Point, extrapolate, point
+from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point
 from bh.solvers.matrices import IndefiniteError
-from bh.solvers.newton import Newton, Solution
-from bh.solvers.stability import leave_saddle
+from bh.solvers.newton import Newton, Solution, count_negative
+from bh.solvers.stability import leave_saddle, locate
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
+AtBifurcation = Literal["stable", "primary", "stop"]
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,10 @@ class LoadControl:
         smallest: part of the step below which an increment gives up.
         work_mismatch: largest relative difference between the energy gained in an increment and the work of the
             actuation (trapezoidal rule); a larger one means that the state jumped to another branch.
+        at_bifurcation: where the branch loses its stability, go on along the stable branch of lowest energy
+            ("stable"), stay on the one that is not stable ("primary"), or end with the outcome "bifurcation" ("stop").
+        foresee: hand over as soon as the last states point at a limit point in the next increment, instead of
+            finding out by cutting it; only of use where something else can pass it (`Automatic`).
     """
 
     first_rotation: float = math.radians(15.0)
@@ -42,6 +48,8 @@ class LoadControl:
     smallest: float = 1e-5
     work_mismatch: float = 0.2
     newton: Newton = field(default_factory=Newton)
+    at_bifurcation: AtBifurcation = "stable"
+    foresee: bool = False
 
     def limits(self, system: System) -> tuple[float, float]:
         """First and largest increment of lambda for a system."""
@@ -65,6 +73,7 @@ class LoadControl:
         points = list(history)
         first, largest = self.limits(system)
         step = first if increment is None else increment
+        newton = self.newton if self.at_bifurcation == "stable" else replace(self.newton, unstable=True)
         cuts: list[str] = []
         iterations = 0
         while points[-1].lam < 1.0:
@@ -72,16 +81,23 @@ class LoadControl:
             left = 1.0 - here.lam
             # do not leave a crumb for the end
             lam = 1.0 if step > 0.999 * left else here.lam + (0.5 * left if step > 0.7 * left else step)
+            fold = fold_ahead(points, system.primal)
+            if self.foresee and fold <= lam and len(cuts) > 2:
+                note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
+                yield Increment(here, "limit-point", iterations, math.nan, step, cuts=tuple(cuts), note=note)
+                return
             q, forces = extrapolate(points, lam)
-            solution = self.newton.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
+            solution = newton.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
             iterations += solution.iterations
-            note = ""
-            if solution.converged and not solution.stable:
+            note, primary = "", solution
+            if solution.converged and not solution.stable and self.at_bifurcation == "stable":
                 solution, note = leave_saddle(system, solution, lam, self.newton)
                 iterations += solution.iterations
             # what did not converge may hold anything; nothing is asked of it
             there = (
-                point(system, solution.q, lam, evaluation=solution.evaluation) if solution.converged else here
+                point(system, solution.q, lam, evaluation=solution.evaluation, negative=solution.negative)
+                if solution.converged
+                else here
             )
             objection = self._objection(system, here, there, solution, left_saddle=bool(note))
             if objection:
@@ -89,32 +105,51 @@ class LoadControl:
                 step = 0.5 * (lam - here.lam)
                 if step < self.smallest:
                     outcome = "bifurcation" if solution.converged and solution.stable is False else "stalled"
+                    if fold <= lam:
+                        outcome = "limit-point"
+                    imbalance = solution.evaluation.imbalance
                     yield Increment(
-                        here,
-                        outcome,
-                        iterations,
-                        solution.evaluation.imbalance,
-                        None,
-                        step,
-                        tuple(cuts),
-                        objection,
+                        here, outcome, iterations, imbalance, step, cuts=tuple(cuts), note=objection
                     )
                     return
                 continue
+            critical = self._critical(system, here, primary, lam)
+            if self.at_bifurcation == "stop" and solution.negative:
+                where = f" at lambda {critical[0].lam:.6g}" if critical else f" before lambda {lam:.6g}"
+                note = f"the branch loses its stability{where}"
+                yield Increment(
+                    here,
+                    "bifurcation",
+                    iterations,
+                    math.nan,
+                    step,
+                    cuts=tuple(cuts),
+                    note=note,
+                    critical=critical,
+                )
+                return
             taken = lam - here.lam
             points = [there] if note else [*points[-2:], there]
             step = self._next(taken, solution.iterations, bool(cuts), largest)
             yield Increment(
-                there,
-                "reached",
-                iterations,
-                solution.evaluation.imbalance,
-                solution.stable,
-                step,
-                tuple(cuts),
-                note,
-            )
+                there, "reached", iterations, solution.evaluation.imbalance, step, tuple(cuts), note, bool(note),
+                critical,
+            )  # fmt: skip
             cuts, iterations = [], 0
+
+    def _critical(
+        self, system: System, here: Point, found: Solution, lam: float
+    ) -> tuple[CriticalPoint, ...]:
+        """What lies between the last state and the one found at `lam` on its branch, if stability changed."""
+        if not found.converged or found.negative is None:
+            return ()
+        before = here.negative
+        if before is None:  # where a step begins nobody has looked yet
+            before = count_negative(system.tangent(here.q, here.lam, here.forces)) if found.negative else 0
+        if before == found.negative:
+            return ()
+        there = point(system, found.q, lam, evaluation=found.evaluation)
+        return locate(system, here, there, (before, found.negative), self.newton.tolerance)
 
     def _next(self, taken: float, iterations: int, was_cut: bool, largest: float) -> float:
         """The next increment of lambda after one of size `taken`; one that was cut is not followed by a larger one."""
@@ -152,7 +187,7 @@ class LoadControl:
             return solution.reason
         if left_saddle:
             return ""
-        if not solution.stable:
+        if not solution.stable and self.at_bifurcation == "stable":
             return solution.reason or "unstable"
         turned = system.objection(here.q, here.lam, there.q, there.lam)
         if turned:

@@ -27,9 +27,22 @@ class Factor(Protocol):
         """x with A x = b, b (n,) or (n, k)."""
         ...
 
-    def descend(self, residual: Array) -> Array:
-        """A direction in which the primal unknowns lower the energy, and the change of multipliers with it."""
-        return -self.solve(residual)
+    def descend(self, residual: Array) -> tuple[Array, float]:
+        """A direction in which the primal unknowns lower the merit, with the change of multipliers that goes with it,
+        and the rate of change of the merit along it (negative), N mm."""
+        direction = -self.solve(residual)
+        return direction, float(residual @ direction)
+
+
+class SignedFactor(Factor):
+    """A factor that may be of an indefinite matrix, with `negative` eigenvalues below zero."""
+
+    negative: int
+
+    def descend(self, residual: Array) -> tuple[Array, float]:
+        if self.negative:
+            raise IndefiniteError(self.negative)
+        return super().descend(residual)
 
 
 class Matrix(Protocol):

@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
+LOAD = "load control"
+ARC = "arc length"
+DISPLACEMENT = "displacement control"
 
 
 @dataclass(frozen=True)
 class Point:
     """A converged state on the way of one step: lambda, unknowns, element forces and the rate of work there.
 
-    `mode` is "arc length" where the state was found so, which a resumed run has to go on with.
+    `mode` is how to go on from here (LOAD, ARC or DISPLACEMENT), also for a resumed run; `negative` counts the
+    negative modes of the state, None where that is not known.
     """
 
     lam: float
@@ -25,7 +29,27 @@ class Point:
     forces: Array
     energy: float
     power: float
-    mode: str = ""
+    mode: str = LOAD
+    negative: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalPoint:
+    """Where an eigenvalue of the tangent goes through zero, found by bisection along the path.
+
+    Attributes:
+        kind: "limit" where lambda turns back, else "bifurcation".
+        mode: (n,) null vector of the tangent; its displacements have unit length.
+        negative: number of negative modes before and behind.
+        error: half the width in lambda of the last interval.
+    """
+
+    kind: str
+    lam: float
+    q: Array
+    mode: Array
+    negative: tuple[int, int]
+    error: float
 
 
 @dataclass(frozen=True)
@@ -33,27 +57,41 @@ class Increment:
     """What one increment of lambda came to.
 
     `outcome` is "reached" for an accepted state; else it names why the step could not go on and `point` is the last
-    accepted state. `cuts` tells why the increment was cut before it was accepted; `negative` counts the negative
-    eigenvalues of the tangent (0: stable), None where that is not known.
+    accepted state. `cuts` tells why the increment was cut before it was accepted. `jumped` is True where the state
+    lies on another branch than the one before, so that nothing can be extrapolated through it; `critical` holds what
+    was passed on the way.
     """
 
     point: Point
     outcome: str
     iterations: int
     imbalance: float
-    stable: bool | None
     next_increment: float
     cuts: tuple[str, ...] = ()
     note: str = ""
-    negative: int | None = None
+    jumped: bool = False
+    critical: tuple[CriticalPoint, ...] = ()
+
+    @property
+    def negative(self) -> int | None:
+        return self.point.negative
+
+    @property
+    def stable(self) -> bool | None:
+        return None if self.negative is None else self.negative == 0
 
 
 def point(
-    system: System, q: Array, lam: float, mode: str = "", evaluation: Evaluation | None = None
+    system: System,
+    q: Array,
+    lam: float,
+    mode: str = LOAD,
+    evaluation: Evaluation | None = None,
+    negative: int | None = None,
 ) -> Point:
     """The point of a path at given unknowns; `evaluation` is the system's there, if it is known already."""
     evaluation = evaluation or system.evaluate(q, lam)
-    return Point(lam, q, evaluation.forces, evaluation.energy, system.power(q, lam), mode)
+    return Point(lam, q, evaluation.forces, evaluation.energy, system.power(q, lam), mode, negative)
 
 
 def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:
@@ -67,3 +105,24 @@ def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:
         q += weight * item.q
         forces += weight * item.forces
     return q, forces
+
+
+def fold_ahead(points: Sequence[Point], primal: int) -> float:
+    """Estimated lambda of the limit point that the path runs into, from its last three points; inf if none is seen.
+
+    Close to a limit point lambda* - lambda goes with the square of the distance in q, so (d lambda / d q)^2, which is
+    a current stiffness parameter (Bergan et al. 1978), falls to zero as a straight line.
+    """
+    if len(points) < 3:
+        return np.inf
+    a, b, c = points[-3:]
+    speeds = [
+        np.linalg.norm((y.q - x.q)[:primal]) / (y.lam - x.lam) if y.lam > x.lam else 0.0
+        for x, y in ((a, b), (b, c))
+    ]
+    # only where the stiffness has fallen clearly: every curved path has some change
+    if min(speeds) <= 0.0 or speeds[1] < 1.5 * speeds[0]:
+        return np.inf
+    before, now = (1.0 / v**2 for v in speeds)
+    middle = 0.5 * (b.lam + c.lam)
+    return float(middle + 0.5 * (c.lam - a.lam) * now / (before - now))

@@ -121,7 +121,7 @@ class BandLDLFactor(Factor):
         x, _ = lapack.dtbtrs(self.ab, x / pivots, trans="T", **unit)
         return unpermuted(x, self.order)
 
-    def descend(self, residual: Array) -> Array:
+    def descend(self, residual: Array) -> tuple[Array, float]:
         raise IndefiniteError(1)
 
 

@@ -1,14 +1,18 @@
-"""Newton's method for one value of lambda: bold with independent forces, careful with energy line search and shift."""
+"""Newton's method for one value of lambda: bold with independent forces, careful with energy line search and shift.
+
+Where both stop, a pseudo-transient motion to rest is the last resort (`bh.solvers.pseudo_transient`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.matrices import Factor, IndefiniteError, Matrix
+from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
@@ -19,8 +23,8 @@ NEUTRAL = 1e-13  # shift, in parts of the diagonal, at which an eigenvalue is ze
 class Solution:
     """What came of one solve; `q` is only an equilibrium where `converged`.
 
-    `iterations` counts factorisations that moved the state; `stable` tells if the Hessian there is positive definite
-    (on the null space of the constraints), None where that was not looked at.
+    `iterations` counts factorisations that moved the state; `negative` the negative eigenvalues of the Hessian there
+    (on the null space of the constraints; 0: stable), None where that was not looked at.
     """
 
     q: Array
@@ -28,8 +32,12 @@ class Solution:
     iterations: int
     converged: bool
     reason: str = ""
-    stable: bool | None = None
+    negative: int | None = None
     careful: bool = False
+
+    @property
+    def stable(self) -> bool | None:
+        return None if self.negative is None else self.negative == 0
 
 
 @dataclass(frozen=True)
@@ -45,12 +53,16 @@ class Newton:
         tolerance: on `Evaluation.imbalance`.
         bold, careful: most iterations of either way.
         bold_shift: largest shift of the bold way; a tangent that is more indefinite asks for the careful one.
+        transient: the last resort; None to do without.
+        unstable: take indefinite tangents as they are and go boldly only, to stay on a branch that is not stable.
     """
 
     tolerance: float = 1e-8
     bold: int = 14
     careful: int = 200
     bold_shift: float = 1e-5
+    transient: PseudoTransient | None = field(default_factory=PseudoTransient)
+    unstable: bool = False
 
     def solve(
         self,
@@ -70,13 +82,16 @@ class Newton:
             other, other_forces = second_guess()
             first = self.solve_boldly(system, other, lam, other_forces)
             first = replace(first, iterations=first.iterations + spent)
-        if first.converged or self.careful == 0:
+        if first.converged or self.careful == 0 or self.unstable:
             return first
         second = self.solve_carefully(system, q, lam)
-        return Solution(
-            second.q, second.evaluation, first.iterations + second.iterations, second.converged, second.reason,
-            second.stable, careful=True,
-        )  # fmt: skip
+        second = replace(second, iterations=first.iterations + second.iterations)
+        if second.converged or self.transient is None:
+            return second
+        q, now, steps = self.transient.relax(system, second.q, lam, self.tolerance)
+        if now.imbalance > self.tolerance:
+            return replace(second, iterations=second.iterations + steps)
+        return self._finish(system, q, lam, now, second.iterations + steps, careful=True)
 
     def solve_boldly(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
         """Full steps with independent forces; gives up on an indefinite tangent or when it runs away."""
@@ -86,7 +101,7 @@ class Newton:
         for iteration in range(self.bold):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=False)
-            factor, _ = factorise_shifted(system.tangent(q, lam, forces), 0.0, self.bold_shift)
+            factor = self._bold_factor(system.tangent(q, lam, forces))
             if factor is None:
                 return Solution(q, now, iteration, False, "indefinite tangent")
             dq = -factor.solve(now.residual)
@@ -102,6 +117,14 @@ class Newton:
             return self._finish(system, q, lam, now, self.bold, careful=False)
         return Solution(q, now, self.bold, False, "iteration limit")
 
+    def _bold_factor(self, matrix: Matrix) -> Factor | None:
+        if not self.unstable:
+            return factorise_shifted(matrix, 0.0, self.bold_shift)[0]
+        try:
+            return matrix.factorise_any()[0]
+        except IndefiniteError:
+            return None
+
     def solve_carefully(self, system: System, q: Array, lam: float) -> Solution:
         """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns."""
         now = system.evaluate(q, lam)
@@ -113,12 +136,12 @@ class Newton:
             factor, shift = factorise_shifted(matrix, shift, least=1e-11)
             if factor is None:
                 return Solution(q, now, iteration, False, "singular tangent", careful=True)
-            dq = factor.descend(now.residual)
+            dq, slope = factor.descend(now.residual)
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, careful=True)
             near = shift < 1e-9 and now.imbalance < 0.1
             step = full_step(system, q, lam, now, -factor.solve(now.residual)) if near else None
-            step = step or line_search(system, q, lam, now, dq)
+            step = step or line_search(system, q, lam, now, dq, slope)
             if step is None:
                 if shift > 1e3:
                     return Solution(q, now, iteration, False, "no descent", careful=True)
@@ -146,12 +169,23 @@ class Newton:
     def _finish(
         system: System, q: Array, lam: float, now: Evaluation, iterations: int, careful: bool
     ) -> Solution:
+        negative = count_negative(system.tangent(q, lam, now.forces))
+        return Solution(q, now, iterations, True, "", negative, careful)
+
+
+def count_negative(matrix: Matrix) -> int:
+    """Number of negative eigenvalues on the null space of the constraints; those that are rounding count as zero.
+
+    Where there are too many constraints for an exact count it is that of the augmented matrix, an upper bound.
+    """
+    try:
+        matrix.factorise(NEUTRAL)
+        return 0
+    except IndefiniteError:
         try:
-            system.tangent(q, lam, now.forces).factorise(NEUTRAL)
-            stable = True
-        except IndefiniteError:
-            stable = False
-        return Solution(q, now, iterations, True, "", stable, careful)
+            return max(matrix.factorise_any()[1], 1)
+        except IndefiniteError as error:
+            return max(error.negative, 1)
 
 
 def factorise_shifted(
@@ -182,25 +216,27 @@ def full_step(
 
 
 def line_search(
-    system: System, q: Array, lam: float, now: Evaluation, dq: Array
+    system: System, q: Array, lam: float, now: Evaluation, dq: Array, slope: float
 ) -> tuple[Array, Evaluation, float] | None:
-    """Step along dq that lowers the energy enough (Armijo), multipliers held while looking; None if there is none."""
+    """Step along dq that lowers the merit enough (Armijo), multipliers held while looking; None if there is none.
+
+    `slope` is the rate of change of the merit along dq, N mm.
+    """
     p = system.primal
-    slope = float(now.residual[:p] @ dq[:p])
-    noise = 1e-13 * max(abs(now.energy), abs(slope))
+    noise = 1e-13 * max(abs(now.merit), abs(slope))
     length = 1.0
     for _ in range(30):
         trial = q.copy()
         trial[:p] += length * dq[:p]
         there = system.evaluate(trial, lam)
         if np.isfinite(there.energy) and (
-            there.energy <= now.energy + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
+            there.merit <= now.merit + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
         ):
             if len(q) > p:
                 trial[p:] += length * dq[p:]
                 there = system.evaluate(trial, lam)
             return trial, there, length
-        gain = there.energy - now.energy - length * slope
+        gain = there.merit - now.merit - length * slope
         best = -0.5 * slope * length**2 / gain if np.isfinite(gain) and gain > 0.0 else 0.0
         length = min(max(best, 0.1 * length), 0.5 * length)
     return None

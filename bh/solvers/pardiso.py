@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.factor import Factor, IndefiniteError, unpermuted
+from bh.solvers.factor import IndefiniteError, SignedFactor, unpermuted
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -146,14 +146,16 @@ class Analysis:
         # a pivot that had to be replaced has no sign of its own: the inertia would be a guess
         if error or replaced or int(handle.options[21]) + negative != len(order):
             raise IndefiniteError(max(negative, 1))
+        factor.negative = negative
         return factor, negative
 
 
-class PardisoFactor(Factor):
+class PardisoFactor(SignedFactor):
     """A factor; when it is garbage its handle waits for the next one of the same pattern, or is freed."""
 
     def __init__(self, handle: Handle, data: Array, order: Ints, spare: deque[Handle]) -> None:
         self._handle, self._data, self._order = handle, data, order
+        self.negative = 0
         weakref.finalize(self, spare.append, handle).atexit = False
 
     def solve(self, b: Array) -> Array:

@@ -13,6 +13,7 @@ from bh.solvers.matrices import BandMatrix, Factor, FreeBodyMatrix, IndefiniteEr
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 NOISE = 2e-14  # error of a constraint that is rounding (angles in rad)
+ROUNDING = 4.0 * np.finfo(float).eps  # of a sum, in parts of the sum of its sizes
 TINY_SHIFT = 1e-12  # shifts up to this only take rounding off
 MOST_DENSE = 300  # constraints whose Schur complement is still formed as a dense matrix
 
@@ -48,6 +49,12 @@ class ConstraintRows:
         _times(self.values, self.columns, x, out)
         return out
 
+    def sizes(self, x: Array) -> Array:
+        """Sums of |G_ij x_j|: rounding errors of `times` go with them."""
+        out = np.empty(len(self.values))
+        _times(np.abs(self.values), self.columns, np.abs(x), out)
+        return out
+
     def dense(self) -> Array:
         """G as an array (c, n)."""
         out = np.zeros((len(self.values), self.n))
@@ -64,10 +71,11 @@ class ConstraintRows:
 
 @dataclass(frozen=True)
 class MultiplierMatrix:
-    """The saddle matrix [[A, G^T], [G, -compliance]] of constraints in augmented form, A = K + gamma G^T G.
+    """The saddle matrix [[K, G^T], [G, -compliance]] of constraints, stored as A = K + gamma G^T G.
 
-    A is positive definite just where K is so on the null space of G (for gamma large enough) and has the sparsity of
-    ordinary hinges. Right-hand sides and solutions are (n + c,), multipliers last.
+    A is positive definite just where K is so on the null space of G (Finsler 1937; for gamma large enough) and has the
+    sparsity of ordinary hinges. gamma is only a means to solve: it is in neither the residual nor the solution.
+    Right-hand sides and solutions are (n + c,), multipliers last.
     """
 
     augmented: BandMatrix | SparseMatrix | FreeBodyMatrix
@@ -93,17 +101,15 @@ class MultiplierMatrix:
             return MultiplierFactor(factor, self.G, self.gamma, self.compliance), 0
         if len(self.gamma) > MOST_DENSE:
             raise IndefiniteError(negative)
-        whole = DenseSchurFactor.of(factor, self.G, self.compliance)
+        whole = DenseSchurFactor.of(factor, self.G, self.gamma, self.compliance)
         # inertia of the saddle is that of A and of -S; its c constraints take c of the negative ones (Gould 1985)
         return whole, negative - int((whole.schur_values < 0.0).sum())
 
     def __matmul__(self, x: Array) -> Array:
         n = self.G.n
-        top = self.augmented @ x[:n] + self.G.transpose_times(x[n:])
-        return np.concatenate((top, self.G.times(x[:n]) - self.compliance * x[n:]))
-
-    def diagonal(self) -> Array:
-        return np.concatenate((self.augmented.diagonal(), -self.compliance))
+        turn = self.G.times(x[:n])
+        top = self.augmented @ x[:n] + self.G.transpose_times(x[n:] - self.gamma * turn)
+        return np.concatenate((top, turn - self.compliance * x[n:]))
 
 
 @dataclass(frozen=True)
@@ -123,22 +129,26 @@ class MultiplierFactor(Factor):
     tolerance: float = 1e-3
 
     def solve(self, b: Array) -> Array:
+        # second row times gamma G^T added to the first: A x + (1 - gamma c) G^T y = b_1 + gamma G^T b_2
         G, n = self.G, self.G.n
-        gap = b[n:]
-        y = np.zeros(len(gap))
-        x = self.factor.solve(b[:n])
+        # constraints that say the same (a straight crease between rigid panels) leave a rounding error that no
+        # multiplier can remove; chasing it would pump up moments that mean nothing
+        gap = np.where(np.abs(b[n:]) <= NOISE, 0.0, b[n:])
+        scale = 1.0 - self.gamma * self.compliance
+        compliance = self.compliance / scale
+        y = np.zeros(len(gap))  # scale times the multipliers until the end
+        x = self.factor.solve(b[:n] + G.transpose_times(self.gamma * gap))
         miss = G.times(x) - gap
+        noise = ROUNDING * float(G.sizes(x).max(initial=0.0))
         goal = 1e-7 * float(np.abs(gap).max(initial=0.0))
         p = z = self.gamma * miss
         rho = float(miss @ z)
         for _ in range(self.most):
             error = float(np.abs(miss).max(initial=0.0))
-            # constraints that say the same (a straight crease between rigid panels) leave a rounding error that no
-            # multiplier can remove; chasing it would pump up moments that mean nothing
-            if error <= NOISE or (error <= goal and np.abs(z).max() <= self.tolerance * np.abs(y).max()):
+            if error <= noise or (error <= goal and np.abs(z).max() <= self.tolerance * np.abs(y).max()):
                 break
             v = self.factor.solve(G.transpose_times(p))
-            Sp = G.times(v) + self.compliance * p
+            Sp = G.times(v) + compliance * p
             curvature = float(p @ Sp)
             if curvature <= 0.0:  # no unknown can change these constraints
                 break
@@ -149,16 +159,20 @@ class MultiplierFactor(Factor):
             z = self.gamma * miss
             rho, before = float(miss @ z), rho
             p = z + (rho / before) * p
-        return np.concatenate((x, y))
+        # with what the constraints still miss as a moment the first row is met exactly
+        return np.concatenate((x, y / scale + self.gamma * miss))
 
-    def descend(self, residual: Array) -> Array:
-        """Newton's direction of the augmented energy at fixed multipliers, and their first-order update.
+    def descend(self, residual: Array) -> tuple[Array, float]:
+        """Newton's direction of the augmented Lagrangian at fixed multipliers, and their first-order update.
 
         The saddle's own direction meets the constraints at once, but may go uphill where the tangent was shifted.
         """
         n = self.G.n
-        x = -self.factor.solve(residual[:n])
-        return np.concatenate((x, self.gamma * (residual[n:] + self.G.times(x))))
+        gap = residual[n:]
+        gradient = residual[:n] + self.G.transpose_times(self.gamma * gap)
+        x = -self.factor.solve(gradient)
+        change = self.gamma * (gap + self.G.times(x))
+        return np.concatenate((x, change)), float(gradient @ x)
 
 
 @dataclass(frozen=True)
@@ -167,20 +181,25 @@ class DenseSchurFactor(Factor):
 
     factor: Factor
     G: ConstraintRows
+    gamma: Array
+    scale: Array  # 1 - gamma * compliance, see `MultiplierFactor.solve`
     influence: Array  # (n, c) A^-1 G^T
     schur: Array
     schur_values: Array
 
     @classmethod
-    def of(cls, factor: Factor, G: ConstraintRows, compliance: Array) -> DenseSchurFactor:
+    def of(cls, factor: Factor, G: ConstraintRows, gamma: Array, compliance: Array) -> DenseSchurFactor:
+        scale = 1.0 - gamma * compliance
         rows = G.dense()
         influence = factor.solve(np.ascontiguousarray(rows.T))
         schur = rows @ influence
-        schur = 0.5 * (schur + schur.T) + np.diag(compliance)
-        return cls(factor, G, influence, schur, np.asarray(np.linalg.eigvalsh(schur), dtype=float))
+        schur = 0.5 * (schur + schur.T) + np.diag(compliance / scale)
+        return cls(
+            factor, G, gamma, scale, influence, schur, np.asarray(np.linalg.eigvalsh(schur), dtype=float)
+        )
 
     def solve(self, b: Array) -> Array:
         n = self.G.n
-        x = self.factor.solve(b[:n])
+        x = self.factor.solve(b[:n] + self.G.transpose_times(self.gamma * b[n:]))
         y = np.linalg.solve(self.schur, self.G.times(x) - b[n:])
-        return np.concatenate((x - self.influence @ y, y))
+        return np.concatenate((x - self.influence @ y, y / self.scale))

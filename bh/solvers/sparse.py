@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bh.solvers import multifrontal, pardiso
 from bh.solvers.dissection import Dissection, dissect
-from bh.solvers.factor import Factor, IndefiniteError, unpermuted
+from bh.solvers.factor import Factor, IndefiniteError, SignedFactor, unpermuted
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -129,7 +129,7 @@ class SparseMatrix:
         L, negative = multifrontal.factorise(data, self.pattern.fronts)
         if negative < 0:
             raise IndefiniteError(1)
-        return MultifrontalFactor(L, self.pattern), negative
+        return MultifrontalFactor(L, self.pattern, negative), negative
 
     def __matmul__(self, x: Array) -> Array:
         p = self.pattern
@@ -142,9 +142,10 @@ class SparseMatrix:
 
 
 @dataclass(frozen=True)
-class MultifrontalFactor(Factor):
+class MultifrontalFactor(SignedFactor):
     L: Array
     pattern: SparsePattern
+    negative: int
 
     def solve(self, b: Array) -> Array:
         order = self.pattern.order

@@ -1,4 +1,4 @@
-"""Is an equilibrium stable, and if not, where does it go."""
+"""Is an equilibrium stable, and if not, where does it go; where on a path does stability change."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.hyperplane import correct
+from bh.solvers.increments import CriticalPoint, Point, point
 from bh.solvers.matrices import IndefiniteError, Matrix
-from bh.solvers.newton import Newton, Solution, factorise_shifted
+from bh.solvers.newton import Newton, Solution, count_negative, factorise_shifted
 from bh.solvers.saddle import MultiplierMatrix
 from bh.solvers.system import System
 
@@ -36,14 +38,35 @@ def lowest_mode(
         before, quotient = quotient, float(mode @ (matrix @ mode))
         if abs(quotient - before) <= tolerance * abs(quotient):
             break
+    return quotient, _signed(mode, size)
+
+
+def nearest_mode(matrix: Matrix, size: int, primal: int, iterations: int = 6) -> Array:
+    """(size,) mode of the eigenvalue nearest to zero, of unit length in its displacements, largest component positive.
+
+    Inverse iteration with the matrix as it is, definite or not: for tangents that are nearly singular.
+    """
+    factor, _ = matrix.factorise_any()
+    mode = np.zeros(size)
+    mode[:primal] = np.random.default_rng(20).normal(size=primal)
+    for _ in range(iterations):
+        load = np.zeros(size)
+        load[:primal] = mode[:primal]
+        mode = factor.solve(load)
+        mode /= np.linalg.norm(mode[:primal])
+    return _signed(mode, size, primal)
+
+
+def _signed(mode: Array, size: int, primal: int | None = None) -> Array:
     whole = np.zeros(size)
-    whole[:primal] = mode * np.sign(mode[np.argmax(np.abs(mode))])
-    return quotient, whole
+    whole[: len(mode)] = mode * np.sign(mode[np.argmax(np.abs(mode[:primal]))])
+    return whole
 
 
 def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -> tuple[Solution, str]:
     """From an unstable equilibrium downhill along its lowest mode to a stable one at the same lambda.
 
+    Both senses of the mode are tried where they are not mirror images, and the state of lower energy is taken.
     Returns the stable state and a note; if none of lower energy is found, the saddle itself and an empty note.
     """
     tangent = system.tangent(saddle.q, lam, saddle.evaluation.forces)
@@ -52,10 +75,86 @@ def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -
     size = float(np.ptp(saddle.q[: system.primal])) or 1.0
     spent = 0
     for amplitude in (1e-2, 5e-2, 2e-1):
-        found = newton.solve_carefully(system, saddle.q + amplitude * size * mode, lam)
-        spent += found.iterations
-        lower = found.evaluation.energy < saddle.evaluation.energy
-        if found.converged and found.stable and lower:
+        starts = [saddle.q + sense * amplitude * size * mode for sense in (1.0, -1.0)]
+        merits = [system.evaluate(start, lam).merit for start in starts]
+        base = saddle.evaluation.merit
+        same = abs(merits[0] - merits[1]) <= 1e-6 * abs(merits[0] - base)
+        best: Solution | None = None
+        for start in starts[:1] if same else starts:
+            found = newton.solve_carefully(system, start, lam)
+            spent += found.iterations
+            lower = found.evaluation.energy < saddle.evaluation.energy
+            better = best is None or found.evaluation.energy < best.evaluation.energy
+            if found.converged and found.stable and lower and better:
+                best = found
+        if best is not None:
             note = f"left an unstable state at lambda {lam:.6g} along its lowest mode"
-            return replace(found, iterations=spent), note
+            return replace(best, iterations=spent), note
     return replace(saddle, iterations=0, reason="unstable and no stable state found nearby"), ""
+
+
+def locate(
+    system: System,
+    a: Point,
+    b: Point,
+    negative: tuple[int, int],
+    tolerance: float = 1e-8,
+    width: float = 1e-5,
+) -> tuple[CriticalPoint, ...]:
+    """Critical points between two states of one branch with different numbers of negative modes, by bisection.
+
+    States between are found on hyperplanes normal to the chord, so that limit points are no obstacle. `width` is the
+    last interval in parts of the chord. Points that cannot be bracketed (another branch comes in between) are left
+    out: a point that is returned has been seen from both sides.
+    """
+    found: list[CriticalPoint] = []
+    low, high, before = (a, 0.0), (b, 1.0), negative[0]
+    while before != negative[1] and len(found) < 4:
+        pair = _bisect(system, a, b, low, high, before, negative[1], tolerance, width)
+        if pair is None:
+            break
+        left, right, behind = pair
+        found.append(_critical_point(system, a, b, left[0], right[0], (before, behind)))
+        low, before = right, behind
+    return tuple(found)
+
+
+Place = tuple[Point, float]  # a state and where it is on the chord, from 0 to 1
+
+
+def _bisect(
+    system: System, a: Point, b: Point, low: Place, high: Place, before: int, behind: int,
+    tolerance: float, width: float,
+) -> tuple[Place, Place, int] | None:  # fmt: skip
+    """The last interval in which the count leaves `before`, and the count behind it; None if the path is lost."""
+    normal = (b.q - a.q)[: system.primal]
+    while high[1] - low[1] > width:
+        p, q = low[0], high[0]
+        forces = 0.5 * (p.forces + q.forces)
+        state = correct(system, 0.5 * (p.q + q.q), 0.5 * (p.lam + q.lam), forces, normal, tolerance)
+        if state.reason:
+            return None
+        middle = point(system, state.q, state.lam, a.mode, state.evaluation), 0.5 * (low[1] + high[1])
+        count = count_negative(system.tangent(state.q, state.lam, state.evaluation.forces))
+        if count == before:
+            low = middle
+        else:
+            high, behind = middle, count
+    return low, high, behind
+
+
+def _critical_point(
+    system: System, a: Point, b: Point, left: Point, right: Point, negative: tuple[int, int]
+) -> CriticalPoint:
+    p = system.primal
+    chord = (b.q - a.q)[:p]
+    senses = []
+    for side in (left, right):
+        factor, _ = system.tangent(side.q, side.lam, side.forces).factorise_any()
+        tangent = -factor.solve(system.control_rate(side.q, side.lam))
+        senses.append(float(tangent[:p] @ chord) > 0.0)
+    lam, q = 0.5 * (left.lam + right.lam), 0.5 * (left.q + right.q)
+    forces = 0.5 * (left.forces + right.forces)
+    mode = nearest_mode(system.tangent(q, lam, forces), system.size, p)
+    kind = "limit" if senses[0] is not senses[1] else "bifurcation"
+    return CriticalPoint(kind, lam, q, mode, negative, 0.5 * abs(right.lam - left.lam))

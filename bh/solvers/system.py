@@ -19,17 +19,24 @@ class Evaluation(NamedTuple):
     """A system at (q, lambda).
 
     Attributes:
-        energy: potential whose stationary points are sought, N mm (with multipliers: the augmented Lagrangian).
+        energy: potential whose stationary points are sought, N mm (with multipliers: the Lagrangian).
         residual: (n,) its gradient.
         imbalance: scale-free size of the residual: largest component beyond rounding, over the typical element
             force; constraint violations in rad or relative units. Zero for perfect equilibrium.
         forces: element forces at q (one array, in the system's own order); see `System.tangent`.
+        penalty: what missed constraints add to the energy where steps are compared (line search), N mm.
     """
 
     energy: float
     residual: Array
     imbalance: float
     forces: Array
+    penalty: float = 0.0
+
+    @property
+    def merit(self) -> float:
+        """What a careful step must lower: the energy, with constraints the augmented Lagrangian; N mm."""
+        return self.energy + self.penalty
 
 
 class System(Protocol):
@@ -67,9 +74,17 @@ class System(Protocol):
         """Why an increment from one state to the next is not to be trusted, or an empty string."""
         ...
 
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        """Outcome and reason where the state itself tells why a path ends (contact, ...), else empty strings."""
+        ...
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        """A motion (n,) of the unknowns in words, such as "crease 'a' turns freely"."""
+        ...
+
     @property
     def energy_scale(self) -> float:
-        """Stiffness times one radian squared over all hinges, penalties included, N mm; 1e-15 of it is rounding."""
+        """Stiffness times one radian squared over all hinges, N mm; 1e-15 of it is rounding."""
         ...
 
     @property

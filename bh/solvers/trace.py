@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from bh.solvers.diagnosis import diagnose
 from bh.solvers.increments import Increment, Point
 from bh.solvers.system import System
 
@@ -48,6 +49,7 @@ class Walk:
 def walk(task: Walk) -> Iterator[Increment]:
     """Accepted increments one by one, so that the caller can store each before the next begins.
 
-    The last one has another outcome than "reached" if the step could not be finished.
+    The last one has another outcome than "reached" if the step could not be finished, and names the reason.
     """
-    yield from task.strategy.follow(task.system, task.history, task.increment, task.origin)
+    for item in task.strategy.follow(task.system, task.history, task.increment, task.origin):
+        yield item if item.outcome == "reached" else diagnose(task.system, item)

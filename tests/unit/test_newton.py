@@ -70,6 +70,12 @@ class Toy:
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         return ""
 
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        return "", ""
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        return "the toy moves"
+
 
 class Springs(Toy):
     """Linear: a chain of three springs."""
@@ -159,7 +165,7 @@ def test_what_does_not_converge_says_so() -> None:
     assert not found.converged
     assert found.reason == "iteration limit"
     assert found.stable is None
-    found = Newton(bold=1, careful=2).solve(Stiffening(), np.array([0.0]), 1.0)
+    found = Newton(bold=1, careful=2, transient=None).solve(Stiffening(), np.array([0.0]), 1.0)
     assert not found.converged
     assert found.iterations == 3
 
@@ -208,7 +214,7 @@ def test_line_search_never_raises_the_energy() -> None:
         q = np.array([start])
         now = system.evaluate(q, 1.0)
         for direction in (-now.residual, -100.0 * now.residual):
-            found = line_search(system, q, 1.0, now, direction)
+            found = line_search(system, q, 1.0, now, direction, float(now.residual @ direction))
             if found is None:
                 assert np.abs(now.residual).max() < 1e-6
                 continue
@@ -222,7 +228,7 @@ def test_line_search_refuses_to_climb() -> None:
     system = Stiffening()
     q = np.array([0.5])
     now = system.evaluate(q, 1.0)
-    assert line_search(system, q, 1.0, now, now.residual) is None
+    assert line_search(system, q, 1.0, now, now.residual, float(now.residual @ now.residual)) is None
 
 
 # --------------------------------------------------------------------------------------- shift and modes
@@ -294,7 +300,7 @@ def test_a_saddle_without_a_way_out_is_kept() -> None:
             return -0.5 * float(q @ q), -q, -np.eye(1)
 
     system = Hill(1, [0.0])
-    saddle = Solution(np.zeros(1), system.evaluate(np.zeros(1), 0.0), 0, True, stable=False)
+    saddle = Solution(np.zeros(1), system.evaluate(np.zeros(1), 0.0), 0, True, negative=1)
     found, note = leave_saddle(system, saddle, 0.0, Newton(careful=20))
     assert note == ""
     assert "no stable state" in found.reason

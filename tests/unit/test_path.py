@@ -80,8 +80,10 @@ def assert_same_records(one: Path, two: Path) -> None:
     assert len(one) == len(two)
     for a, b in zip(one.records, two.records, strict=True):
         assert np.array_equal(a.q, b.q)
-        same = [f.name for f in fields(a) if f.name not in ("q", "wall_time_s")]
+        same = [f.name for f in fields(a) if f.name not in ("q", "wall_time_s", "critical")]
         assert [getattr(a, name) for name in same] == [getattr(b, name) for name in same]
+        for c, d in zip(a.critical, b.critical, strict=True):
+            assert all(np.array_equal(getattr(c, f.name), getattr(d, f.name)) for f in fields(c))
 
 
 # --------------------------------------------------------------------------------------- what a path says
@@ -255,7 +257,9 @@ def test_progress_is_told() -> None:
 def test_progress_is_told_of_failure_and_of_errors() -> None:
     meter = Meter()
     path = trace(
-        MODELS["held"], progress=meter, strategy=LoadControl(smallest=0.3, newton=Newton(bold=1, careful=0))
+        MODELS["held"],
+        progress=meter,
+        strategy=LoadControl(smallest=0.3, newton=Newton(bold=1, careful=0, transient=None)),
     )
     assert meter.closed == [path.outcome] == ["stalled"]
 
@@ -282,7 +286,9 @@ def test_silence(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_path_that_cannot_go_on_says_so() -> None:
-    path = trace(MODELS["held"], strategy=LoadControl(smallest=0.3, newton=Newton(bold=1, careful=0)))
+    path = trace(
+        MODELS["held"], strategy=LoadControl(smallest=0.3, newton=Newton(bold=1, careful=0, transient=None))
+    )
     assert path.outcome == "stalled"
     assert path.reason
     assert len(path) == 1  # the flat state is kept
@@ -313,7 +319,7 @@ def test_failure_in_the_middle_keeps_what_was_reached() -> None:
 
 
 def test_a_failed_step_is_the_end() -> None:
-    impatient = LoadControl(smallest=0.5, newton=Newton(bold=1, careful=0))
+    impatient = LoadControl(smallest=0.5, newton=Newton(bold=1, careful=0, transient=None))
     path = trace(FREE.fold("crease", to=1.2).fold("crease", to=2.0), strategy=impatient)
     assert path.outcome == "stalled"
     assert len(path.steps) == 1
@@ -484,9 +490,9 @@ def test_resumed_after_a_kill(name: str, tmp_path: FilePath) -> None:
         assert Path.load(copy).outcome == "reached"
 
 
-@pytest.mark.parametrize("states", [3, 6, 9])
+@pytest.mark.parametrize("states", [3, 5, 7])
 @pytest.mark.parametrize(
-    "strategy", [Automatic(arc=ArcLength(most=10)), ArcLength(most=20)], ids=["automatic", "arc"]
+    "strategy", [Automatic(arc=ArcLength(most=20)), ArcLength(most=20)], ids=["automatic", "arc"]
 )
 def test_resumed_while_following_by_arc_length(
     strategy: Automatic | ArcLength, states: int, tmp_path: FilePath

@@ -87,6 +87,8 @@ def test_answers_and_inertia(tangents: dict[str, SparseMatrix], state: str, back
         with pytest.raises(IndefiniteError) as caught:
             matrix.factorise()
         assert caught.value.negative == negative
+        with pytest.raises(IndefiniteError):
+            factor.descend(b[:, 0])
         x = factor.solve(b)
     else:
         x = matrix.factorise().solve(b)

@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 import verification.cases as registry
 from meshes import InputError
-from verification import command
+from verification import campaign, command, environment
+from verification import run as runner
 from verification.cases import ALL_CASES, CASES, case
 from verification.checks import CaseResult, Check, Context, line, plot
 from verification.run import run, write_json
@@ -258,16 +259,20 @@ def test_a_broken_record_is_begun_anew(tmp_path: Path, content: str) -> None:
     assert no_constants((tmp_path / "checks.json").read_text()) == json.loads(json.dumps(data))
 
 
-def test_environment_and_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    import verification.run as runner
+@pytest.fixture(autouse=True)
+def no_records(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only what a test runs; the kept runs of long cases have tests of their own."""
+    monkeypatch.setattr(runner, "RECORDS", tmp_path_factory.mktemp("records"))
 
-    assert {"python", "pyvista", "matplotlib"} <= set(runner.environment())
-    monkeypatch.setattr(runner, "PROJECT", tmp_path)  # no repository
-    assert "git commit" not in runner.environment()
+
+def test_environment_and_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    assert {"python", "pyvista", "matplotlib"} <= set(environment.environment())
+    monkeypatch.setattr(environment, "PROJECT", tmp_path)  # no repository
+    assert "git commit" not in environment.environment()
     (tmp_path / ".git").write_text("no repository either")
-    assert "git commit" not in runner.environment()
-    monkeypatch.setattr(runner.shutil, "which", lambda name: None)
-    assert "git commit" not in runner.environment()
+    assert "git commit" not in environment.environment()
+    monkeypatch.setattr(environment.shutil, "which", lambda name: None)
+    assert "git commit" not in environment.environment()
 
 
 def test_a_run_keeps_the_other_cases(tmp_path: Path) -> None:
@@ -381,3 +386,46 @@ def test_strips_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp
     data = run(["strips"], tmp_path, quick=True)
     failed = {r["quantity"] for r in data["checks"] if r["passed"] is False}
     assert failed == {"torsion", "bending_out_of_plane"}
+
+
+# --------------------------------------------------------------------------------------- long cases
+
+
+def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Results that are stored are not played again; a half-written line and those of other versions are."""
+    monkeypatch.setattr(campaign, "environment", lambda: {"python": "x"})
+    few = campaign.scenes(3)
+    store, told = tmp_path / "campaign.jsonl", []
+    whole = campaign.play_all(few, store, told.append)
+    assert [r.outcome for r in whole] == ["reached"] * 3
+    assert told == []
+    lines = store.read_text().splitlines()
+    assert len(lines) == 4
+    marked = json.dumps({**json.loads(lines[1]), "iterations": 12345})
+    store.write_text("\n".join([lines[0], marked, lines[2][:20]]))
+    again = campaign.play_all(few, store, told.append)
+    assert sorted(r.iterations for r in again)[-1] == 12345
+    assert sorted(r.outcome for r in again) == ["reached"] * 3
+    assert "1 of 3 scenes are known" in told[0]
+    monkeypatch.setattr(campaign, "environment", lambda: {"python": "y"})
+    anew = campaign.play_all(few, store, told.append)
+    assert [r.iterations for r in anew] == [r.iterations for r in whole]
+
+
+def test_long_cases_come_from_the_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run without them shows the kept run, with its own date; a run of them replaces it."""
+    few = campaign.scenes(2)
+    monkeypatch.setattr(campaign, "QUICK_SCENES", 2)
+    run(["campaign"], tmp_path / "long", quick=True)
+    (tmp_path / "records").mkdir()
+    kept = tmp_path / "records" / "campaign.json"
+    kept.write_text((tmp_path / "long" / "checks.json").read_text().replace('"2 random scenes"', '"kept"'))
+    monkeypatch.setattr(runner, "RECORDS", tmp_path / "records")
+    data = run(["shear_calibration"], tmp_path / "short")
+    assert [info["name"] for info in data["cases"]] == ["shear_calibration"]
+    stored = json.loads((tmp_path / "short" / "checks.json").read_text())
+    titles = {info["name"]: info["title"] for info in stored["cases"]}
+    assert titles["campaign"] == "kept"
+    run(["campaign"], tmp_path / "short", quick=True)
+    stored = json.loads((tmp_path / "short" / "checks.json").read_text())
+    assert [i["title"] for i in stored["cases"] if i["name"] == "campaign"] == [f"{len(few)} random scenes"]

@@ -1,0 +1,46 @@
+"""Why a step could not go on, said by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bh.solvers.increments import Increment
+from bh.solvers.matrices import IndefiniteError
+from bh.solvers.stability import lowest_mode
+from bh.solvers.system import System
+
+FREE = 1e-11  # stiffness of a motion, in parts of the largest, that is rounding
+
+
+def diagnose(system: System, failure: Increment) -> Increment:
+    """A failed increment with the outcome that names its reason, where the last state tells it.
+
+    In this order: what the system itself sees (contact of panels, loads that turn a free sheet), a motion without
+    stiffness ("mechanism"), and what the strategy has found ("limit-point", "bifurcation", "stalled").
+    """
+    here = failure.point
+    outcome, reason = system.obstacle(here.q, here.lam)
+    if outcome:
+        return replace(failure, outcome=outcome, note=f"{reason}; {failure.note}")
+    if failure.outcome != "stalled":
+        return failure
+    motion = free_motion(system, failure)
+    if motion:
+        return replace(failure, outcome="mechanism", note=f"{motion} without resistance; {failure.note}")
+    return failure
+
+
+def free_motion(system: System, failure: Increment) -> str:
+    """The motion of the last state that nothing resists, in words, or an empty string."""
+    here = failure.point
+    matrix = system.tangent(here.q, here.lam, here.forces)
+    try:
+        stiffness, mode = lowest_mode(matrix, system.size, system.primal)
+    except IndefiniteError:
+        return ""
+    rng = np.random.default_rng(3)
+    probe = np.concatenate((rng.normal(size=system.primal), np.zeros(system.size - system.primal)))
+    typical = float(np.linalg.norm((matrix @ probe)[: system.primal]) / np.linalg.norm(probe))
+    return system.describe(here.q, here.lam, mode) if stiffness < FREE * typical else ""

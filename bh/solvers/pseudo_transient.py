@@ -1,0 +1,63 @@
+"""Pseudo-transient continuation: follow a damped motion to rest, in ever longer steps (Kelley and Keyes 1998)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.solvers.matrices import IndefiniteError
+from bh.solvers.system import Evaluation, System
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PseudoTransient:
+    """Implicit Euler steps of D dq/dt = - d merit / dq, with D the diagonal of the tangent.
+
+    A long step is one of Newton's method, a short one follows the steepest descent in the norm of D. The step grows as
+    the residual falls (switched evolution relaxation) and is halved where the merit rises or the shifted tangent is
+    not definite; so it creeps through narrow curved valleys in which a line search comes to a stop.
+
+    Attributes:
+        shift: first 1 / time step.
+        most: steps before giving up.
+    """
+
+    shift: float = 1.0
+    most: int = 200
+    largest: float = 1e8
+
+    def relax(self, system: System, q: Array, lam: float, tolerance: float) -> tuple[Array, Evaluation, int]:
+        """State, its evaluation and the number of steps taken; at rest where the imbalance is within `tolerance`."""
+        p = system.primal
+        now = system.evaluate(q, lam)
+        shift, steps = self.shift, 0
+        for _ in range(4 * self.most):
+            if now.imbalance <= tolerance or steps >= self.most or shift > self.largest:
+                break
+            try:
+                # below rounding there is nothing to damp, and the last steps are Newton's
+                factor = system.tangent(q, lam, now.forces).factorise(shift if shift > 1e-11 else 0.0)
+            except IndefiniteError:
+                shift = max(4.0 * shift, 1e-9)
+                continue
+            dq, _ = factor.descend(now.residual)
+            trial = q.copy()
+            trial[:p] += dq[:p]
+            held = system.evaluate(trial, lam)
+            noise = 1e-12 * max(abs(now.merit), abs(held.merit))
+            if not (np.isfinite(held.energy) and held.merit <= now.merit + noise):
+                shift = max(4.0 * shift, 1e-9)
+                continue
+            there = held
+            if len(q) > p:
+                trial[p:] += dq[p:]
+                there = system.evaluate(trial, lam)
+            steps += 1
+            ratio = there.imbalance / now.imbalance
+            shift *= min(2.0, max(0.1, ratio))
+            q, now = trial, there
+        return q, now, steps
