@@ -96,18 +96,35 @@ class SparseMatrix:
     pattern: SparsePattern
 
     @classmethod
-    def of(cls, matrix: sp.sparray) -> SparseMatrix:
-        """From any symmetric matrix (n, n), both triangles given."""
+    def of(cls, matrix: sp.sparray, pattern: SparsePattern | None = None) -> SparseMatrix:
+        """From any symmetric matrix (n, n), both triangles given; `pattern` is that of an earlier one with its entries.
+
+        Raises:
+            ValueError: the matrix has other entries than the pattern.
+        """
         n = matrix.shape[0]
         entries = sp.coo_array(matrix)
-        off = entries.row > entries.col
-        keys = np.unique(entries.row[off].astype(np.int64) * n + entries.col[off])
-        pattern, _ = SparsePattern.dissected(
-            keys // n, keys % n, np.ones(n, dtype=np.int64), None, lambda o: o
-        )
-        permuted = sp.csc_array(sp.csc_array(matrix)[pattern.order][:, pattern.order])
-        columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
-        return cls(np.asarray(permuted[pattern.indices, columns]).ravel().astype(float), pattern)
+        if pattern is None:
+            off = entries.row > entries.col
+            keys = np.unique(entries.row[off].astype(np.int64) * n + entries.col[off])
+            one_each = np.ones(n, dtype=np.int64)
+            pattern, _ = SparsePattern.dissected(keys // n, keys % n, one_each, None, lambda order: order)
+        place = np.empty(n, dtype=np.int64)
+        place[pattern.order] = np.arange(n)
+        rows, columns = place[entries.row], place[entries.col]
+        low = rows >= columns
+        diagonal = np.arange(n)  # always there, if only as a zero
+        lower = sp.coo_array(
+            (
+                np.r_[entries.data[low], np.zeros(n)],
+                (np.r_[rows[low], diagonal], np.r_[columns[low], diagonal]),
+            ),
+            shape=(n, n),
+        ).tocsc()
+        lower.sort_indices()
+        if not np.array_equal(lower.indices, pattern.indices):
+            raise ValueError("the matrix has other entries than its pattern")
+        return cls(np.asarray(lower.data, dtype=float), pattern)
 
     def factorise(self, shift: float = 0.0) -> Factor:
         factor, negative = self._factorise(shift)

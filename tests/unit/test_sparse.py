@@ -168,6 +168,23 @@ def test_singular_is_refused(backend: str) -> None:
         matrix.factorise_any()
 
 
+def test_pattern_of_an_earlier_matrix() -> None:
+    """A matrix with the same entries reuses the analysis; one with other entries is refused."""
+    rng = np.random.default_rng(3)
+    structure = sp.random_array((40, 40), density=0.06, rng=rng)
+    structure = sp.csc_array(structure + structure.T + sp.eye_array(40))
+    first = SparseMatrix.of(20.0 * sp.eye_array(40) + structure)
+    other = sp.csc_array(structure, copy=True)
+    other.data = other.data**2
+    other = other + 30.0 * sp.eye_array(40)
+    second = SparseMatrix.of(other, first.pattern)
+    assert second.pattern is first.pattern
+    b = rng.normal(size=40)
+    assert np.allclose(other @ second.factorise().solve(b), b, atol=1e-12)
+    with pytest.raises(ValueError, match="other entries"):
+        SparseMatrix.of(sp.eye_array(40), first.pattern)
+
+
 # --------------------------------------------------------------------------------------- PARDISO alone
 
 
