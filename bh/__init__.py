@@ -33,7 +33,7 @@ _HOME = {
     "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
 }  # fmt: skip
 
-_SUBMODULES = ("plotting",)
+_SUBMODULES = {"contact": "bh.analysis.contact", "plotting": "bh.plotting"}
 
 __all__ = [
     "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
@@ -50,7 +50,7 @@ def __getattr__(name: str) -> Any:
         globals()[name] = value
         return value
     if name in _SUBMODULES:
-        return import_module(f"bh.{name}")
+        return import_module(_SUBMODULES[name])
     if name == "__version__":
         from importlib.metadata import version
 

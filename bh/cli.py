@@ -23,6 +23,7 @@ except KeyboardInterrupt:  # `main` tells of it from here on
     raise SystemExit(130) from None
 
 if TYPE_CHECKING:
+    from bh.analysis.contact import Contact
     from bh.path import Path as Trace
     from bh.scene import Scene
 
@@ -121,7 +122,7 @@ def run(
     loaded = load_scene(scene)
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
-        path, names, before = solve(loaded, folder, resume=resume, progress=not quiet)
+        path, names, before, contact = solve(loaded, folder, resume=resume, progress=not quiet)
     except KeyboardInterrupt:
         again = shlex.join(["bh", "run", str(scene), "-o", str(folder), "--resume"])
         raise _InterruptedError(
@@ -139,7 +140,7 @@ def run(
             ) from error
         written.append(folder / name)
     if not quiet:
-        _summary(path, loaded, written)
+        _summary(path, loaded, written, contact)
     if path.outcome != "reached":
         why = f" ({path.reason})" if path.reason else ""
         kept = "; the finished result of an earlier run is kept" if names == UNFINISHED else ""
@@ -228,7 +229,7 @@ def _proxy(entry: EntryPoint) -> Callable[[typer.Context], Any]:
 _add_commands()
 
 
-def _summary(path: Trace, scene: Scene, written: Sequence[Path]) -> None:
+def _summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact | None) -> None:
     from math import degrees
 
     from bh.formulations import takes_nu
@@ -257,6 +258,10 @@ def _summary(path: Trace, scene: Scene, written: Sequence[Path]) -> None:
         )
     if len(creases) > 6:
         typer.echo(f"and {len(creases) - 6} more creases")
+    if contact is None:
+        typer.echo("self-contact: none")
+    else:
+        typer.echo(f"self-contact (reported, not prevented), first in {contact}")
     typer.echo("files: " + " ".join(str(file) for file in written))
 
 

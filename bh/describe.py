@@ -42,6 +42,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
     data = {
         "format": FORMAT,
         "formulation": model.formulation,
+        "hinge_lock": model.hinge_lock,
         "green": model.stiffness is not None and model.stiffness.green,
         "sheet": _plain(model.sheet),
         "mesh": {
@@ -88,6 +89,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             stiffness=ElementStiffness(arrays["stiffness/bars"], arrays["stiffness/hinges"], data["green"])
             if "stiffness/bars" in arrays
             else None,
+            hinge_lock=data.get("hinge_lock", False),  # files of versions that had no lock
         )
     except (KeyError, TypeError) as missing:
         raise PathFileError(f"the stored model is incomplete ({missing}); solve again") from missing

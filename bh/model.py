@@ -112,6 +112,8 @@ class Model:
         creases: laws of spring creases. A crease with no law and no fold is ordinary sheet.
         formulation: name of a registered formulation.
         stiffness: given element stiffness (bars and hinges only), or None to derive it from the sheet.
+        hinge_lock: bending hinges and spring creases stop before their panels pass through each other (bars and hinges
+            only): stiffening without bound within the last 2 degrees before 0 and 2 pi, nothing elsewhere.
     """
 
     mesh: SheetMesh
@@ -121,6 +123,7 @@ class Model:
     creases: Mapping[str, CreaseLaw] = field(default_factory=dict)
     formulation: str = "bars-and-hinges"
     stiffness: ElementStiffness | None = None
+    hinge_lock: bool = True
 
     def __post_init__(self) -> None:
         for name, kind, how in (
@@ -135,6 +138,8 @@ class Model:
                 raise ModelError(
                     f"the {name} of a model is {what}; give bh.Model(mesh, sheet) {how} as {name}"
                 )
+        if not isinstance(self.hinge_lock, bool):
+            raise ModelError(f"hinge_lock = {self.hinge_lock!r} cannot be; give True or False")
 
     def __repr__(self) -> str:
         """One line: "Model(384 triangles, 1 crease, 4 supports, 1 step, bars-and-hinges)"."""
@@ -180,7 +185,10 @@ class Model:
         k_fold = _on_edges(mesh, "folding hinges", folding_hinges, folding_stiffness)
         creased = np.flatnonzero(~np.isnan(k_fold))
         k_hinge = np.nan_to_num(np.where(np.isnan(k_fold), k_bend, k_fold))[topology.hinge_edges]
-        mesh = replace(mesh, edge_sets={"crease:fold": topology.edges[creased]}, folds={"fold": "mountain"})
+        if len(creased):  # an empty crease could be neither folded nor drawn
+            mesh = replace(
+                mesh, edge_sets={"crease:fold": topology.edges[creased]}, folds={"fold": "mountain"}
+            )
         # the sheet only sets the scale of forces here; a mean bar stiffness stands for E t
         model = cls(
             mesh, Sheet(E=float(np.mean(k_bar)), t=1.0), stiffness=ElementStiffness(k_bar, k_hinge, green)

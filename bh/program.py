@@ -227,6 +227,18 @@ def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:
     return found[found >= 0]
 
 
+def hinge_name(mesh: SheetMesh, hinge: int) -> str:
+    """A row of `mesh.topology.hinges` in words: "crease 'NAME' (edge 3-7)", or "edge 3-7" off creases.
+
+    Where several names share the edge (FOLD files name all mountains, and each chain of them) it is the shortest one.
+    """
+    a, b = mesh.topology.hinges[hinge, 1:3].tolist()
+    on = [name for name in mesh.creases if hinge in crease_hinges(mesh, name)]
+    if not on:
+        return f"edge {a}-{b}"
+    return f"crease '{min(on, key=lambda name: len(mesh.crease_edges(name)))}' (edge {a}-{b})"
+
+
 def _edge_hinges(mesh: SheetMesh, crease: str) -> Ints:
     """Hinge of every edge of a crease, in order; -1 where the edge lies on the boundary."""
     topology = mesh.topology

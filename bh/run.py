@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bh.analysis.contact import Contact, first_contact
 from bh.describe import fingerprint
 from bh.errors import InputError
 from bh.model import Model
@@ -30,11 +31,12 @@ FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "resul
 
 
 class Solved(NamedTuple):
-    """A path, the names of the files that hold it and its result, and whether it had been finished before."""
+    """A path, the names of its files, whether it had been finished before, and its first self-contact if any."""
 
     path: Trace
     names: tuple[str, str]
     before: bool
+    contact: Contact | None
 
 
 def solve(
@@ -69,7 +71,8 @@ def solve(
         if names == UNFINISHED:
             _move(file, folder / FINISHED[0])
         names = FINISHED
-    text = json.dumps(result(path, scene), indent=2, allow_nan=False) + "\n"
+    contact = first_contact(path)
+    text = json.dumps(result(path, scene, contact), indent=2, allow_nan=False) + "\n"
     with replacing(folder / names[1]) as draft:
         draft.write_text(text, encoding="utf-8")
     if not before:
@@ -78,7 +81,7 @@ def solve(
         for name in UNFINISHED:
             (folder / name).unlink(missing_ok=True)
         remove_extras(folder, "-unfinished")
-    return Solved(path, names, before)
+    return Solved(path, names, before, contact)
 
 
 def _is_whole(file: Path, model: Model) -> bool:
@@ -182,8 +185,8 @@ def _move(file: Path, place: Path) -> None:
     os.replace(file, place)
 
 
-def result(path: Trace, scene: Scene) -> dict[str, Any]:
-    """The content of result.json; energies in N mm, angles in rad."""
+def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, Any]:
+    """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact."""
     mesh, last = scene.model.mesh, path[-1]
     folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
     steps = []
@@ -214,11 +217,13 @@ def result(path: Trace, scene: Scene) -> dict[str, Any]:
             for step, c in path.critical_points
         ],
         "energy": {kind: _number(value) for kind, value in last.energy.as_dict().items()},
+        "lock_energy": _number(last.energy.lock),
         "fold_angle": {
             crease: {"mean": _number(a.mean()), "min": _number(a.min()), "max": _number(a.max())}
             for crease, a in folds.items()
             if len(a)
         },
+        "self_contact": _contact(path, contact),
         "steps": steps,
         "iterations": path.iterations,
         "wall_time_s": path.wall_time_s,
@@ -233,6 +238,22 @@ def result(path: Trace, scene: Scene) -> dict[str, Any]:
         "input": path.provenance["input"],
         "scene": str(scene.source),
     }
+
+
+def _contact(path: Trace, contact: Contact | None) -> dict[str, Any]:
+    """Whether the sheet passes through itself, and where first; of very many triangle pairs the first hundred."""
+    found: dict[str, Any] = {"found": contact is not None, "states": len(path)}
+    if contact is not None:
+        found |= {
+            "about": "reported, not prevented: from this state on the sheet passes through itself",
+            "state": contact.state,
+            "step": contact.step,
+            "lambda": contact.lam,
+            "panels": [list(pair) for pair in contact.panels],
+            "triangle_pairs": len(contact.triangles),
+            "triangles": contact.triangles[:100].tolist(),
+        }
+    return found
 
 
 def _number(value: float) -> float | None:

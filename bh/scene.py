@@ -134,7 +134,8 @@ def _scene(text: str, folder: Path) -> Scene:
         if key not in data:
             raise SceneError(f"{key} is missing; add a table {'[[steps]]' if key == 'steps' else f'[{key}]'}")
     sheet = read_table(SheetTable, data["sheet"], "sheet")
-    name = _formulation(read_table(ModelTable, data.get("model", {}), "model").formulation)
+    how = read_table(ModelTable, data.get("model", {}), "model")
+    name = _formulation(how.formulation)
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
@@ -145,6 +146,7 @@ def _scene(text: str, folder: Path) -> Scene:
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
+        hinge_lock=how.hinge_lock,
     )
     _check(model)
     return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold))

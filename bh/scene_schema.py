@@ -128,6 +128,7 @@ class MeshTable(Table):
 
 class ModelTable(Table):
     formulation: str = Field("bars-and-hinges", description="a name that `bh formulations` lists")
+    hinge_lock: bool = Field(True, description="true or false")
 
 
 class OutputsTable(Table):

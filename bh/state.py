@@ -16,17 +16,26 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Energy:
-    """Elastic energy by kind, N mm (Eq. 3.1): bars, bending hinges, spring creases."""
+    """Elastic energy by kind, N mm (Eq. 3.1): bars, bending hinges, spring creases.
+
+    Attributes:
+        lock: what the locks of hinges hold that are about to close (`Model.hinge_lock`), zero otherwise. It is no part
+            of the theory and of none of the others, but of what the actuation has done as work:
+            work = change of (total + lock).
+    """
 
     stretching: float
     bending: float
     folding: float
+    lock: float = 0.0
 
     @property
     def total(self) -> float:
+        """Elastic energy of the sheet without the locks, N mm (Eq. 3.1)."""
         return self.stretching + self.bending + self.folding
 
     def as_dict(self) -> dict[str, float]:
+        """Elastic energies by kind and their total, N mm."""
         return {
             "stretching": self.stretching,
             "bending": self.bending,
@@ -44,11 +53,12 @@ class State:
         step: index of the step, from 0; `lam` its control parameter in [0, 1].
         points: (n, 3) node positions, mm.
         energy: elastic energies, N mm.
-        dihedral_angles: (m,) at every hinge of `mesh.topology.hinges`, rad in [0, 2 pi).
+        dihedral_angles: (m,) at every hinge of `mesh.topology.hinges`, rad in [0, 2 pi]; a closed one reads 0 or 2 pi.
         energy_density: by kind ("stretching", "bending", "folding") energy an area of each triangle, N mm / mm^2.
         reactions: (n, 3) forces that supports exert on the sheet, N; zero at free nodes.
         crease_moments: (m,) moment a length carried by each crease hinge, N mm / mm, nan off creases; positive
-            where it works to open the dihedral angle below the sheet against the crease.
+            where it works to open the dihedral angle below the sheet against the crease. Near closed with what the
+            lock carries (`Model.hinge_lock`).
         stable: True if the tangent is positive definite there (False: not, None: not known).
     """
 

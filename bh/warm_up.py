@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 import meshes
+from bh.analysis.contact import candidates
+from bh.analysis.triangles import intersecting
 from bh.model import Model, Sheet
 from bh.path import Path, trace
 from bh.solvers.linear import linear_response
@@ -15,6 +17,8 @@ def warm_up() -> None:
     mesh = meshes.structured(meshes.annulus_sector(10.0, 1.0, 0.3), along=2)
     sheet = Model(mesh, Sheet(E=1.0, t=0.1))
     path = trace(sheet.fold("crease", to=math.pi - 0.1))
+    triangles = mesh.triangles
+    intersecting(path[-1].points, triangles, candidates(path[-1].points, triangles), 1e-9)
     trace(
         sheet.support("edge:start", "xyz")
         .support("edge:end", [[0.0, 1.0, 1.0]])

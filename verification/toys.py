@@ -91,6 +91,9 @@ class VonMisesTruss:
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         return ""
 
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        return ""
+
     def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
         return "", ""
 

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.mechanics.hinge_lock import in_zone, lock
 from bh.mechanics.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
 from bh.mechanics.pattern import Pattern as Pattern
 from bh.mechanics.pattern import build_pattern as build_pattern
@@ -24,11 +25,13 @@ def elongation(length, rest_length, green):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def nodal_forces(x, bars, rest_length, k_bar, green, hinges, k_hinge, rest, couple, f, s_bar, s_hinge, turns):  # type: ignore[no-untyped-def]
+def nodal_forces(  # type: ignore[no-untyped-def]
+    x, bars, rest_length, k_bar, green, hinges, k_hinge, k_lock, rest, couple, f, s_bar, s_hinge, turns
+):
     """Energy (N mm) and the mean size of element forces (N); adds the gradient of the energy to `f` (n, 3).
 
     Writes the force of each bar, k times its elongation (see `elongation`), and the moment of each hinge,
-    k (phi - rest) + couple, with its turn phi - rest.
+    k (phi - rest) + couple, with that of its lock of stiffness `k_lock` (see `hinge_lock`), and its turn phi - rest.
     """
     g = np.empty(12)
     energy, size, count = 0.0, 0.0, 0
@@ -53,9 +56,13 @@ def nodal_forces(x, bars, rest_length, k_bar, green, hinges, k_hinge, rest, coup
         geometry = hinge_geometry(x, hinges[i], g)
         turn = geometry[0] - rest[i]
         s = k_hinge[i] * turn + couple[i]
-        s_hinge[i] = s
         turns[i] = turn
         energy += (0.5 * k_hinge[i] * turn + couple[i]) * turn
+        if in_zone(geometry[0]):
+            more, moment, _ = lock(geometry[0], k_lock[i])
+            energy += more
+            s += moment
+        s_hinge[i] = s
         size += s * s * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
         for p in range(4):
             node = hinges[i, p]
@@ -145,6 +152,7 @@ def tangent_values(  # type: ignore[no-untyped-def]
     bar_slots,
     hinges,
     k_hinge,
+    k_lock,
     s_hinge,
     hinge_slots,
     frame_of,
@@ -152,8 +160,12 @@ def tangent_values(  # type: ignore[no-untyped-def]
     data,
     d_bar,
     g_hinge,
+    k_tangent,
 ):
-    """Add the tangent, k g g^T + s Hessian of every element, to `data`; writes the gradients of all measures."""
+    """Add the tangent, k g g^T + s Hessian of every element, to `data`.
+
+    Writes the gradients of all measures, and the stiffness of every hinge with that of its lock to `k_tangent`.
+    """
     H = np.zeros((12, 12))
     B = np.zeros((6, 6))
     turned = len(frames) > 0
@@ -166,9 +178,13 @@ def tangent_values(  # type: ignore[no-untyped-def]
     for i in range(len(hinges)):
         g = g_hinge[i]
         geometry = hinge_geometry(x, hinges[i], g)
+        k = k_hinge[i]
+        if in_zone(geometry[0]):
+            k += lock(geometry[0], k_lock[i])[2]
+        k_tangent[i] = k
         for p in range(12):
             for q in range(p + 1):
-                H[p, q] = k_hinge[i] * g[p] * g[q]
+                H[p, q] = k * g[p] * g[q]
         add_hinge_hessian(geometry, s_hinge[i], H)
         if turned:
             _rotate(H, hinges[i], frame_of, frames)
@@ -176,7 +192,7 @@ def tangent_values(  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge, s_hinge, out):  # type: ignore[no-untyped-def]
+def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge, k_lock, s_hinge, out):  # type: ignore[no-untyped-def]
     """Add tangent times v (n, 3) to out (n, 3), all in global axes and with no support left out."""
     H = np.zeros((12, 12))
     B = np.zeros((6, 6))
@@ -186,9 +202,12 @@ def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge,
         _multiply(B, bars[i], v, out)
     for i in range(len(hinges)):
         geometry = hinge_geometry(x, hinges[i], g)
+        k = k_hinge[i]
+        if in_zone(geometry[0]):
+            k += lock(geometry[0], k_lock[i])[2]
         for p in range(12):
             for q in range(p + 1):
-                H[p, q] = k_hinge[i] * g[p] * g[q]
+                H[p, q] = k * g[p] * g[q]
         add_hinge_hessian(geometry, s_hinge[i], H)
         _multiply(H, hinges[i], v, out)
 
@@ -204,8 +223,11 @@ def _multiply(H, nodes, v, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def predicted_forces(bars, k_bar, s_bar, d_bar, hinges, k_hinge, s_hinge, g_hinge, u, out_bar, out_hinge):  # type: ignore[no-untyped-def]
-    """Element forces that the last tangent predicts for the displacement increment u (n, 3)."""
+def predicted_forces(bars, k_bar, s_bar, d_bar, hinges, k_tangent, s_hinge, g_hinge, u, out_bar, out_hinge):  # type: ignore[no-untyped-def]
+    """Element forces that the last tangent predicts for the displacement increment u (n, 3).
+
+    `d_bar`, `g_hinge` and `k_tangent` are what `tangent_values` wrote.
+    """
     for i in range(len(bars)):
         a, b = bars[i, 0], bars[i, 1]
         stretch = 0.0
@@ -216,4 +238,4 @@ def predicted_forces(bars, k_bar, s_bar, d_bar, hinges, k_hinge, s_hinge, g_hing
         turn = 0.0
         for p in range(12):
             turn += g_hinge[i, p] * u[hinges[i, p // 3], p % 3]
-        out_hinge[i] = s_hinge[i] + k_hinge[i] * turn
+        out_hinge[i] = s_hinge[i] + k_tangent[i] * turn

@@ -18,10 +18,11 @@ from bh.mechanics.assembly import (
     tangent_values,
 )
 from bh.mechanics.elements import sheet_elements
+from bh.mechanics.hinge_lock import ZONE, until_closed
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.motions import describe_motion
 from bh.model import Model
-from bh.program import StepProgram
+from bh.program import StepProgram, hinge_name
 from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
@@ -71,6 +72,7 @@ class BarsAndHingesSystem:
         self._moments_start = moments
         self._d_bar = np.empty((len(self.elements.bars), 3))
         self._g_hinge = np.empty((len(self.elements.hinges), 12))
+        self._k_hinge = np.empty(len(self.elements.hinges))  # with the locks, as of the last tangent
         if self.constraints.rigid_body:
             self._check_balance()
 
@@ -169,7 +171,7 @@ class BarsAndHingesSystem:
         turn = np.empty(len(e.hinges))
         forces = np.empty(len(e.bars) + len(e.hinges))
         energy, size = nodal_forces(
-            x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, e.hinge_stiffness,
+            x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, e.hinge_stiffness, e.lock,
             e.rest.at(lam), self.couple(q, lam), f, forces[: len(e.bars)], forces[len(e.bars) :], turn,
         )  # fmt: skip
         return energy, size, f, forces, turn
@@ -188,8 +190,8 @@ class BarsAndHingesSystem:
         data = np.zeros(pattern.size)
         tangent_values(
             x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0],
-            e.hinges, self._augmented_stiffness, forces[bars:],
-            pattern.slots[1], self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge,
+            e.hinges, self._augmented_stiffness, e.lock, forces[bars:], pattern.slots[1],
+            self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge, self._k_hinge,
         )  # fmt: skip
         matrix: Matrix
         if self.constraints.rigid_body:
@@ -209,7 +211,7 @@ class BarsAndHingesSystem:
         local.ravel()[self.free] = dq[: self.primal]
         out = np.empty_like(forces)
         predicted_forces(
-            e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, e.hinge_stiffness, forces[bars:],
+            e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, self._k_hinge, forces[bars:],
             self._g_hinge, self.to_global(local), out[:bars], out[bars:],
         )  # fmt: skip
         if e.held:
@@ -237,8 +239,9 @@ class BarsAndHingesSystem:
     def power(self, q: Array, lam: float) -> float:
         e = self.elements
         x = self.positions(q, lam)
-        _, _, f, forces, turn = self.internal_forces(x, q, lam)
-        total = float(e.couple.rate @ turn - forces[len(e.bars) :] @ e.rest.rate)
+        _, _, f, _, turn = self.internal_forces(x, q, lam)
+        moment = e.hinge_stiffness * turn + self.couple(q, lam)  # without the lock, which knows no rest angle
+        total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.reference))
         unbalanced = self.to_local(f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.prescribed_rate))
@@ -264,18 +267,21 @@ class BarsAndHingesSystem:
         out = np.zeros_like(x)
         tangent_times(
             x, v, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars],
-            e.hinges, e.hinge_stiffness, forces[bars:], out,
+            e.hinges, e.hinge_stiffness, e.lock, forces[bars:], out,
         )  # fmt: skip
         return out
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        e = self.elements
-        before = dihedral_angles(self.positions(q, lam), e.hinges)
-        after = dihedral_angles(self.positions(q_new, lam_new), e.hinges)
-        turn = float(np.abs(after - before).max(initial=0.0))
+        through = self.crossing(q, lam, q_new, lam_new)
+        if through:
+            return through
+        turn = float(np.abs(self._angles(q_new, lam_new) - self._angles(q, lam)).max(initial=0.0))
         return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
 
     def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        touching = self.contact(q, lam)
+        if touching:
+            return "contact", touching
         if not self.constraints.rigid_body or not (self.force.start.any() or self.force.end.any()):
             return "", ""
         # an accepted state is in equilibrium; do the forces stay so a little further along the path?
@@ -300,6 +306,39 @@ class BarsAndHingesSystem:
         local = np.zeros_like(self.reference)
         local.ravel()[self.free] = motion[: self.primal]
         return describe_motion(self.mesh, self.positions(q, lam), self.to_global(local))
+
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Which panels passed through each other at a hinge between two states, or an empty string.
+
+        Angles are known modulo a turn, so a hinge that passes 0 or 2 pi is seen to jump by nearly a turn; it counts as
+        passed where the way through closed is the shorter one (a jump by more than pi).
+        """
+        jump = np.abs(self._angles(q_new, lam_new) - self._angles(q, lam))
+        if jump.max(initial=0.0) <= np.pi:
+            return ""
+        return f"{self._panels(int(np.argmax(jump)))} would pass through each other"
+
+    def contact(self, q: Array, lam: float) -> str:
+        """Which panels have met at a hinge (within `hinge_lock.ZONE` of closed), or an empty string.
+
+        Names the hinge that is nearest to 0 or 2 pi. Held creases are not asked, they follow their angle; nor are
+        hinges that are made closed. Where a path cannot go on, this tells whether contact is the reason, with the lock
+        or without.
+        """
+        e = self.elements
+        left = until_closed(self._angles(q, lam))
+        left[until_closed(dihedral_angles(self.reference, e.hinges)) < ZONE] = np.inf
+        left = left[: e.bending + e.spring]
+        if len(left) == 0 or left.min() >= ZONE:
+            return ""
+        nearest = int(np.argmin(left))
+        return f"{self._panels(nearest)} touch ({np.degrees(left[nearest]):.2g} degrees from closed)"
+
+    def _angles(self, q: Array, lam: float) -> Array:
+        return dihedral_angles(self.positions(q, lam), self.elements.hinges)
+
+    def _panels(self, hinge: int) -> str:
+        return f"the panels at {hinge_name(self.mesh, int(self.elements.source[hinge]))}"
 
     # ------------------------------------------------------------------------------- pattern, grounding, constraints
 

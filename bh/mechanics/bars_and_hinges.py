@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
+from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
 from bh.program import StepProgram
@@ -47,6 +48,7 @@ class BarsAndHinges:
         bend = slice(0, e.bending)
         spring = slice(e.bending, e.bending + e.spring)
         by_hinge = 0.5 * e.hinge_stiffness * turn**2
+        by_lock = lock_terms(phi, e.lock)[:, 0].sum()
         density = {
             "stretching": _to_triangles(model, stretch, np.arange(len(e.bars))),
             "bending": _to_triangles(model, by_hinge[bend], mesh.topology.hinge_edges[e.source[bend]]),
@@ -64,7 +66,9 @@ class BarsAndHinges:
         reactions[system.constraints.fixed] = local[system.constraints.fixed]
         return State(
             mesh=mesh, step=step, lam=lam, points=x,
-            energy=Energy(float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum())),
+            energy=Energy(
+                float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum()), float(by_lock)
+            ),
             dihedral_angles=angles, energy_density=density, reactions=system.to_global(reactions),
             crease_moments=moments, stable=stable,
         )  # fmt: skip

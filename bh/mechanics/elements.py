@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.actuation import Ramp
+from bh.mechanics.hinge_lock import ZONE, lock_terms, until_closed
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness, sheet_bars
 from bh.model import Model
@@ -22,8 +23,9 @@ PENALTY = 300.0  # of a held crease, in parts of E t h^2 with h the height of it
 class Elements:
     """Element arrays of one step. Hinges are ordered: bending, spring creases, held creases.
 
-    `source` (h,) is the row of `mesh.topology.hinges` of each hinge. Held creases have no stiffness (their moment is a
-    multiplier); `penalty` (held,) is their weight in the augmented tangent, N mm / rad.
+    `source` (h,) is the row of `mesh.topology.hinges` of each hinge, `lock` (h,) the stiffness of its lock. Held
+    creases have no stiffness (their moment is a multiplier); `penalty` (held,) is their weight in the tangent,
+    N mm / rad.
     """
 
     bars: Ints
@@ -32,6 +34,7 @@ class Elements:
     hinges: Ints
     source: Ints
     hinge_stiffness: Array
+    lock: Array
     rest: Ramp
     couple: Ramp
     bending: int
@@ -67,14 +70,17 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
     # augmentation well above what the bars give a wing
     gamma = PENALTY * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
     stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], 0.0)
+    lock = _lock_stiffness(model, program, stiffness, k_bend, reference)
     held_from = np.where(np.isnan(program.held.start), held_start, program.held.start)
     law = program.law[source]
 
     def ramp(bend: Array, spring: Array, held: Array) -> Array:
         return np.where(law == SHEET, bend[source], np.where(law == SPRING, spring[source], held[source]))
 
+    # a released crease begins with the moment that it has; what its lock takes of it is not the spring's
+    of_spring = moment_start - lock_terms(held_start, lock)[:, 1]
     rest_from = np.where(
-        np.isnan(program.rest.start), held_start - moment_start / _nonzero(k_fold), program.rest.start
+        np.isnan(program.rest.start), held_start - of_spring / _nonzero(k_fold), program.rest.start
     )
     rest = Ramp(ramp(reference, rest_from, held_from), ramp(reference, program.rest.end, program.held.end))
     scale = np.where(law == HELD, 0.0, hinge_length[source])
@@ -82,10 +88,27 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
     return Elements(
         bars=topology.edges, bar_length=lengths, bar_stiffness=k_bar,
         hinges=np.ascontiguousarray(topology.hinges[source]), source=source,
-        hinge_stiffness=stiffness[source], rest=rest, couple=couple,
+        hinge_stiffness=stiffness[source], lock=lock[source], rest=rest, couple=couple,
         bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]), penalty=gamma[groups[2]],
         green=model.stiffness is not None and model.stiffness.green,
     )  # fmt: skip
+
+
+def _lock_stiffness(
+    model: Model, program: StepProgram, stiffness: Array, sheet: Array, reference: Array
+) -> Array:
+    """(m,) stiffness of the locks, N mm / rad: the hinge's own, or the sheet's at that edge where it is larger.
+
+    So a soft crease stops as hard as the sheet beside it. `sheet` (m,) is Eq. 3.11 for all edges; where stiffness is
+    given, the mean of all hinges stands for it. Held creases follow their angle exactly and have none, and neither
+    have hinges that are made closed (their `reference` angle, rad, lies in the zone).
+    """
+    if not model.hinge_lock or len(stiffness) == 0:
+        return np.zeros_like(stiffness)
+    if model.stiffness is not None:
+        sheet = np.full_like(stiffness, model.stiffness.hinges.mean())
+    without = (program.law == HELD) | (until_closed(reference) < ZONE)
+    return np.where(without, 0.0, np.maximum(stiffness, sheet))
 
 
 def _nonzero(stiffness: Array) -> Array:

@@ -5,7 +5,7 @@ m the unit normal (up when a lies to the left of j -> k), u the unit vector in t
 h the height of the wing and s the foot of the wing along the edge (0 at j, 1 at k), the dihedral angle measured
 below the sheet is
 
-    phi = pi - atan2(e . (m_a x m_b), m_a . m_b)            exact at flat, in [0, 2 pi)
+    phi = pi - atan2(e . (m_a x m_b), m_a . m_b)            exact at flat, in [0, 2 pi]
 
     d phi / d x_wing = m / h
     d phi / d x_j = - sum (1 - s) m / h,    d phi / d x_k = - sum s m / h          (sums over both triangles)
@@ -103,7 +103,10 @@ def add_hinge_hessian(geometry, factor, H):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def dihedral_angles(x: Array, hinges: NDArray[np.int64]) -> Array:
-    """(m,) dihedral angles in [0, 2 pi), rad, of (m, 4) hinges at node positions x (n, 3)."""
+    """(m,) dihedral angles in [0, 2 pi], rad, of (m, 4) hinges at node positions x (n, 3).
+
+    A closed hinge reads 0 or 2 pi; which of them is decided by rounding, since both are the same position.
+    """
     phi = np.empty(len(hinges))
     g = np.empty(12)
     for i in range(len(hinges)):

@@ -34,6 +34,7 @@ class LoadControl:
         smallest: part of the step below which an increment gives up.
         work_mismatch: largest relative difference between the energy gained in an increment and the work of the
             actuation (trapezoidal rule); a larger one means that the state jumped to another branch.
+        brisk: cuts of an increment before Newton's careful way is tried.
         at_bifurcation: where the branch loses its stability, go on along the stable branch of lowest energy
             ("stable"), stay on the one that is not stable ("primary"), or end with the outcome "bifurcation" ("stop").
         foresee: hand over as soon as the last states point at a limit point in the next increment, instead of
@@ -48,6 +49,7 @@ class LoadControl:
     smallest: float = 1e-5
     work_mismatch: float = 0.2
     newton: Newton = field(default_factory=Newton)
+    brisk: int = 2
     at_bifurcation: AtBifurcation = "stable"
     foresee: bool = False
 
@@ -87,7 +89,10 @@ class LoadControl:
                 yield Increment(here, "limit-point", iterations, math.nan, step, cuts=tuple(cuts), note=note)
                 return
             q, forces = extrapolate(points, lam)
-            solution = newton.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
+            # a shorter increment is a cheaper remedy than the careful way, but for the start and at the end of patience
+            brisk = len(points) > 1 and len(cuts) < self.brisk
+            method = replace(newton, careful=0) if brisk else newton
+            solution = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
             iterations += solution.iterations
             note, primary = "", solution
             if solution.converged and not solution.stable and self.at_bifurcation == "stable":
@@ -185,8 +190,8 @@ class LoadControl:
         """Why the state that was found is not to be accepted, or an empty string."""
         if not solution.converged:
             return solution.reason
-        if left_saddle:
-            return ""
+        if left_saddle:  # it may have gone far
+            return system.crossing(here.q, here.lam, there.q, there.lam)
         if not solution.stable and self.at_bifurcation == "stable":
             return solution.reason or "unstable"
         turned = system.objection(here.q, here.lam, there.q, there.lam)

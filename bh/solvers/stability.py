@@ -147,14 +147,13 @@ def _critical_point(
     system: System, a: Point, b: Point, left: Point, right: Point, negative: tuple[int, int]
 ) -> CriticalPoint:
     p = system.primal
-    chord = (b.q - a.q)[:p]
-    senses = []
-    for side in (left, right):
-        factor, _ = system.tangent(side.q, side.lam, side.forces).factorise_any()
-        tangent = -factor.solve(system.control_rate(side.q, side.lam))
-        senses.append(float(tangent[:p] @ chord) > 0.0)
     lam, q = 0.5 * (left.lam + right.lam), 0.5 * (left.q + right.q)
     forces = 0.5 * (left.forces + right.forces)
     mode = nearest_mode(system.tangent(q, lam, forces), system.size, p)
-    kind = "limit" if senses[0] is not senses[1] else "bifurcation"
+    # at a limit point the path itself runs along the mode, and the mode does work on the change of the load
+    chord = (b.q - a.q)[:p]
+    along = abs(float(mode[:p] @ chord)) > 0.1 * float(np.linalg.norm(chord))
+    work = mode * system.control_rate(q, lam)
+    loaded = abs(float(work.sum())) > 1e-3 * float(np.abs(work).sum())
+    kind = "limit" if along and loaded else "bifurcation"
     return CriticalPoint(kind, lam, q, mode, negative, 0.5 * abs(right.lam - left.lam))

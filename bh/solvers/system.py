@@ -74,6 +74,10 @@ class System(Protocol):
         """Why an increment from one state to the next is not to be trusted, or an empty string."""
         ...
 
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """What passed through itself between two states, which no increment may, or an empty string."""
+        ...
+
     def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
         """Outcome and reason where the state itself tells why a path ends (contact, ...), else empty strings."""
         ...

@@ -212,6 +212,15 @@ def test_closed_hinge_is_inside_the_turn(seed: int) -> None:
     assert min(phi, 2.0 * math.pi - phi) < 1e-7
 
 
+def test_both_ends_of_the_turn_are_read() -> None:
+    """The interval is closed: rounding turns a closed hinge into 0 or into exactly 2 pi, and both occur."""
+    exactly = np.array([[1.0, 0.5, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.5, 0.0]])
+    assert angle(exactly) in (0.0, 2.0 * math.pi)
+    mountain, valley = exactly.copy(), exactly.copy()
+    mountain[3, 2], valley[3, 2] = -1e-17, 1e-17  # wing b below or above wing a by less than can be resolved
+    assert {angle(mountain), angle(valley)} == {0.0, 2.0 * math.pi}
+
+
 # --------------------------------------------------------------------------------------- derivatives
 
 

@@ -32,10 +32,12 @@ along = 6
 """
 GOOD = SECTOR + '[[steps]]\nfold = { crease = "crease", to = 2.0 }\n'
 TWO_STEPS = GOOD + '[[steps]]\nfold = { crease = "crease", to = 1.0 }\n'
-# a dead couple that ten turns of the soft crease could not balance
+# a dead couple that ten turns of the soft crease could not balance; nothing stops it from closing
 EARLY = (
     SECTOR
     + """
+[model]
+hinge_lock = false
 [creases.crease]
 stiffness = 0.1
 [[steps]]
@@ -68,6 +70,7 @@ def test_run_writes_path_and_result(here, capsys):
     assert data["outcome"] == "reached"
     assert data["reason"] == ""
     assert set(data["energy"]) == {"stretching", "bending", "folding", "total"}
+    assert data["lock_energy"] == 0.0
     assert data["energy"]["total"] == pytest.approx(
         sum(data["energy"][k] for k in ("stretching", "bending", "folding"))
     )
@@ -129,6 +132,14 @@ def test_path_that_ends_early(here, capsys):
     assert err.count("\n") == 1
     assert f"early.toml: step 2 of 3 ended early: {data['outcome']} ({data['reason']})" in err
     assert "out/result.json" in err
+
+
+def test_locked_hinges_let_it_reach_its_end(here, capsys):
+    """The same couple with the default: the panels are pressed against each other."""
+    (here / "locked.toml").write_text(EARLY.replace("hinge_lock = false", "hinge_lock = true"))
+    assert main(["run", "locked.toml", "-o", "out", "--quiet"]) == 0
+    path = Trace.load("out/path.bh")
+    assert max(state.energy.lock for state in path) > 0.0
 
 
 def test_a_finished_result_is_never_lost(here, capsys):

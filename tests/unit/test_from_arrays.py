@@ -99,3 +99,19 @@ def test_arrays_that_do_not_fit(change: dict[str, Any], words: str) -> None:
     with pytest.raises(bh.InputError, match=words) as refused:
         bh.Model.from_arrays(**wrong)
     assert "\n" not in str(refused.value)
+
+
+def test_no_folding_hinges_make_no_crease() -> None:
+    """An empty crease could be neither folded nor drawn."""
+    _, arrays = own_arrays()
+    hinges = np.vstack((arrays["bending_hinges"], arrays["folding_hinges"]))
+    stiffness = np.concatenate((arrays["bending_stiffness"], arrays["folding_stiffness"]))
+    bare = {
+        "bending_hinges": hinges,
+        "bending_stiffness": stiffness,
+        "folding_hinges": [],
+        "folding_stiffness": [],
+    }
+    model = bh.Model.from_arrays(**{**arrays, **bare})
+    assert model.mesh.creases == ()
+    assert not model.mesh.folds

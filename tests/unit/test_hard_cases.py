@@ -12,8 +12,12 @@ from verification.checks import CaseResult
 from verification.hard_cases import STUDIES
 from verification.toys import VonMisesTruss
 
+SLOW = {"assemblages", "random meshes"}  # their parts are tried by test_hard_case_tools.py
 
-@pytest.mark.parametrize("name", STUDIES)
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in STUDIES]
+)
 def test_study(name: str) -> None:
     """Every judged figure of every study holds."""
     failed = [

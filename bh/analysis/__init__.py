@@ -1,0 +1,1 @@
+"""What is read from solved states; public as `bh.contact`."""

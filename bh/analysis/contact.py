@@ -1,0 +1,215 @@
+"""Self-contact: where a sheet passes through itself. It is found and reported, the solver does not prevent it.
+
+Panels that meet at a hinge are kept apart by `Model.hinge_lock`; all others can pass through each other without the
+solver's notice, and states beyond that are no longer those of a real sheet. The sheet is taken as its middle surface,
+without thickness. A state is looked at in three stages, each of which only sees what the one before could not rule out:
+
+1. if all triangles face the same way from some direction and the boundary, seen from there, is that of one region
+   covered once, then so is every point inside, and the sheet cannot meet itself (see `seen_once`);
+2. boxes round the triangles, in the plane of the sheet's largest extent, in an STR tree of shapely;
+3. pairs whose boxes meet are intersected (`bh.analysis.triangles`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.path import Path
+from bh.state import State
+from meshes import SheetMesh
+from meshes.errors import MeshError
+from meshes.topology import Ints, boundary_loops
+
+Array = NDArray[np.float64]
+TOLERANCE = 1e-9  # of the sheet's size: distances and overlaps up to this are touching
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """The parts of a sheet between its creases.
+
+    Attributes:
+        of_triangle: (t,) number of the panel of each triangle, from 0 in the order of the triangles.
+        creases: of each panel the creases that bound it, in the mesh's order.
+    """
+
+    of_triangle: Ints
+    creases: tuple[tuple[str, ...], ...]
+
+    @classmethod
+    def of(cls, mesh: SheetMesh) -> Panels:
+        """Connected parts of the triangles after cutting along all creases.
+
+        An edge with several names counts for the shortest of those creases (FOLD files name all mountains, and each
+        chain of them).
+        """
+        import scipy.sparse as sp
+        from scipy.sparse.csgraph import connected_components
+
+        topology, count = mesh.topology, len(mesh.triangles)
+        names = mesh.creases
+        owner = np.full(len(topology.edges), -1)
+        for k in sorted(range(len(names)), key=lambda k: -len(mesh.crease_edges(names[k]))):
+            owner[topology.find_edges(mesh.crease_edges(names[k]))] = k
+        one, two = topology.edge_triangles.T
+        joined = (two >= 0) & (owner < 0)
+        graph = sp.coo_array((np.ones(joined.sum()), (one[joined], two[joined])), shape=(count, count))
+        labels = connected_components(graph, directed=False)[1].astype(np.int64)
+        # number them in the order of their first triangles
+        rank = np.argsort(np.argsort(np.unique(labels, return_index=True)[1]))
+        labels = rank[labels]
+        bounding: list[set[int]] = [set() for _ in range(labels.max() + 1)]
+        for side in (one, two):
+            at = (owner >= 0) & (side >= 0)
+            for panel, crease in np.unique(np.column_stack((labels[side[at]], owner[at])), axis=0).tolist():
+                bounding[panel].add(crease)
+        return cls(labels, tuple(tuple(names[k] for k in sorted(found)) for found in bounding))
+
+    def name(self, panel: int) -> str:
+        """ "panel 2 (between crease-1 and crease-2)", "panel 0 (at crease)", "panel 0" """
+        creases = self.creases[panel]
+        if not creases:
+            return f"panel {panel}"
+        where = (
+            f"at {creases[0]}"
+            if len(creases) == 1
+            else f"between {', '.join(creases[:-1])} and {creases[-1]}"
+        )
+        return f"panel {panel} ({where})"
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Self-contact in a state of a path.
+
+    Attributes:
+        state: index of the state; `step` and `lam` where that is.
+        triangles: (k, 2) pairs of triangles that intersect, the lower one first.
+        panels: pairs of panels that they belong to, in words, without repetition.
+    """
+
+    state: int
+    step: int
+    lam: float
+    triangles: Ints
+    panels: tuple[tuple[str, str], ...]
+
+    def __str__(self) -> str:
+        """One line: "state 4 (step 0, lambda 0.61), panel 0 (at crease-1) and panel 2 (at crease-2)"."""
+        shown = "; ".join(f"{a} and {b}" if a != b else f"{a} and itself" for a, b in self.panels[:3])
+        more = f"; and {len(self.panels) - 3} more pairs" if len(self.panels) > 3 else ""
+        return f"state {self.state} (step {self.step}, lambda {self.lam:.4g}), {shown}{more}"
+
+
+def self_contact(state: State) -> Ints:
+    """(k, 2) pairs of triangles of a state that intersect, the lower one first, sorted; empty without self-contact.
+
+    Neighbours count where they meet beyond the node or edge that they share: those of a closed hinge lie in one plane.
+    """
+    return _Detector(state.mesh).pairs(state.points)
+
+
+def first_contact(path: Path | Iterable[State]) -> Contact | None:
+    """The first state of a path in which the sheet meets itself, or None.
+
+    Looks at the accepted states only: what happens between two of them is not seen.
+    """
+    detector: _Detector | None = None
+    for index, state in enumerate(path):
+        if detector is None or detector.mesh is not state.mesh:
+            detector = _Detector(state.mesh)
+        pairs = detector.pairs(state.points)
+        if len(pairs):
+            panels = Panels.of(state.mesh)
+            met = np.unique(np.sort(panels.of_triangle[pairs], axis=1), axis=0).tolist()
+            words = tuple((panels.name(a), panels.name(b)) for a, b in met)
+            return Contact(index, state.step, state.lam, pairs, words)
+    return None
+
+
+def seen_once(points: Array, triangles: Ints, loops: Iterable[Ints]) -> bool:
+    """Proof that a connected sheet does not meet itself: from some direction every point of it is seen, and only once.
+
+    If all triangles turn the same side towards the direction (here their mean normal), the projection of the sheet
+    covers every point of the plane as often as its boundary winds round it. If the boundary loops are the shell and the
+    holes of a valid polygon, that is once inside of it, never outside, and in a hole never or twice; the area tells
+    which. The same idea as for the self-collision of cloth (Volino and Magnenat Thalmann 1994).
+
+    Args:
+        points: (n, 3), mm; triangles: (t, 3); loops: boundary loops of node indices.
+
+    Returns:
+        True for a sheet that is proven free of self-contact; False means nothing.
+    """
+    import shapely
+
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    doubled = np.cross(b - a, c - a)
+    mean = doubled.sum(axis=0)
+    size = float(np.linalg.norm(mean))
+    area = np.linalg.norm(doubled, axis=1)
+    if size <= 1e-6 * area.sum():
+        return False
+    towards = doubled @ (mean / size)
+    if (towards <= 1e-6 * area).any():
+        return False
+    axes = np.linalg.svd((mean / size)[None, :])[2][1:]
+    flat = points @ axes.T
+    rings = sorted((shapely.Polygon(flat[loop]) for loop in loops), key=lambda ring: -ring.area)
+    region = shapely.Polygon(rings[0].exterior, [ring.exterior for ring in rings[1:]])
+    return bool(region.is_valid and abs(0.5 * towards.sum() - region.area) <= 1e-9 * region.area)
+
+
+def candidates(points: Array, triangles: Ints, margin: float = 0.0) -> Ints:
+    """(k, 2) pairs of triangles whose boxes, wider by `margin` (mm), meet; the lower one first."""
+    import shapely
+
+    corners = points[triangles]
+    low, high = corners.min(axis=1) - 0.5 * margin, corners.max(axis=1) + 0.5 * margin
+    # the two axes of largest extent tell boxes apart best; the third one is checked afterwards
+    z, x, y = np.argsort(np.ptp(points, axis=0))
+    boxes = shapely.box(low[:, x], low[:, y], high[:, x], high[:, y])
+    one, two = shapely.STRtree(boxes).query(boxes)
+    keep = one < two
+    one, two = one[keep], two[keep]
+    keep = (low[one, z] <= high[two, z]) & (low[two, z] <= high[one, z])
+    return np.column_stack((one[keep], two[keep])).astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Detector:
+    """What can be known of a mesh before its states are looked at."""
+
+    mesh: SheetMesh
+
+    @cached_property
+    def loops(self) -> list[Ints] | None:
+        """Boundary loops of a connected sheet, else None."""
+        import scipy.sparse as sp
+        from scipy.sparse.csgraph import connected_components
+
+        one, two = self.mesh.topology.edge_triangles[self.mesh.topology.hinge_edges].T
+        count = len(self.mesh.triangles)
+        graph = sp.coo_array((np.ones(len(one)), (one, two)), shape=(count, count))
+        if connected_components(graph, directed=False)[0] > 1:
+            return None
+        try:
+            return boundary_loops(self.mesh.topology) or None
+        except MeshError:  # it touches itself at a node
+            return None
+
+    def pairs(self, points: Array) -> Ints:
+        from bh.analysis.triangles import intersecting
+
+        triangles = self.mesh.triangles
+        if self.loops is not None and seen_once(points, triangles, self.loops):
+            return np.empty((0, 2), dtype=np.int64)
+        tolerance = TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
+        found = candidates(points, triangles, tolerance)
+        found = found[intersecting(points, triangles, found, tolerance)]
+        return found[np.lexsort((found[:, 1], found[:, 0]))]
