@@ -14,10 +14,10 @@ export PIP_NO_INPUT := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup libraries report test lint format bench clean distclean
+.PHONY: help setup libraries report test lint format bench bench-table fast clean distclean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 report: setup ## set everything up, then write the report
 	@echo "== Report"
@@ -41,6 +41,12 @@ format: setup ## apply ruff's fixes and formatting
 
 bench: setup ## run the benchmarks
 	@$(PY) -m pytest benchmarks $(PYTEST_ARGS)
+
+bench-table: setup ## measure the table of speeds, docs/performance.md
+	@$(PY) -m benchmarks.table
+
+fast: setup ## add the extra `fast` (pypardiso with MKL, 0.9 GB; x86-64 only)
+	@$(PY) -m pip install -q --no-build-isolation -c requirements.lock -e '.[fast]'
 
 setup: libraries $(VENV)/.warm ## make .venv, install the pinned packages and the project
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from bh.kernel_cache import ensure as _ensure_kernel_cache
+
 if TYPE_CHECKING:
     from bh.actuation import Displace, Fold, Force, Moment
     from bh.errors import InputError, ModelError, PathFileError, SceneError
@@ -38,6 +40,8 @@ __all__ = [
     "InputError", "LoadControl", "Model", "ModelError", "Moment",
     "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "load_scene", "trace",
 ]  # fmt: skip
+
+_ensure_kernel_cache()
 
 
 def __getattr__(name: str) -> Any:

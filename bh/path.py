@@ -26,6 +26,7 @@ from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
 from bh.storage import CriticalRow, PathFile, StateRow, reading
+from bh.threads import one_blas_thread
 from meshes.mesh import count
 
 Array = NDArray[np.float64]
@@ -274,7 +275,8 @@ def trace(
     report = meter(progress)
     try:
         for step in range(len(path.steps), len(model.steps)):
-            end = _run_step(path, step, strategy, report, target)
+            with one_blas_thread():
+                end = _run_step(path, step, strategy, report, target)
             path.steps.append(end)
             if target is not None:
                 target.finish_step(step, *astuple(end))

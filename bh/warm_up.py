@@ -8,7 +8,7 @@ import meshes
 from bh.analysis.contact import candidates
 from bh.analysis.triangles import intersecting
 from bh.model import Model, Sheet
-from bh.path import trace
+from bh.path import Path, trace
 from bh.solvers.linear import linear_response
 
 
@@ -31,6 +31,11 @@ def warm_up() -> None:
     )
     system = trace(displaced)._system(0)
     system.control_rate(system.start(), 0.0)
+    wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
+    system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0))._system(0)
+    now = system.evaluate(system.start(), 0.0)
+    matrix = system.tangent(system.start(), 0.0, now.forces)
+    matrix @ matrix.factorise().solve(now.residual)
 
 
 if __name__ == "__main__":

@@ -21,8 +21,8 @@ DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.program", "bh.scene", "bh.scene_schema",
     "bh.describe", "bh.state", "bh.formulations",
 )  # fmt: skip
-PATH = ("bh.path", "bh.storage", "bh.progress")
-PROTOCOL = ("bh.solvers.matrices", "bh.solvers.saddle", "bh.solvers.system")
+PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
+PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = ("bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.offscreen", "bh.warm_up")
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,
@@ -41,7 +41,19 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
         for top in TOP
     ),
     # the facade: names for type checkers only, see `test_facade_loads_nothing`
-    ("bh", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis", "bh.applications", *TOP)),
+    (
+        "bh",
+        (
+            "meshes",
+            *DESCRIPTION,
+            "bh.solvers",
+            *PATH,
+            "bh.analysis",
+            "bh.applications",
+            *TOP,
+            "bh.kernel_cache",
+        ),
+    ),
     ("fem", ("meshes", "fem", *DESCRIPTION, "bh.solvers", *PATH)),
     ("verification", ("meshes", "bh", "fem", "verification")),
     ("reports", ("meshes", "verification", "reports", "bh.plotting")),
@@ -245,13 +257,19 @@ def test_folding_loads_no_heavy_library() -> None:
 
 
 def test_facade_loads_nothing() -> None:
-    """`bh/__init__.py` imports from the house only for type checkers."""
+    """`bh/__init__.py` imports from the house only for type checkers; and what must run before kernels are defined."""
     body = [
         node
         for node in tree("bh").body
         if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node))
     ]
-    assert not [m for m in imported(ast.Module(body, []), "bh", True, set(FILES)) if m.split(".")[0] in HOUSE]
+    found = {m for m in imported(ast.Module(body, []), "bh", True, set(FILES)) if m.split(".")[0] in HOUSE}
+    assert found == {"bh.kernel_cache"}
+    assert (
+        not {m.split(".")[0] for m in imports_of("bh.kernel_cache")}
+        - set(sys.stdlib_module_names)
+        - {"__future__"}
+    )
 
 
 def test_facade_names_exist() -> None:

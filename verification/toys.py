@@ -75,7 +75,7 @@ class VonMisesTruss:
         k = 2.0 * self.stiffness * (along + (1.0 - rest / length) * (1.0 - along))
         c = self.spring
         K = np.array([[k]]) if c is None else np.array([[k + c, -c], [-c, c]])
-        return SparseMatrix(sp.csc_matrix(K), np.arange(self.size))
+        return SparseMatrix.of(sp.csc_array(K))
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         return forces

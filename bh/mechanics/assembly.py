@@ -1,26 +1,19 @@
-"""Energy, forces and tangent of bars and hinges in one compiled pass each, into a fixed pattern.
-
-The pattern is found once for a step: every entry of every element matrix knows its slot in the values of the band or
-of the sparse matrix, so that assembling is adding.
-"""
+"""Energy, forces and tangent of bars and hinges in one compiled pass each, into a fixed pattern (`pattern`)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
 
 from bh.mechanics.hinge_lock import in_zone, lock
 from bh.mechanics.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
-from bh.solvers.matrices import BandMatrix, SparseMatrix, reverse_cuthill_mckee
+from bh.mechanics.pattern import Pattern as Pattern
+from bh.mechanics.pattern import build_pattern as build_pattern
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @njit(inline="always", **OPTIONS)
@@ -246,134 +239,3 @@ def predicted_forces(bars, k_bar, s_bar, d_bar, hinges, k_tangent, s_hinge, g_hi
         for p in range(12):
             turn += g_hinge[i, p] * u[hinges[i, p // 3], p % 3]
         out_hinge[i] = s_hinge[i] + k_tangent[i] * turn
-
-
-@njit(**OPTIONS)
-def _element_slots(nodes, number, position, stride, slots):  # type: ignore[no-untyped-def]
-    """Keys row + stride * column of the lower entries of every element, or -1 where a unknown is prescribed."""
-    for e in range(len(nodes)):
-        at = 0
-        for i in range(3 * nodes.shape[1]):
-            a = number[nodes[e, i // 3], i % 3]
-            for j in range(i + 1):
-                b = number[nodes[e, j // 3], j % 3]
-                if a < 0 or b < 0:
-                    slots[e, at] = -1
-                else:
-                    row, column = position[a], position[b]
-                    if row < column:
-                        row, column = column, row
-                    slots[e, at] = row + stride * column
-                at += 1
-
-
-@dataclass(frozen=True)
-class Pattern:
-    """Where the entries of all elements go.
-
-    Attributes:
-        order: (n,) permutation of the unknowns, order[k] is the unknown in row k.
-        bandwidth: of the permuted matrix; used if `banded`.
-        slots: one (elements, entries) array for each group of elements.
-        size: number of values.
-    """
-
-    order: Ints
-    bandwidth: int
-    banded: bool
-    slots: tuple[Ints, ...]
-    size: int
-    indices: Ints
-    indptr: Ints
-    both: Ints
-
-    def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
-        n = len(self.order)
-        if self.banded:
-            return BandMatrix(data.reshape((self.bandwidth + 1, n), order="F"), self.order)
-        csc = sp.csc_matrix((data[self.both], self.indices, self.indptr), shape=(n, n))
-        return SparseMatrix(csc, self.order)
-
-
-def band_is_cheaper(n: int, bandwidth: int) -> bool:
-    """Choice between LAPACK's band and SuperLU by their measured costs, unless the band would not fit into memory.
-
-    Seconds on the developers' machine: 2.6e-11 n (b + 1)^2 for the band, 1.5e-7 n^1.45 for SuperLU with its inertia
-    (docs/decisions.md has the table).
-    """
-    fits = 8 * n * (bandwidth + 1) < 2e9
-    return fits and 2.6e-11 * n * (bandwidth + 1.0) ** 2 < 1.5e-7 * n**1.45
-
-
-def build_pattern(number: Ints, groups: tuple[Ints, ...]) -> Pattern:
-    """Pattern of element groups, each (elements, nodes); `number` (n, 3) numbers the unknowns, -1 if prescribed."""
-    n = int(number.max(initial=-1)) + 1
-    rows, columns = _node_pairs(groups)
-    # block pattern of nodes; unknowns of a node stay together
-    nodes = len(number)
-    order_nodes, _ = reverse_cuthill_mckee(rows, columns, nodes)
-    order = number[order_nodes].ravel()
-    order = order[order >= 0]
-    position = np.empty(n, dtype=np.int64)
-    position[order] = np.arange(n)
-    keys: list[Ints] = []
-    for group in groups:
-        width = 3 * group.shape[1]
-        slots = np.empty((len(group), width * (width + 1) // 2), dtype=np.int64)
-        _element_slots(group, number, position, n, slots)
-        keys.append(slots)
-    every = np.concatenate([k.ravel() for k in keys]) if keys else np.zeros(0, dtype=np.int64)
-    every = every[every >= 0]
-    bandwidth = int((every % n - every // n).max(initial=0)) if n else 0
-    if band_is_cheaper(n, bandwidth):
-        slots_band = tuple(np.where(k >= 0, (k % n - k // n) + (k // n) * (bandwidth + 1), -1) for k in keys)
-        empty = np.zeros(0, dtype=np.int64)
-        return Pattern(order, bandwidth, True, slots_band, (bandwidth + 1) * n, empty, empty, empty)
-    return _sparse_pattern(n, order, position, every, keys, bandwidth)
-
-
-def _sparse_pattern(
-    n: int, order: Ints, position: Ints, every: Ints, keys: list[Ints], bandwidth: int
-) -> Pattern:
-    """Compressed lower values and the map to both triangles, in SuperLU's minimum-degree order."""
-    from scipy.sparse.linalg import splu
-
-    unique = np.unique(every)
-    row, column = unique % n, unique // n
-    # fill-reducing order once: factorise a diagonally dominant matrix of this pattern
-    probe = sp.csc_matrix((np.full(len(unique), -1e-3), (row, column)), shape=(n, n))
-    probe = sp.csc_matrix(probe + probe.T + 2.0 * n * sp.eye_array(n))
-    permutation = splu(
-        probe,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True, "Equil": False},
-    ).perm_c.astype(np.int64)
-    # perm_c[old] = new
-    new_row, new_column = permutation[row], permutation[column]
-    new_order = np.empty(n, dtype=np.int64)
-    new_order[permutation] = order
-    low, high = np.maximum(new_row, new_column), np.minimum(new_row, new_column)
-    size = len(unique)
-    off = np.flatnonzero(low != high)
-    all_rows = np.concatenate((low, high[off]))
-    all_columns = np.concatenate((high, low[off]))
-    source = np.concatenate((np.arange(size), off))
-    sorting = np.lexsort((all_rows, all_columns))
-    indptr = np.concatenate(([0], np.cumsum(np.bincount(all_columns, minlength=n))))
-    slots = tuple(np.where(k >= 0, np.searchsorted(unique, np.maximum(k, 0)), -1) for k in keys)
-    return Pattern(
-        new_order, bandwidth, False, slots, size,
-        all_rows[sorting].astype(np.int32), indptr.astype(np.int32), source[sorting],
-    )  # fmt: skip
-
-
-def _node_pairs(groups: tuple[Ints, ...]) -> tuple[Ints, Ints]:
-    rows: list[Any] = []
-    columns: list[Any] = []
-    for group in groups:
-        for i in range(group.shape[1]):
-            for j in range(i):
-                rows.append(group[:, i])
-                columns.append(group[:, j])
-    return np.concatenate(rows), np.concatenate(columns)

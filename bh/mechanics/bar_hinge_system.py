@@ -347,7 +347,7 @@ class BarsAndHingesSystem:
         groups: tuple[Ints, ...] = (self.elements.bars, self.elements.hinges)
         if self.constraints.rigid_body:
             groups += (self.mesh.triangles[self._ground_triangle][None, :],)
-        return build_pattern(self.number, groups)
+        return build_pattern(self.number, groups, self.reference)
 
     @cached_property
     def _compliance(self) -> Array:

@@ -1,4 +1,4 @@
-"""Symmetric matrices that factorise themselves: banded, sparse, of a free body (multipliers: `bh.solvers.saddle`).
+"""Symmetric matrices that factorise themselves: banded, of a free body (`bh.solvers.sparse`, `bh.solvers.saddle`).
 
 A matrix knows how to solve with itself; the driver does not care how. `factorise` either returns a factor or raises
 `IndefiniteError`, which says how many eigenvalues are negative, so that the driver can shift or turn back.
@@ -7,7 +7,6 @@ A matrix knows how to solve with itself; the driver does not care how. `factoris
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,53 +14,14 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from bh.solvers.factor import Factor as Factor
+from bh.solvers.factor import IndefiniteError as IndefiniteError
+from bh.solvers.factor import Matrix as Matrix
+from bh.solvers.factor import unpermuted
+from bh.solvers.sparse import SparseMatrix as SparseMatrix
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-
-class IndefiniteError(ArithmeticError):
-    """The matrix is not positive definite (for multipliers: not so on the constraint's null space).
-
-    `negative` is the number of negative eigenvalues, or 1 where only their presence is known.
-    """
-
-    def __init__(self, negative: int) -> None:
-        super().__init__(f"{negative} negative eigenvalue(s)")
-        self.negative = negative
-
-
-class Factor(Protocol):
-    def solve(self, b: Array) -> Array:
-        """x with A x = b, b (n,) or (n, k)."""
-        ...
-
-    def descend(self, residual: Array) -> tuple[Array, float]:
-        """Newton's direction, and the rate of change of the merit (N mm) along its primal part once the multipliers
-        have been changed as it says: negative."""
-        direction = -self.solve(residual)
-        return direction, float(residual @ direction)
-
-
-class Matrix(Protocol):
-    def factorise(self, shift: float = 0.0) -> Factor:
-        """Factor of A + shift * diag(|A|); raises `IndefiniteError`."""
-        ...
-
-    def factorise_any(self) -> tuple[Factor, int]:
-        """Factor of A, definite or not, and its number of negative eigenvalues (on the constraints' null space).
-
-        Raises `IndefiniteError` only where A is singular to rounding.
-        """
-        ...
-
-    def __matmul__(self, x: Array) -> Array: ...
-
-
-def unpermuted(rows: Array, order: Ints) -> Array:
-    """Rows in the order of the unknowns again; `order[k]` is the unknown in row k."""
-    out = np.empty_like(rows)
-    out[order] = rows
-    return out
 
 
 # ---------------------------------------------------------------------------------------------- banded
@@ -163,61 +123,6 @@ class BandLDLFactor(Factor):
 
     def descend(self, residual: Array) -> tuple[Array, float]:
         raise IndefiniteError(1)
-
-
-# ---------------------------------------------------------------------------------------------- sparse
-
-
-@dataclass(frozen=True)
-class SparseMatrix:
-    """Symmetric sparse matrix, both triangles in CSC form, rows already in a fill-reducing order `order`."""
-
-    csc: sp.csc_matrix
-    order: Ints
-
-    def factorise(self, shift: float = 0.0) -> SparseFactor:
-        factor, negative = self._factorise(shift)
-        if negative:
-            raise IndefiniteError(negative)
-        return factor
-
-    def factorise_any(self) -> tuple[Factor, int]:
-        return self._factorise(0.0)
-
-    def _factorise(self, shift: float) -> tuple[SparseFactor, int]:
-        from scipy.sparse.linalg import splu
-
-        A = self.csc
-        if shift:
-            diagonal = np.abs(A.diagonal())
-            A = A + sp.diags_array(shift * np.maximum(diagonal, 1e-3 * diagonal.mean()), format="csc")
-        try:
-            factor = splu(
-                A,
-                permc_spec="NATURAL",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True, "Equil": False},
-            )
-        except RuntimeError as singular:
-            raise IndefiniteError(1) from singular
-        # with diagonal pivots U = D L^T, so the signs on the diagonal of U are the inertia (Sylvester)
-        negative = int((factor.U.diagonal() <= 0.0).sum())
-        return SparseFactor(factor, self.order), negative
-
-    def __matmul__(self, x: Array) -> Array:
-        return unpermuted(self.csc @ x[self.order], self.order)
-
-    def diagonal(self) -> Array:
-        return unpermuted(self.csc.diagonal(), self.order)
-
-
-@dataclass(frozen=True)
-class SparseFactor(Factor):
-    superlu: Any
-    order: Ints
-
-    def solve(self, b: Array) -> Array:
-        return unpermuted(self.superlu.solve(np.ascontiguousarray(b[self.order])), self.order)
 
 
 # ---------------------------------------------------------------------------------------------- composed

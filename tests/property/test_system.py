@@ -15,7 +15,7 @@ import bh
 import meshes
 from bh import Displace, Fold, Force, Model, Moment, Sheet, trace
 from bh.formulations import formulation
-from bh.mechanics import assembly
+from bh.mechanics import pattern as patterns
 from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
 from bh.model import ElementStiffness
 from bh.program import program
@@ -216,7 +216,7 @@ def test_states_are_in_equilibrium(name: str) -> None:
 
 
 def force_storage(monkeypatch: pytest.MonkeyPatch, banded: bool) -> None:
-    monkeypatch.setattr(assembly, "band_is_cheaper", lambda n, bandwidth: banded)
+    monkeypatch.setattr(patterns, "band_is_cheaper", lambda n, bandwidth: banded)
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -244,8 +244,9 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
         b = np.random.default_rng(0).normal(size=system.size)
         b[system.primal :] = 0.0
         responses.append((dense(A, system.size), linear_response(system, q).dq[: system.primal], A @ b))
-    # with multipliers the rounding of the penalty (gamma over the stiffness of a bending sheet) comes on top
-    tolerance = 1e-9 if system.size > system.primal else 1e-10
+    # with multipliers the rounding of the penalty (gamma over the stiffness of a bending sheet) comes on top: 1.4e-9
+    # with the band and 0.5e-9 with the sparse factor, against a solution in extended precision
+    tolerance = 4e-9 if system.size > system.primal else 1e-10
     for x, y in zip(*responses, strict=True):
         assert np.abs(x - y).max() <= tolerance * np.abs(x).max()
 

@@ -9,8 +9,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from bh.mechanics import assembly
-from bh.mechanics.assembly import build_pattern
+from bh.mechanics import pattern as patterns
+from bh.mechanics.pattern import build_pattern
 from bh.solvers.matrices import (
     BandMatrix,
     FreeBodyMatrix,
@@ -43,7 +43,7 @@ def band(A: Array, order: NDArray[np.int64]) -> BandMatrix:
 
 
 def sparse(A: Array, order: NDArray[np.int64]) -> SparseMatrix:
-    return SparseMatrix(sp.csc_matrix(A[np.ix_(order, order)]), order)
+    return SparseMatrix.of(sp.csc_array(A))
 
 
 def shuffled(A: Array, seed: int = 1) -> tuple[Array, NDArray[np.int64]]:
@@ -148,7 +148,7 @@ def test_reverse_cuthill_mckee() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_pattern_assembles_random_elements(banded: bool, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Random elements with some unknowns prescribed: the matrix is the sum of all element matrices."""
-    monkeypatch.setattr(assembly, "band_is_cheaper", lambda n, bandwidth: banded)
+    monkeypatch.setattr(patterns, "band_is_cheaper", lambda n, bandwidth: banded)
     rng = np.random.default_rng(seed)
     nodes = 9
     number = np.full((nodes, 3), -1)
@@ -181,8 +181,8 @@ def test_pattern_assembles_random_elements(banded: bool, seed: int, monkeypatch:
 
 
 def test_choice_of_storage_grows_with_bandwidth() -> None:
-    assert assembly.band_is_cheaper(500, 20)
-    assert not assembly.band_is_cheaper(30_000, 900)
+    assert patterns.band_is_cheaper(500, 20)
+    assert not patterns.band_is_cheaper(30_000, 900)
 
 
 # --------------------------------------------------------------------------------------- free bodies

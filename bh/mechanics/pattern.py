@@ -1,0 +1,179 @@
+"""Where the entries of all elements go: found once for a step, node by node, so that assembling is adding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bh.solvers.matrices import BandMatrix, reverse_cuthill_mckee
+from bh.solvers.sparse import SparseMatrix, SparsePattern, band_is_cheaper
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Slots = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Where the entries of all elements go.
+
+    Attributes:
+        order: (n,) permutation of the unknowns, order[k] is the unknown in row k.
+        bandwidth: of the permuted matrix; used if `banded`.
+        slots: one (elements, entries) array for each group of elements: where the lower entries of its matrix, row
+            by row, go in the values; -1 where an unknown is prescribed.
+        size: number of values.
+        sparse: the pattern of the sparse matrix, None if banded.
+    """
+
+    order: Ints
+    bandwidth: int
+    slots: tuple[Slots, ...]
+    size: int
+    sparse: SparsePattern | None
+
+    @property
+    def banded(self) -> bool:
+        return self.sparse is None
+
+    def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
+        if self.sparse is None:
+            return BandMatrix(data.reshape((self.bandwidth + 1, len(self.order)), order="F"), self.order)
+        return SparseMatrix(data, self.sparse)
+
+
+def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None = None) -> Pattern:
+    """Pattern of element groups, each (elements, nodes).
+
+    Args:
+        number: (nodes, 3) numbers of the unknowns, -1 if prescribed.
+        places: (nodes, d) positions, which help to find a good order of a wide sheet.
+    """
+    sizes = (number >= 0).sum(axis=1)
+    used = np.flatnonzero(sizes)  # nodes with unknowns
+    vertex = np.full(len(number), -1, dtype=np.int64)
+    vertex[used] = np.arange(len(used))
+    high, low = _node_pairs(vertex, groups)
+    sizes = sizes[used]
+    number = np.ascontiguousarray(number[used])
+    groups = tuple(vertex[group] for group in groups)
+    n = int(sizes.sum())
+    order, _ = reverse_cuthill_mckee(high, low, len(used))
+    place, first = _places(order, sizes)
+    reach = first[np.maximum(place[high], place[low]) + 1] - first[np.minimum(place[high], place[low])]
+    bandwidth = int(max(reach.max(initial=0), sizes.max(initial=0))) - 1 if n else 0
+    if band_is_cheaper(n, bandwidth):
+        starts = np.arange(n, dtype=np.int64) * (bandwidth + 1)
+        slots = tuple(_band_slots(group, number, place, first, starts) for group in groups)
+        return Pattern(_unknowns(number, order), bandwidth, slots, (bandwidth + 1) * n, None)
+    sparse, tree_order = SparsePattern.dissected(
+        high, low, sizes, None if places is None else places[used], lambda order: _unknowns(number, order)
+    )
+    place, first = _places(tree_order, sizes)
+    slots = tuple(
+        _sparse_slots(group, number, place, first, sparse.indptr, sparse.indices) for group in groups
+    )
+    return Pattern(sparse.order, bandwidth, slots, len(sparse.indices), sparse)
+
+
+def _unknowns(number: Ints, order: Ints) -> Ints:
+    """Unknowns in the order of their nodes."""
+    flat = number[order].ravel()
+    return flat[flat >= 0]
+
+
+def _places(order: Ints, sizes: Ints) -> tuple[Ints, Ints]:
+    """Place of every node in the order, and the first row of the node at every place (and the number of rows)."""
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    return place, np.concatenate(([0], np.cumsum(sizes[order])))
+
+
+def _node_pairs(vertex: Ints, groups: tuple[Ints, ...]) -> tuple[Ints, Ints]:
+    """Every pair of nodes that share an element, once, as (high, low)."""
+    keys = []
+    for group in groups:
+        nodes = vertex[group]
+        for i in range(group.shape[1]):
+            for j in range(i):
+                a, b = nodes[:, i], nodes[:, j]
+                both = (a >= 0) & (b >= 0)
+                a, b = a[both], b[both]
+                keys.append(np.maximum(a, b) * len(vertex) + np.minimum(a, b))
+    unique = np.unique(np.concatenate(keys)) if keys else np.zeros(0, dtype=np.int64)
+    return unique // len(vertex), unique % len(vertex)
+
+
+@njit(cache=True, nogil=True)
+def _rows(nodes, number, place, first, rows):  # type: ignore[no-untyped-def]
+    """Rows (3 p,) of the unknowns of an element, -1 if prescribed."""
+    for p in range(len(nodes)):
+        v = nodes[p]
+        row = first[place[v]] if v >= 0 else 0
+        for c in range(3):
+            if v >= 0 and number[v, c] >= 0:
+                rows[3 * p + c] = row
+                row += 1
+            else:
+                rows[3 * p + c] = -1
+
+
+@njit(cache=True, nogil=True)
+def _band_slots(group, number, place, first, starts):  # type: ignore[no-untyped-def]
+    width = 3 * group.shape[1]
+    slots = np.empty((len(group), width * (width + 1) // 2), dtype=np.int32)
+    rows = np.empty(width, dtype=np.int64)
+    for e in range(len(group)):
+        _rows(group[e], number, place, first, rows)
+        at = 0
+        for i in range(width):
+            for j in range(i + 1):
+                if rows[i] < 0 or rows[j] < 0:
+                    slots[e, at] = -1
+                else:
+                    low = min(rows[i], rows[j])
+                    slots[e, at] = starts[low] + max(rows[i], rows[j]) - low
+                at += 1
+    return slots
+
+
+@njit(cache=True, nogil=True)
+def _sparse_slots(group, number, place, first, indptr, indices):  # type: ignore[no-untyped-def]
+    nodes = group.shape[1]
+    width = 3 * nodes
+    slots = np.empty((len(group), width * (width + 1) // 2), dtype=np.int32)
+    rows = np.empty(width, dtype=np.int64)
+    for e in range(len(group)):
+        _rows(group[e], number, place, first, rows)
+        for p in range(nodes):
+            for q in range(p + 1):
+                for j in range(3 * q, 3 * q + 3):
+                    # the entries of one node lie together in a column, so one search serves all three
+                    base_row, base = -1, 0
+                    for i in range(max(3 * p, j), 3 * p + 3):
+                        at = i * (i + 1) // 2 + j
+                        r, c = rows[i], rows[j]
+                        if r < 0 or c < 0:
+                            slots[e, at] = -1
+                            continue
+                        if r < c:  # the other node's column: no run to follow
+                            slots[e, at] = _find(indices, indptr[r], indptr[r + 1], c)
+                        else:
+                            if base_row < 0:
+                                base_row, base = r, _find(indices, indptr[c], indptr[c + 1], r)
+                            slots[e, at] = base + r - base_row
+    return slots
+
+
+@njit(cache=True, nogil=True)
+def _find(indices, low, high, row):  # type: ignore[no-untyped-def]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if indices[middle] <= row:
+            low = middle
+        else:
+            high = middle
+    return low

@@ -1,0 +1,178 @@
+"""Nested dissection of a graph (George 1973): the order in which a wide sheet is eliminated.
+
+A set of vertices is cut in half along the best of a few lines; the vertices on one side of the cut that touch
+the other one are its separator, which is eliminated after both halves. What depends on what is then a binary tree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+LEAF = 12  # vertices that are not cut any further: measured, 8 to 16 differ by less than 5 %
+DIRECTIONS = 6  # of cuts
+
+
+@dataclass(frozen=True)
+class Dissection:
+    """An elimination order and its tree, children before parents.
+
+    Attributes:
+        order: (v,) vertex at every place of the order.
+        start: (f + 1,) front k eliminates the places start[k] to start[k + 1].
+        parent: (f,) front that needs front k done, -1 for the last.
+    """
+
+    order: Ints
+    start: Ints
+    parent: Ints
+
+
+def dissect(indptr: Ints, indices: Ints, places: Array | None = None) -> Dissection:
+    """Nested dissection of the graph with neighbours indices[indptr[v] : indptr[v + 1]] of vertex v.
+
+    `places` (v, d) are positions in the flat sheet, if there are any. Cuts follow straight lines there, which are
+    short, or lines of equal distance in the graph, which follow cells that are slender or lie on a bow.
+    """
+    keys = _graph_keys(indptr, indices)
+    if places is not None and len(places):
+        keys = np.column_stack((_lines(places), keys))
+    order, start, parent = _dissect(indptr, indices, np.ascontiguousarray(keys), LEAF)
+    return Dissection(order, start, parent)
+
+
+def _lines(places: Array) -> Array:
+    """(v, DIRECTIONS) distances from lines in the plane of the two longest axes of all places."""
+    centred = places - places.mean(axis=0)
+    axes = np.linalg.svd(centred.T @ centred)[0][:, :2]
+    angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    return np.asarray((centred @ axes) @ np.vstack((np.cos(angles), np.sin(angles)))[: axes.shape[1]])
+
+
+@njit(cache=True, nogil=True)
+def _dissect(indptr, indices, keys, leaf):  # type: ignore[no-untyped-def]
+    count = len(indptr) - 1
+    order = np.arange(count)
+    side = np.full(count, -1, dtype=np.int8)  # -1 outside the set, 0 and 1 its halves, 2 the separator
+    best = np.empty(count, dtype=np.int8)
+    most = 2 * count + 2
+    own_start, own_end, parents = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
+    stack = np.empty((128, 3), np.int64)
+    stack[0] = 0, count, -1
+    depth, fronts = 1, 0
+    while depth > 0:
+        depth -= 1
+        lo, hi, parent = stack[depth]
+        here = fronts
+        fronts += 1
+        parents[here], own_end[here] = parent, hi
+        if hi - lo <= leaf:
+            own_start[here] = lo
+            continue
+        members = order[lo:hi].copy()
+        _best_cut(members, indptr, indices, keys, side, best)
+        ends = np.zeros(3, dtype=np.int64)
+        for i in range(len(members)):
+            ends[best[members[i]]] += 1
+            side[members[i]] = -1
+        at = np.array([lo, lo + ends[0], lo + ends[0] + ends[1]])
+        own_start[here] = at[2]
+        # the larger half on top: it is done first, and the other's update waits less
+        stack[depth] = at[0], at[1], here
+        stack[depth + 1] = at[1], at[2], here
+        depth += 2
+        for i in range(len(members)):
+            half = best[members[i]]
+            order[at[half]] = members[i]
+            at[half] += 1
+    # parents were numbered before children, right halves before left ones: backwards it is a postorder
+    start, parent_of = np.empty(fronts + 1, np.int64), np.empty(fronts, np.int64)
+    for k in range(fronts):
+        start[k] = own_start[fronts - 1 - k]
+        before = parents[fronts - 1 - k]
+        parent_of[k] = fronts - 1 - before if before >= 0 else -1
+    start[fronts] = count
+    return order, start, parent_of
+
+
+@njit(cache=True, nogil=True)
+def _gap(key, ranks):  # type: ignore[no-untyped-def]
+    """Where to cut so that the halves are most alike but rows of equal keys are not torn, if that can be."""
+    middle = len(ranks) // 2
+    tie = 1e-6 * (key[ranks[-1]] - key[ranks[0]])
+    for away in range(len(ranks) // 6 + 1):
+        for half in (middle - away, middle + away):
+            if key[ranks[half]] - key[ranks[half - 1]] > tie:
+                return half
+    return middle
+
+
+@njit(cache=True, nogil=True)
+def _best_cut(members, indptr, indices, keys, side, best):  # type: ignore[no-untyped-def]
+    """Writes 0, 1 (halves) or 2 (separator) into `best` for all members, for the direction of fewest separators."""
+    fewest = len(members) + 1
+    key = np.empty(len(members))
+    for direction in range(keys.shape[1]):
+        for i in range(len(members)):
+            key[i] = keys[members[i], direction]
+        ranks = np.argsort(key, kind="mergesort")
+        half = _gap(key, ranks)
+        for i in range(len(members)):
+            side[members[ranks[i]]] = 0 if i < half else 1
+        touching = np.zeros(2, np.int64)
+        for i in range(len(members)):
+            v = members[i]
+            for e in range(indptr[v], indptr[v + 1]):
+                if side[indices[e]] == 1 - side[v]:
+                    touching[side[v]] += 1
+                    break
+        lesser = 0 if touching[0] <= touching[1] else 1
+        if touching[lesser] >= fewest:
+            continue
+        fewest = touching[lesser]
+        for i in range(len(members)):
+            v = members[i]
+            best[v] = side[v]
+            if side[v] == lesser:
+                for e in range(indptr[v], indptr[v + 1]):
+                    if side[indices[e]] == 1 - lesser:
+                        best[v] = 2
+                        break
+
+
+@njit(cache=True, nogil=True)
+def _distances(indptr, indices, source):  # type: ignore[no-untyped-def]
+    """Edges from `source` to every vertex; -1 where there is no way."""
+    distance = np.full(len(indptr) - 1, -1, dtype=np.int64)
+    queue = np.empty(len(indptr) - 1, dtype=np.int64)
+    distance[source] = 0
+    queue[0] = source
+    done, found = 0, 1
+    while done < found:
+        v = queue[done]
+        done += 1
+        for e in range(indptr[v], indptr[v + 1]):
+            w = indices[e]
+            if distance[w] < 0:
+                distance[w] = distance[v] + 1
+                queue[found] = w
+                found += 1
+    return distance
+
+
+def _graph_keys(indptr: Ints, indices: Ints) -> Array:
+    """(v, 5) distances in the graph from three vertices far apart, and two of their differences."""
+    count = len(indptr) - 1
+    if count == 0:
+        return np.zeros((0, 5))
+    far: list[Ints] = []
+    nearest = _distances(indptr, indices, 0)
+    for _ in range(3):
+        far.append(_distances(indptr, indices, int(np.argmax(nearest))))
+        nearest = np.minimum(nearest, far[-1]) if len(far) > 1 else far[-1]
+    return np.column_stack((*far, far[0] - far[1], far[1] - far[2])).astype(float)

@@ -1,0 +1,67 @@
+"""What every matrix and factor of the driver can do, and the error of a matrix that is not positive definite."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class IndefiniteError(ArithmeticError):
+    """The matrix is not positive definite (for multipliers: not so on the constraint's null space).
+
+    `negative` is the number of negative eigenvalues, or 1 where only their presence is known.
+    """
+
+    def __init__(self, negative: int) -> None:
+        super().__init__(f"{negative} negative eigenvalue(s)")
+        self.negative = negative
+
+
+class Factor(Protocol):
+    def solve(self, b: Array) -> Array:
+        """x with A x = b, b (n,) or (n, k)."""
+        ...
+
+    def descend(self, residual: Array) -> tuple[Array, float]:
+        """Newton's direction, and the rate of change of the merit (N mm) along its primal part once the multipliers
+        have been changed as it says: negative."""
+        direction = -self.solve(residual)
+        return direction, float(residual @ direction)
+
+
+class SignedFactor(Factor):
+    """A factor that may be of an indefinite matrix, with `negative` eigenvalues below zero."""
+
+    negative: int
+
+    def descend(self, residual: Array) -> tuple[Array, float]:
+        if self.negative:
+            raise IndefiniteError(self.negative)
+        return super().descend(residual)
+
+
+class Matrix(Protocol):
+    def factorise(self, shift: float = 0.0) -> Factor:
+        """Factor of A + shift * diag(|A|); raises `IndefiniteError`."""
+        ...
+
+    def factorise_any(self) -> tuple[Factor, int]:
+        """Factor of A, definite or not, and its number of negative eigenvalues (on the constraints' null space).
+
+        Raises `IndefiniteError` only where A is singular to rounding.
+        """
+        ...
+
+    def __matmul__(self, x: Array) -> Array: ...
+
+
+def unpermuted(rows: Array, order: Ints) -> Array:
+    """Rows in the order of the unknowns again; `order[k]` is the unknown in row k."""
+    out = np.empty_like(rows)
+    out[order] = rows
+    return out
