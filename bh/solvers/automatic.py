@@ -8,9 +8,12 @@ from itertools import pairwise
 
 from bh.solvers.arc_length import ArcLength
 from bh.solvers.continuation import AtBifurcation, LoadControl
-from bh.solvers.increments import ARC, LOAD, Increment, Point
+from bh.solvers.increments import ARC, LOAD, Increment, Point, point
+from bh.solvers.newton import Solution
+from bh.solvers.stability import leave_saddle
 from bh.solvers.system import System
 
+NEVER = 10**6  # cuts before the careful way: arc length comes first
 FAR = 8  # states by arc length that rise steadily: there is no limit point
 
 
@@ -44,7 +47,7 @@ class Automatic:
         """See `LoadControl.follow`; increments by arc length say so in their note."""
         points = list(history)
         load = replace(self.load, at_bifurcation=self.at_bifurcation)
-        bold = replace(load, smallest=max(self.patience, load.smallest), foresee=True)
+        bold = replace(load, smallest=max(self.patience, load.smallest), foresee=True, brisk=NEVER)
         failure: Increment | None = None
         while True:
             if points[-1].mode != ARC:
@@ -63,7 +66,7 @@ class Automatic:
                 note = f"by arc length: {passed.note}"
                 failure = replace(passed, note=f"{failure.note}; {note}" if failure else note)
                 break
-            increment = self.load.limits(system)[0]
+            increment = self.load.limits(system)[0]  # load control takes over again
         if points[-1].mode != ARC and points[-1].lam < 1.0:
             last = yield from self._run(load.follow(system, points[-3:], self.patience), points)
             if last is None:
@@ -94,6 +97,12 @@ class Automatic:
             if item.outcome != "reached":
                 return item
             points.append(item.point)
+            if self.at_bifurcation == "stable":
+                left = self._leave(system, item, load)
+                if left is not None:
+                    points[:] = [left.point]
+                    yield left
+                    return None
             if behind_limit(points) and item.point.lam < 1.0:
                 points[:] = [replace(item.point, mode=LOAD)]
                 note = f"{item.note}; load control from here on"
@@ -102,6 +111,23 @@ class Automatic:
                 return None
             yield item
         return None
+
+    @staticmethod
+    def _leave(system: System, item: Increment, load: LoadControl) -> Increment | None:
+        """The stable state below one that lies behind a bifurcation of a stable branch, or None."""
+        first = item.critical[0] if item.critical else None
+        if first is None or first.kind != "bifurcation" or first.negative[0] != 0 or item.point.lam >= 1.0:
+            return None
+        here = item.point
+        saddle = Solution(here.q, system.evaluate(here.q, here.lam), 0, True, negative=here.negative)
+        found, note = leave_saddle(system, saddle, here.lam, load.newton)
+        if not note:
+            return None
+        there = point(system, found.q, here.lam, LOAD, found.evaluation, found.negative)
+        return replace(
+            item, point=there, iterations=item.iterations + found.iterations, imbalance=found.evaluation.imbalance,
+            next_increment=load.limits(system)[0], note=f"arc length; {note}", jumped=True,
+        )  # fmt: skip
 
 
 def behind_limit(points: Sequence[Point]) -> bool:

@@ -22,6 +22,23 @@ AtBifurcation = Literal["stable", "primary", "stop"]
 
 
 @dataclass(frozen=True)
+class _Trial:
+    """A solve at one lambda: the state, how it was found on the branch (`primary`), and why it cannot be accepted."""
+
+    point: Point
+    solution: Solution
+    primary: Solution
+    objection: str
+    note: str
+    iterations: int
+
+    @property
+    def failure(self) -> str:
+        """The outcome of a step that ends here."""
+        return "bifurcation" if self.solution.converged and self.solution.stable is False else "stalled"
+
+
+@dataclass(frozen=True)
 class LoadControl:
     """Adaptive increments of lambda with extrapolated starts.
 
@@ -76,7 +93,6 @@ class LoadControl:
         points = list(history)
         first, largest = self.limits(system)
         step = first if increment is None else increment
-        newton = self.newton if self.at_bifurcation == "stable" else replace(self.newton, unstable=True)
         cuts: list[str] = []
         iterations = 0
         while points[-1].lam < 1.0:
@@ -89,60 +105,56 @@ class LoadControl:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
                 yield Increment(here, "limit-point", iterations, math.nan, step, cuts=tuple(cuts), note=note)
                 return
-            q, forces = extrapolate(points, lam)
-            # a shorter increment is a cheaper remedy than the careful way, but for the start and at the end of patience
-            brisk = len(points) > 1 and len(cuts) < self.brisk
-            method = replace(newton, careful=0) if brisk else newton
-            solution = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
-            iterations += solution.iterations
-            note, primary = "", solution
-            trusted = solution.converged and not self._mistrust(system, here, solution, lam)
-            if trusted and not solution.stable and self.at_bifurcation == "stable":
-                solution, note = leave_saddle(system, solution, lam, self.newton)
-                iterations += solution.iterations
-            # what did not converge may hold anything; nothing is asked of it
-            there = (
-                point(system, solution.q, lam, evaluation=solution.evaluation, negative=solution.negative)
-                if solution.converged
-                else here
-            )
-            objection = self._objection(system, here, there, solution, left_saddle=bool(note))
-            if objection:
-                cuts.append(f"lambda {lam:.6g}: {objection}")
+            tried = self._try(system, points, lam, brisk=len(points) > 1 and len(cuts) < self.brisk)
+            iterations += tried.iterations
+            imbalance = tried.solution.evaluation.imbalance
+            if tried.objection:
+                cuts.append(f"lambda {lam:.6g}: {tried.objection}")
                 step = 0.5 * (lam - here.lam)
                 if step < self.smallest:
-                    outcome = "bifurcation" if solution.converged and solution.stable is False else "stalled"
-                    if fold <= lam:
-                        outcome = "limit-point"
-                    imbalance = solution.evaluation.imbalance
+                    outcome = "limit-point" if fold <= lam else tried.failure
                     yield Increment(
-                        here, outcome, iterations, imbalance, step, cuts=tuple(cuts), note=objection
+                        here, outcome, iterations, imbalance, step, cuts=tuple(cuts), note=tried.objection
                     )
                     return
                 continue
-            critical = self._critical(system, here, primary, lam)
-            if self.at_bifurcation == "stop" and solution.negative:
+            critical = self._critical(system, here, tried.primary, lam)
+            if self.at_bifurcation == "stop" and tried.solution.negative:
                 where = f" at lambda {critical[0].lam:.6g}" if critical else f" before lambda {lam:.6g}"
                 note = f"the branch loses its stability{where}"
                 yield Increment(
-                    here,
-                    "bifurcation",
-                    iterations,
-                    math.nan,
-                    step,
-                    cuts=tuple(cuts),
-                    note=note,
-                    critical=critical,
+                    here, "bifurcation", iterations, imbalance, step, tuple(cuts), note, critical=critical
                 )
                 return
-            taken = lam - here.lam
-            points = [there] if note else [*points[-2:], there]
-            step = self._next(taken, solution.iterations, bool(cuts), largest)
+            points = [tried.point] if tried.note else [*points[-2:], tried.point]
+            step = self._next(lam - here.lam, tried.solution.iterations, bool(cuts), largest)
             yield Increment(
-                there, "reached", iterations, solution.evaluation.imbalance, step, tuple(cuts), note, bool(note),
-                critical,
+                tried.point, "reached", iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note), critical
             )  # fmt: skip
             cuts, iterations = [], 0
+
+    def _try(self, system: System, points: Sequence[Point], lam: float, brisk: bool) -> _Trial:
+        """One solve at `lam`, from the branch's stable side if it is unstable there, and what is to be said against it.
+
+        A shorter increment is a cheaper remedy than the careful way, so that is left out where `brisk`.
+        """
+        here = points[-1]
+        newton = replace(self.newton, unstable=self.at_bifurcation != "stable")
+        method = replace(newton, careful=0) if brisk else newton
+        q, forces = extrapolate(points, lam)
+        primary = found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
+        iterations, note = found.iterations, ""
+        if not found.converged:  # it may hold anything; nothing is asked of it
+            return _Trial(here, found, primary, found.reason, "", iterations)
+        there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
+        objection = self._jump(system, here, there)
+        if not objection and not found.stable and self.at_bifurcation == "stable":
+            found, note = leave_saddle(system, found, lam, self.newton)
+            iterations += found.iterations
+            there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
+            # the stable state may be far, but not on the other side of a closed hinge
+            objection = system.crossing(here.q, here.lam, there.q, lam) if note else found.reason
+        return _Trial(there, found, primary, objection, note, iterations)
 
     def _critical(
         self, system: System, here: Point, found: Solution, lam: float
@@ -185,24 +197,6 @@ class LoadControl:
             return here.q + change, system.predicted_forces(here.forces, change)
 
         return guess
-
-    def _objection(
-        self, system: System, here: Point, there: Point, solution: Solution, left_saddle: bool
-    ) -> str:
-        """Why the state that was found is not to be accepted, or an empty string."""
-        if not solution.converged:
-            return solution.reason
-        if left_saddle:  # it may have gone far
-            return system.crossing(here.q, here.lam, there.q, there.lam)
-        if not solution.stable and self.at_bifurcation == "stable":
-            return solution.reason or self._jump(system, here, there) or "unstable"
-        return self._jump(system, here, there)
-
-    def _mistrust(self, system: System, here: Point, found: Solution, lam: float) -> str:
-        """Why an unstable state is not on the branch of the last one, before anybody leaves it."""
-        if found.stable:
-            return ""
-        return self._jump(system, here, point(system, found.q, lam, evaluation=found.evaluation))
 
     def _jump(self, system: System, here: Point, there: Point) -> str:
         """Why two states are not neighbours on one branch, or an empty string."""

@@ -11,7 +11,7 @@ from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import lowest_mode
 from bh.solvers.system import System
 
-FREE = 1e-11  # stiffness of a motion, in parts of the largest, that is rounding
+FREE = 1e-14  # stiffness of a motion, in parts of the largest, that is rounding
 
 
 def diagnose(system: System, failure: Increment) -> Increment:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +22,24 @@ class IndefiniteError(ArithmeticError):
         self.negative = negative
 
 
+class Descent(NamedTuple):
+    """A direction (n,), the rate of change of the merit along its primal part (N mm, negative), and whether that is so
+    once the multipliers have been changed as it says (`first`) or before they are."""
+
+    direction: Array
+    slope: float
+    first: bool = True
+
+
 class Factor(Protocol):
     def solve(self, b: Array) -> Array:
         """x with A x = b, b (n,) or (n, k)."""
         ...
 
-    def descend(self, residual: Array) -> tuple[Array, float]:
-        """Newton's direction, and the rate of change of the merit (N mm) along its primal part once the multipliers
-        have been changed as it says: negative."""
+    def descend(self, residual: Array) -> Descent:
+        """A direction in which the primal unknowns lower the merit, with the change of multipliers to it."""
         direction = -self.solve(residual)
-        return direction, float(residual @ direction)
+        return Descent(direction, float(residual @ direction))
 
 
 class SignedFactor(Factor):
@@ -39,7 +47,7 @@ class SignedFactor(Factor):
 
     negative: int
 
-    def descend(self, residual: Array) -> tuple[Array, float]:
+    def descend(self, residual: Array) -> Descent:
         if self.negative:
             raise IndefiniteError(self.negative)
         return super().descend(residual)

@@ -14,10 +14,10 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from bh.solvers.factor import Descent, unpermuted
 from bh.solvers.factor import Factor as Factor
 from bh.solvers.factor import IndefiniteError as IndefiniteError
 from bh.solvers.factor import Matrix as Matrix
-from bh.solvers.factor import unpermuted
 from bh.solvers.sparse import SparseMatrix as SparseMatrix
 
 Array = NDArray[np.float64]
@@ -121,7 +121,7 @@ class BandLDLFactor(Factor):
         x, _ = lapack.dtbtrs(self.ab, x / pivots, trans="T", **unit)
         return unpermuted(x, self.order)
 
-    def descend(self, residual: Array) -> tuple[Array, float]:
+    def descend(self, residual: Array) -> Descent:
         raise IndefiniteError(1)
 
 

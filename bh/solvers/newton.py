@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import Factor, IndefiniteError, Matrix
+from bh.solvers.factor import Descent, Factor, IndefiniteError, Matrix
 from bh.solvers.modes import count_negative, factorise_shifted, lowest_mode
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.system import Evaluation, System
@@ -62,11 +62,11 @@ class Newton:
 
     tolerance: float = 1e-8
     bold: int = 14
-    careful: int = 200
+    careful: int = 150
     bold_shift: float = 1e-5
     transient: PseudoTransient | None = field(default_factory=PseudoTransient)
     unstable: bool = False
-    saddles: bool = True
+    saddles: bool = False
 
     def solve(
         self,
@@ -141,7 +141,8 @@ class Newton:
             factor, shift = factorise_shifted(matrix, shift, least=1e-11)
             if factor is None:
                 return Solution(q, now, iteration, False, "singular tangent", careful=True)
-            dq, slope = factor.descend(now.residual)
+            descent = factor.descend(now.residual)
+            dq = descent.direction
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, careful=True)
             if shift > 1e-9 and now.imbalance < NEAR_SADDLE:
@@ -157,7 +158,7 @@ class Newton:
                     continue
             near = shift < 1e-9 and now.imbalance < 0.1
             step = full_step(system, q, lam, now, -factor.solve(now.residual)) if near else None
-            step = step or line_search(system, q, lam, now, dq, slope)
+            step = step or line_search(system, q, lam, now, descent)
             if step is None:
                 if shift > 1e3:
                     return Solution(q, now, iteration, False, "no descent", careful=True)
@@ -224,16 +225,16 @@ def full_step(
 
 
 def line_search(
-    system: System, q: Array, lam: float, now: Evaluation, dq: Array, slope: float
+    system: System, q: Array, lam: float, now: Evaluation, descent: Descent
 ) -> tuple[Array, Evaluation, float] | None:
-    """Step along dq that lowers the merit enough (Armijo); None if there is none.
+    """Step along a direction that lowers the merit enough (Armijo); None if there is none.
 
-    Multipliers are changed at once and held while looking; `slope` is the rate of change of the merit along the primal
-    part of dq after that, N mm.
+    Multipliers are held while looking, changed before or after as the descent says.
     """
     p = system.primal
+    dq, slope = descent.direction, descent.slope
     start = q
-    if len(q) > p:
+    if len(q) > p and descent.first:
         start = q.copy()
         start[p:] += dq[p:]
         now = system.evaluate(start, lam)
@@ -246,6 +247,9 @@ def line_search(
         if np.isfinite(there.energy) and (
             there.merit <= now.merit + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
         ):
+            if len(q) > p and not descent.first:
+                trial[p:] += length * dq[p:]
+                there = system.evaluate(trial, lam)
             return trial, there, length
         gain = there.merit - now.merit - length * slope
         best = -0.5 * slope * length**2 / gain if np.isfinite(gain) and gain > 0.0 else 0.0

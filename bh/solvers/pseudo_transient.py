@@ -27,7 +27,7 @@ class PseudoTransient:
     """
 
     shift: float = 1.0
-    most: int = 200
+    most: int = 100
     largest: float = 1e8
 
     def relax(self, system: System, q: Array, lam: float, tolerance: float) -> tuple[Array, Evaluation, int]:
@@ -44,18 +44,21 @@ class PseudoTransient:
             except IndefiniteError:
                 shift = max(4.0 * shift, 1e-9)
                 continue
-            dq, _ = factor.descend(now.residual)
-            base = now
-            if len(q) > p:  # multipliers first; with them the displacements go downhill
-                start = q.copy()
-                start[p:] += dq[p:]
+            descent = factor.descend(now.residual)
+            base, start = now, q.copy()
+            if len(q) > p and descent.first:
+                start[p:] += descent.direction[p:]
                 base = system.evaluate(start, lam)
-            trial = q + dq
+            trial = start.copy()
+            trial[:p] += descent.direction[:p]
             there = system.evaluate(trial, lam)
             noise = 1e-12 * max(abs(base.merit), abs(there.merit))
             if not (np.isfinite(there.energy) and there.merit <= base.merit + noise):
                 shift = max(4.0 * shift, 1e-9)
                 continue
+            if len(q) > p and not descent.first:
+                trial[p:] += descent.direction[p:]
+                there = system.evaluate(trial, lam)
             steps += 1
             ratio = there.imbalance / now.imbalance
             shift *= min(2.0, max(0.1, ratio))

@@ -8,14 +8,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import BandMatrix, Factor, FreeBodyMatrix, IndefiniteError, SparseMatrix
+from bh.solvers.factor import Descent, Factor, IndefiniteError
+from bh.solvers.matrices import BandMatrix, FreeBodyMatrix, SparseMatrix
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 NOISE = 2e-14  # error of a constraint that is rounding (angles in rad)
 ROUNDING = 4.0 * np.finfo(float).eps  # of a sum, in parts of the sum of its sizes
 TINY_SHIFT = 1e-12  # shifts up to this only take rounding off
-MOST_DENSE = 300  # constraints whose Schur complement is still formed as a dense matrix
+MUCH_SHIFT = 1e9  # shifts above this make multipliers of their own
+MOST_BRISK = (
+    300  # constraints up to which an indefinite augmented matrix is looked at closely in every iteration
+)
+MOST_DENSE = 1500  # constraints whose Schur complement is still formed as a dense matrix
 
 
 @njit(cache=True, nogil=True)
@@ -85,9 +90,11 @@ class MultiplierMatrix:
 
     def factorise(self, shift: float = 0.0) -> MultiplierFactor | DenseSchurFactor:
         try:
-            return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma, self.compliance)
+            return MultiplierFactor(
+                self.augmented.factorise(shift), self.G, self.gamma, self.compliance, shift
+            )
         except IndefiniteError:
-            if shift > TINY_SHIFT:
+            if shift > TINY_SHIFT or len(self.gamma) > MOST_BRISK:
                 raise
         # large moments in the constraints can outweigh gamma: A is indefinite, the state on the constraints is not
         factor, negative = self.factorise_any()
@@ -125,6 +132,7 @@ class MultiplierFactor(Factor):
     G: ConstraintRows
     gamma: Array
     compliance: Array
+    shift: float = 0.0
     most: int = 40
     tolerance: float = 1e-3
 
@@ -162,18 +170,25 @@ class MultiplierFactor(Factor):
         # with what the constraints still miss as a moment the first row is met exactly
         return np.concatenate((x, y / scale + self.gamma * miss))
 
-    def descend(self, residual: Array) -> tuple[Array, float]:
+    def descend(self, residual: Array) -> Descent:
         """Newton's direction of the saddle. Its displacements go downhill once its multipliers are set.
 
         With those the gradient of the augmented Lagrangian is -(K + gamma G^T G) x, as G x = -gap; so its slope along x
         is negative wherever the (shifted) augmented matrix is definite. Updating the multipliers to first order only
-        (gamma times what is missed) crawls where the sheet is stiffer against the constraint than gamma.
+        (gamma times what is missed) crawls where the sheet is stiffer against the constraint than gamma. But where the
+        matrix had to be shifted much its multipliers are those of the shift: then the first order it is.
         """
         n = self.G.n
+        if self.shift > MUCH_SHIFT:
+            gap = residual[n:]
+            gradient = residual[:n] + self.G.transpose_times(self.gamma * gap)
+            x = -self.factor.solve(gradient)
+            change = self.gamma * (gap + self.G.times(x))
+            return Descent(np.concatenate((x, change)), float(gradient @ x), first=False)
         direction = -self.solve(residual)
         moments = direction[n:] + self.gamma * residual[n:]
         gradient = residual[:n] + self.G.transpose_times(moments)
-        return direction, float(gradient @ direction[:n])
+        return Descent(direction, float(gradient @ direction[:n]))
 
 
 @dataclass(frozen=True)

@@ -202,7 +202,7 @@ def test_pseudo_transient_comes_to_rest(start: tuple[float, float]) -> None:
     q, now, steps = PseudoTransient().relax(system, np.array(start), 0.0, 1e-10)
     assert q == pytest.approx([1.0, 1.0], abs=1e-6)
     assert now.imbalance <= 1e-10
-    assert 0 < steps <= 200
+    assert 0 < steps <= 100
 
 
 def test_newton_falls_back_on_it() -> None:

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bh.solvers.continuation import LoadControl
+from bh.solvers.factor import Descent
 from bh.solvers.increments import Increment, Point, extrapolate, point
 from bh.solvers.linear import linear_response
 from bh.solvers.matrices import BandMatrix
@@ -218,7 +219,7 @@ def test_line_search_never_raises_the_energy() -> None:
         q = np.array([start])
         now = system.evaluate(q, 1.0)
         for direction in (-now.residual, -100.0 * now.residual):
-            found = line_search(system, q, 1.0, now, direction, float(now.residual @ direction))
+            found = line_search(system, q, 1.0, now, Descent(direction, float(now.residual @ direction)))
             if found is None:
                 assert np.abs(now.residual).max() < 1e-6
                 continue
@@ -232,7 +233,7 @@ def test_line_search_refuses_to_climb() -> None:
     system = Stiffening()
     q = np.array([0.5])
     now = system.evaluate(q, 1.0)
-    assert line_search(system, q, 1.0, now, now.residual, float(now.residual @ now.residual)) is None
+    assert line_search(system, q, 1.0, now, Descent(now.residual, float(now.residual @ now.residual))) is None
 
 
 # --------------------------------------------------------------------------------------- shift and modes
