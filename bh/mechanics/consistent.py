@@ -50,7 +50,7 @@ class Consistent:
         x = system.positions(q, lam)
         now = system.internal(x, q[system.moving :], lam)
         _, M, S = system.split(now.forces)
-        stretching, bending = now.sheet.T
+        stretching, bending = now.stretching, system.bending_by_triangle(now.theta)
         folding = 0.5 * e.spring_stiffness * now.turns**2
 
         angles = dihedral_angles(x, topology.hinges)
@@ -61,9 +61,9 @@ class Consistent:
         ends = mesh.points[topology.hinges[:, 1:3]]
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         moments[e.springs] = (S - e.couple.at(lam)) / lengths[e.springs]
-        turning = (e.kind == TURN) & (e.rotation >= 0)
+        turning = (e.patches.kind == TURN) & (e.patches.hinge >= 0)
         by_hinge = np.zeros(len(angles))
-        by_hinge[topology.edge_hinges[topology.triangle_edges[turning]]] = M[turning]
+        by_hinge[e.patches.hinge[turning]] = M[turning]
         moments[held] = (by_hinge / lengths)[held]
         return State(
             mesh=mesh, step=step, lam=lam, points=x,

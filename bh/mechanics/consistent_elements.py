@@ -1,41 +1,49 @@
-"""Element arrays of the consistent formulation: constant matrices of triangles, edge rotations, crease springs."""
+"""Element arrays of the consistent formulation in one step: triangles, patches, edge rotations, crease springs."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.actuation import Ramp
 from bh.errors import ModelError
-from bh.mechanics.consistent_kernels import NONE, OWN, TURN, choose_sides
+from bh.mechanics.consistent_kernels import TURN
+from bh.mechanics.consistent_patches import (
+    Patches,
+    bending_matrices,
+    patches,
+    stretching_matrices,
+    triangle_frames,
+)
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.stiffness import folding_hinge_stiffness
 from bh.model import Model
 from bh.program import HELD, SHEET, SPRING, StepProgram
+from bh.solvers.matrices import reverse_cuthill_mckee
 from meshes import SheetMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class ConsistentElements:
-    """Element arrays of one step; t triangles, h spring hinges, edge k of a triangle is opposite its corner k.
+    """Element arrays of one step: t triangles, c patches with a angles, h spring hinges.
 
     Attributes:
-        triangles: (t, 3) nodes.
+        triangles: (t, 3) nodes; edge k is opposite corner k.
         rest_square: (t, 3) squares of the edges' lengths in the stress-free sheet, mm^2.
         K: (t, 3, 3) energy of stretching 1/2 gamma.K.gamma, N / mm^3.
-        B: (t, 3, 3) energy of bending 1/2 theta.B.theta, N mm; free edges are eliminated from it.
-        kind, quad, ghost, place, rotation: what the angles theta are, see `bh.mechanics.consistent_kernels`.
-        rest: (t, 3) rest dihedral angles of TURN edges, rad.
-        nodes: (t, p) rows of the unknowns of an element: its corners, wings and (one row past the nodes) rotations.
+        B_triangle: (t, 3, 3) energy of bending of a triangle by the angles at its edges, N mm.
+        patches: matrices and angles of the patches.
+        quad, ghost, place, rotation, column: of the angles, see `bh.mechanics.consistent_kernels`.
+        rest: (c, a) rest dihedral angles of TURN angles, rad.
+        nodes: (c, p) nodes of the matrix of a patch, then -1; `width` (c,) its number of rows, rotations included.
         springs: (h,) rows of `mesh.topology.hinges`; `hinges` (h, 4) their nodes, `turns` (h, 2) their rotations.
         spring_stiffness: (h,) N mm / rad; spring_rest, couple: (h,) rest angles (rad) and applied couples (N mm).
-        side_rotation: (m, 2) the rotation of each side of every hinge.
         held: (m,) held dihedral angles at every hinge, rad; nan where it is not held.
         rotations: how many there are.
     """
@@ -43,81 +51,24 @@ class ConsistentElements:
     triangles: Ints
     rest_square: Array
     K: Array
-    B: Array
-    kind: Ints
+    B_triangle: Array
+    patches: Patches
     quad: Ints
     ghost: Array
     place: Ints
     rotation: Ints
+    column: Ints
     rest: Ramp
     nodes: Ints
+    width: Ints
     springs: Ints
     hinges: Ints
     turns: Ints
     spring_stiffness: Array
     spring_rest: Ramp
     couple: Ramp
-    side_rotation: Ints
     held: Ramp
     rotations: int
-
-    @cached_property
-    def spring_nodes(self) -> Ints:
-        """(h, 5) rows of the unknowns of a spring: its nodes, and the row past the nodes for its rotations."""
-        past = np.full((len(self.hinges), 1), self.nodes.max(initial=0))
-        return np.hstack((self.hinges, past))
-
-
-def triangle_frames(points: Array, triangles: Ints) -> tuple[Array, Array]:
-    """(t, 3, 2) edge vectors in each triangle's own plane, edge k from corner k + 1 to k + 2, and areas (t,)."""
-    corner = points[triangles]
-    edge = np.roll(corner, 1, axis=1) - np.roll(corner, -1, axis=1)
-    normal = np.cross(edge[:, 0], edge[:, 1])
-    doubled = np.linalg.norm(normal, axis=1)
-    e1 = edge[:, 0] / np.linalg.norm(edge[:, 0], axis=1)[:, None]
-    e2 = np.cross(normal / doubled[:, None], e1)
-    return np.stack((np.einsum("tki,ti->tk", edge, e1), np.einsum("tki,ti->tk", edge, e2)), axis=2), (
-        0.5 * doubled
-    )
-
-
-def stretching_matrices(edges: Array, areas: Array, E: float, t: float, nu: float) -> Array:
-    """(t, 3, 3) K of 1/2 gamma.K.gamma = 1/2 A t E:C:E in plane stress; gamma_k = e_k.E.e_k (N / mm^3).
-
-    `edges` (t, 3, 2) as of `triangle_frames`. Three edges give the three components of a constant Green strain.
-    """
-    x, y = edges[..., 0], edges[..., 1]
-    strain = np.linalg.inv(np.stack((x * x, y * y, 2.0 * x * y), axis=2))  # (E_xx, E_yy, E_xy) from gamma
-    modulus = E * t / (1.0 - nu**2)
-    C = modulus * np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 2.0 * (1.0 - nu)]])
-    return np.einsum("t,tik,ij,tjl->tkl", areas, strain, C, strain, optimize=True)
-
-
-def bending_matrices(edges: Array, areas: Array, D: float, nu: float) -> Array:
-    """(t, 3, 3) B of 1/2 theta.B.theta = 1/2 A D ((1 - nu) kappa:kappa + nu tr(kappa)^2), N mm.
-
-    kappa = (1/A) sum_k L_k theta_k mu_k (x) mu_k with the outward normals mu_k of the stress-free edges.
-    """
-    lengths = np.linalg.norm(edges, axis=2)
-    tangent = edges / lengths[..., None]
-    cosine = np.einsum("tki,tli->tkl", tangent, tangent)  # of the normals too, which are turned by a right angle
-    weight = lengths[:, :, None] * lengths[:, None, :] * (D / areas)[:, None, None]
-    return weight * ((1.0 - nu) * cosine**2 + nu)
-
-
-def without_free_edges(B: Array, free: NDArray[np.bool_]) -> Array:
-    """B after the rotations of `free` (t, 3) edges have taken their moments away (Schur complement)."""
-    rows = np.flatnonzero(free.any(axis=1))
-    if len(rows) == 0:
-        return B
-    out = B.copy()
-    off = free[rows]
-    either = off[:, :, None] | off[:, None, :]
-    inverse = np.where(either, 0.0, np.linalg.inv(B[rows]))
-    scale = np.trace(inverse, axis1=1, axis2=2)
-    unit = np.where(scale > 0.0, scale, 1.0)[:, None, None] * np.eye(3)
-    out[rows] = np.where(either, 0.0, np.linalg.inv(np.where(off[:, :, None] & either, unit, inverse)))
-    return out
 
 
 def consistent_elements(
@@ -136,25 +87,25 @@ def consistent_elements(
     _check_moments(mesh, program)
     topology = mesh.topology
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
+    B = bending_matrices(edges, areas, sheet.bending_stiffness(), sheet.nu)
     clamped = np.zeros(len(topology.edges), dtype=bool)
     clamped[program.constraints.clamped] = True
-    clamped = clamped[topology.triangle_edges]
-    hinge_of = topology.edge_hinges[topology.triangle_edges]
-    free = (hinge_of < 0) & ~clamped
-    side = (topology.edge_triangles[topology.triangle_edges, 0] != np.arange(len(areas))[:, None]).astype(int)
-
     spring = law == SPRING
-    turning = choose_sides(topology.edge_triangles[topology.hinge_edges], ~spring, len(areas))
-    turns = (hinge_of >= 0) & ~spring[hinge_of] & (turning[hinge_of] == side)
-    kind = np.where(free, NONE, np.where(turns | clamped, TURN, OWN))
-    side_rotation, rotations = _number_rotations(spring)
-    rotation = np.where(hinge_of >= 0, side_rotation[hinge_of, side], -1)
-    quad, place, nodes = _neighbourhoods(mesh, turns, clamped, hinge_of)
+    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh))
+    rotation, turns, rotations = _number_rotations(mesh, joined, spring)
+    quad, ghost = _quads(mesh, joined)
+    nodes, place = _rows(joined, quad)
+    has = rotation >= 0
+    in_nodes = 3 * (nodes >= 0).sum(axis=1)
+    column = np.where(has, in_nodes[:, None] + np.cumsum(has, axis=1) - 1, -1)
+    width = in_nodes + has.sum(axis=1)
+    # local axes are turned in blocks of three rows: there must be as many nodes, be they none
+    nodes = np.pad(nodes, ((0, 0), (0, -(-int(width.max()) // 3) - nodes.shape[1])), constant_values=-1)
 
     reference = dihedral_angles(mesh.points, topology.hinges)
     held = Ramp(np.where(np.isnan(program.held.start), held_start, program.held.start), program.held.end)
     rest = [
-        np.append(np.where(law == HELD, angle, reference), np.pi)[hinge_of] for angle in (held.start, held.end)
+        np.append(np.where(law == HELD, at, reference), np.pi)[joined.hinge] for at in (held.start, held.end)
     ]
     springs = np.flatnonzero(spring)
     ends = mesh.points[topology.hinges[:, 1:3]]
@@ -162,18 +113,14 @@ def consistent_elements(
     k_fold = folding_hinge_stiffness(program.stiffness, length)[springs]
     begin = held_start[springs] - moment_start[springs] / np.where(k_fold == 0.0, np.inf, k_fold)
     begin = np.where(np.isnan(program.rest.start[springs]), begin, program.rest.start[springs])
-    lengths = np.linalg.norm(edges, axis=2)
-    D = sheet.bending_stiffness()
     return ConsistentElements(
-        triangles=mesh.triangles, rest_square=lengths**2,
-        K=stretching_matrices(edges, areas, sheet.E, sheet.t, sheet.nu),
-        B=without_free_edges(bending_matrices(edges, areas, D, sheet.nu), free),
-        kind=kind, quad=quad, ghost=_ghosts(mesh, clamped), place=place, rotation=rotation,
-        rest=Ramp(*rest), nodes=nodes, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]),
-        turns=side_rotation[springs], spring_stiffness=k_fold, spring_rest=Ramp(begin, program.rest.end[springs]),
+        triangles=mesh.triangles, rest_square=(edges**2).sum(axis=2),
+        K=stretching_matrices(edges, areas, sheet.E, sheet.t, sheet.nu), B_triangle=B, patches=joined,
+        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
+        width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
+        spring_stiffness=k_fold, spring_rest=Ramp(begin, program.rest.end[springs]),
         couple=Ramp((program.moment.start * length)[springs], (program.moment.end * length)[springs]),
-        side_rotation=side_rotation,
-        held=Ramp(*(np.where(law == HELD, angle, np.nan) for angle in (held.start, held.end))), rotations=rotations,
+        held=Ramp(*(np.where(law == HELD, at, np.nan) for at in (held.start, held.end))), rotations=rotations,
     )  # fmt: skip
 
 
@@ -188,44 +135,63 @@ def _check_moments(mesh: SheetMesh, program: StepProgram) -> None:
         )
 
 
-def _number_rotations(spring: NDArray[np.bool_]) -> tuple[Ints, int]:
-    """(m, 2) rotation of each side of every hinge, and their number: one a hinge, two at a spring crease."""
-    first = np.cumsum(np.where(spring, 2, 1)) - np.where(spring, 2, 1)
-    return np.column_stack((first, first + spring)), int(len(spring) + spring.sum())
+def triangle_ranks(mesh: SheetMesh) -> Array:
+    """(t,) mean place of the corners in a narrow order of the nodes."""
+    hinges = mesh.topology.hinges
+    pairs = [(i, j) for i in range(4) for j in range(i)]
+    rows = np.concatenate([mesh.triangles[:, 0], *(hinges[:, i] for i, _ in pairs)])
+    columns = np.concatenate([mesh.triangles[:, 1], *(hinges[:, j] for _, j in pairs)])
+    order, _ = reverse_cuthill_mckee(rows, columns, len(mesh.points))
+    position = np.empty(len(order))
+    position[order] = np.arange(len(order))
+    return np.asarray(position[mesh.triangles].mean(axis=1))
 
 
-def _neighbourhoods(
-    mesh: SheetMesh, turns: NDArray[np.bool_], clamped: NDArray[np.bool_], hinge_of: Ints
-) -> tuple[Ints, Ints, Ints]:
-    """(quad, place, nodes) of `ConsistentElements`."""
-    triangles, t = mesh.triangles, len(mesh.triangles)
-    wings = max(int(turns.sum(axis=1).max(initial=0)), 1)
-    nodes = np.full((t, 3 + wings + 1), len(mesh.points), dtype=np.int64)
-    nodes[:, :3] = triangles
-    slot = 2 + np.cumsum(turns, axis=1)
-    quad = np.zeros((t, 3, 4), dtype=np.int64)
-    place = np.zeros((t, 3, 4), dtype=np.int64)
-    at, k = np.nonzero(turns)
-    quad[at, k] = mesh.topology.hinges[hinge_of[at, k]]
-    same = quad[at, k][:, :, None] == triangles[at][:, None, :]
-    place[at, k] = np.where(same.any(axis=2), same.argmax(axis=2), slot[at, k][:, None])
-    across = np.where(same.any(axis=2), 0, quad[at, k]).sum(axis=1)  # the one node that is not a corner
-    nodes[at, slot[at, k]] = across
-    at, k = np.nonzero(clamped)
+def _number_rotations(mesh: SheetMesh, joined: Patches, spring: Bools) -> tuple[Ints, Ints, int]:
+    """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
+
+    There is one for each hinge between two patches, and two for each spring crease.
+    """
+    count = np.ones(len(spring), dtype=np.int64)
+    count[spring] = 2
+    count[joined.hinge[joined.inner]] = 0
+    first = np.cumsum(count) - count
+    both = np.column_stack((first, first + spring))
+    triangles = mesh.topology.edge_triangles[mesh.topology.hinge_edges, 0]
+    side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
+    has = (joined.hinge >= 0) & ~joined.inner
+    return np.where(has, both[joined.hinge, side], -1), both, int(count.sum())
+
+
+def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
+    """Nodes (c, a, 4) of TURN angles and ghosts (c, a, 3) of clamps: where the sheet would go on, as far as the edge."""
+    quad = np.zeros((*joined.kind.shape, 4), dtype=np.int64)
+    ghost = np.zeros((*joined.kind.shape, 3))
+    turning = (joined.kind == TURN) & (joined.hinge >= 0)
+    quad[turning] = mesh.topology.hinges[joined.hinge[turning]]
+    clamp = (joined.kind == TURN) & (joined.hinge < 0)
+    triangle, k = joined.half_edge[clamp] // 3, joined.half_edge[clamp] % 3
     # corner, its opposite edge counter-clockwise, and a ghost that moves with the edge
-    place[at, k] = np.column_stack((k, (k + 1) % 3, (k + 2) % 3, (k + 1) % 3))
-    quad[at, k] = np.take_along_axis(triangles[at], place[at, k], axis=1)
-    return quad, place, nodes
+    corners = np.column_stack((k, (k + 1) % 3, (k + 2) % 3, (k + 1) % 3))
+    quad[clamp] = np.take_along_axis(mesh.triangles[triangle], corners, axis=1)
+    points = mesh.points[quad[clamp]]
+    normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    ghost[clamp] = np.cross(points[:, 2] - points[:, 1], normal)
+    return quad, ghost
 
 
-def _ghosts(mesh: SheetMesh, clamped: NDArray[np.bool_]) -> Array:
-    """(t, 3, 3) where the sheet would go on across a clamped edge: its outward direction, as long as the edge, mm."""
-    ghost = np.zeros((len(mesh.triangles), 3, 3))
-    at, k = np.nonzero(clamped)
-    corner = mesh.points[mesh.triangles[at]]
-    rows = np.arange(len(at))
-    a, b = corner[rows, (k + 1) % 3], corner[rows, (k + 2) % 3]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    ghost[at, k] = np.cross(b - a, normal)
-    return ghost
+def _rows(joined: Patches, quad: Ints) -> tuple[Ints, Ints]:
+    """Nodes (c, p) that the angles of a patch depend on, then -1; and the place (c, a, 4) of each quad among them."""
+    count = len(quad)
+    past = int(quad.max()) + 1
+    used = np.where((joined.kind == TURN)[..., None], quad, past).reshape(count, -1)
+    ordered = np.sort(used, axis=1)
+    fresh = np.diff(ordered, axis=1, prepend=-1) > 0
+    slot = np.cumsum(fresh, axis=1) - 1
+    nodes = np.full(used.shape, past, dtype=np.int64)
+    row, at = np.nonzero(fresh)
+    nodes[row, slot[row, at]] = ordered[row, at]
+    nodes = nodes[:, : max(int((nodes < past).sum(axis=1).max()), 1)]
+    place = (used[:, :, None] == nodes[:, None, :]).argmax(axis=2)
+    return np.where(nodes < past, nodes, -1), place.reshape(quad.shape)

@@ -10,13 +10,15 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from bh.mechanics import consistent_kernels as kernels
-from bh.mechanics.assembly import Pattern, pattern_of_keys
+from bh.mechanics import consistent_setup as setup
+from bh.mechanics.assembly import Pattern
 from bh.mechanics.consistent_elements import consistent_elements
+from bh.mechanics.consistent_pattern import rotation_pattern
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
 from bh.program import StepProgram
-from bh.solvers.matrices import FreeBodyMatrix, Matrix, reverse_cuthill_mckee
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation
 from bh.state import State
 from meshes.topology import Ints
@@ -27,7 +29,7 @@ ROUNDING = 8.0 * np.finfo(float).eps
 
 
 class ElementForces(NamedTuple):
-    """Forces N (t, 3), N/mm, and moments M (t, 3) of triangles and moments S (h,) of spring creases, N mm."""
+    """Edge forces N (t, 3), N/mm, moments M (c, a) of patches and moments S (h,) of spring creases, N mm."""
 
     N: Array
     M: Array
@@ -37,16 +39,19 @@ class ElementForces(NamedTuple):
 class Internal(NamedTuple):
     """Energies (N mm), their gradients to positions f (n, 3) and rotations r (r,), and element forces.
 
-    `sheet` (t, 2) are stretching and bending of the triangles, `springs` is that of the springs and their couples.
-    `size` is a typical element force (N), `turns` (h,) what the springs have turned (rad).
+    `stretching` (t,) is that of the triangles, `bending` the whole, `springs` that of the springs and their couples.
+    `size` is a typical element force (N), `theta` (c, a) are the angles of the patches and `turns` (h,) what the
+    springs have turned (rad).
     """
 
-    sheet: Array
+    stretching: Array
+    bending: float
     springs: float
     size: float
     f: Array
     r: Array
     forces: Array
+    theta: Array
     turns: Array
 
 
@@ -90,7 +95,7 @@ class ConsistentSystem:
     @cached_property
     def energy_scale(self) -> float:
         e = self.elements
-        return 0.5 * float(np.trace(e.B, axis1=1, axis2=2).sum() + e.spring_stiffness.sum())
+        return 0.5 * float(np.trace(e.B_triangle, axis1=1, axis2=2).sum() + e.spring_stiffness.sum())
 
     def start(self) -> Array:
         """Unknowns of the state that the step begins with; the rotations are those of least energy there."""
@@ -103,11 +108,11 @@ class ConsistentSystem:
 
     def rotation_stiffness(self) -> sp.csc_matrix:
         """Hessian of the energy in the rotations alone, which does not depend on anything."""
-        e = self.elements
-        most = 9 * len(e.triangles) + 4 * len(e.springs)
+        e, joined = self.elements, self.elements.patches
+        most = joined.B.size + 4 * len(e.springs)
         rows, columns, values = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-        used = kernels.rotation_matrix(
-            e.rotation, e.kind, e.B, e.turns, e.spring_stiffness, rows, columns, values
+        used = setup.rotation_matrix(
+            e.rotation, joined.kind, joined.B, e.turns, e.spring_stiffness, rows, columns, values
         )
         entries = (values[:used], (rows[:used], columns[:used]))
         return sp.csc_matrix(entries, shape=(e.rotations, e.rotations))
@@ -116,36 +121,52 @@ class ConsistentSystem:
         """(n, 3) node positions, mm."""
         return self.displacements.positions(q[: self.moving], lam)
 
+    @cached_property
+    def _counts(self) -> tuple[int, int, int]:
+        e = self.elements
+        return 3 * len(e.triangles), e.rotation.size, len(e.springs)
+
     def split(self, forces: Array) -> ElementForces:
         """Element forces as they belong together."""
-        t = 3 * len(self.elements.triangles)
-        return ElementForces(forces[:t].reshape(-1, 3), forces[t : 2 * t].reshape(-1, 3), forces[2 * t :])
+        t, c, _ = self._counts
+        angles = self.elements.rotation.shape
+        return ElementForces(forces[:t].reshape(-1, 3), forces[t : t + c].reshape(angles), forces[t + c :])
 
     # ------------------------------------------------------------------------------- the System protocol
 
     def internal(self, x: Array, alpha: Array, lam: float) -> Internal:
         """Energies, gradient and element forces at positions x and rotations alpha."""
-        e = self.elements
+        e, joined = self.elements, self.elements.patches
         f, r = np.zeros_like(x), np.zeros(e.rotations)
-        forces = np.empty(6 * len(e.triangles) + len(e.springs))
+        forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
+        stretching, turns = np.empty(len(e.triangles)), np.empty(len(e.springs))
         N, M, S = self.split(forces)
-        sheet = np.empty((len(e.triangles), 2))
-        size = kernels.sheet_forces(
-            x, alpha, e.triangles, e.rest_square, e.K, e.kind, e.quad, e.ghost, e.rest.at(lam), e.rotation, e.B,
-            f, r, N, M, sheet,
-        )  # fmt: skip
-        turns = np.empty(len(e.springs))
+        size = kernels.stretching_forces(x, e.triangles, e.rest_square, e.K, f, N, stretching)
+        size += kernels.bending_forces(
+            x, alpha, joined.kind, e.quad, e.ghost, e.rest.at(lam), e.rotation, joined.B, f, r, M, theta
+        )
         springs, more = kernels.spring_forces(
             x, alpha, e.hinges, e.spring_stiffness, e.spring_rest.at(lam), e.couple.at(lam), e.turns, f, r, S, turns
         )
         size = float(np.sqrt((size + more) / len(forces)))
-        return Internal(sheet, springs, size, f, r, forces, turns)
+        bending = 0.5 * float(np.vdot(M, theta))
+        return Internal(stretching, bending, springs, size, f, r, forces, theta, turns)
+
+    def bending_by_triangle(self, theta: Array) -> Array:
+        """(t,) energy of bending, N mm, for the angles (c, a) of the patches."""
+        e = self.elements
+        half = np.einsum("cha,ca->ch", e.patches.shares, theta).reshape(*e.patches.members.shape, 3)
+        inside = e.patches.members >= 0
+        out = np.empty(len(e.triangles))
+        member = e.patches.members[inside]
+        out[member] = 0.5 * np.einsum("tk,tkl,tl->t", half[inside], e.B_triangle[member], half[inside])
+        return out
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
-        energy = float(now.sheet.sum()) + now.springs - float(np.vdot(load, x - self.mesh.points))
+        energy = float(now.stretching.sum()) + now.bending + now.springs - float(np.vdot(load, x - self.mesh.points))
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
         return Evaluation(energy, residual, self._imbalance(residual, now.size, load, x), now.forces)
 
@@ -163,10 +184,10 @@ class ConsistentSystem:
     def _heights(self) -> Array:
         """(rotations,) height of a triangle on the edge of each rotation, mm: what turns a moment into a force."""
         e = self.elements
-        height = 2.0 * self.mesh.areas[:, None] / np.sqrt(e.rest_square)
+        height = (2.0 * self.mesh.areas[:, None] / np.sqrt(e.rest_square)).ravel()
         out = np.ones(e.rotations)
         used = e.rotation >= 0
-        out[e.rotation[used]] = height[used]
+        out[e.rotation[used]] = height[e.patches.half_edge[used]]
         return out
 
     @cached_property
@@ -175,64 +196,46 @@ class ConsistentSystem:
         e = self.elements
         stretch = np.einsum("tkk,tk->tk", e.K, e.rest_square).max()
         height = 2.0 * self.mesh.areas[:, None] / np.sqrt(e.rest_square)
-        bend = (np.einsum("tkk->tk", e.B) / height).max()
+        bend = (np.einsum("tkk->tk", e.B_triangle) / height).max()
         spring = (e.spring_stiffness / height.min()).max(initial=0.0)
         return float(stretch), float(max(bend, spring))
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
-        e, pattern = self.elements, self._pattern
+        e, joined, pattern = self.elements, self.elements.patches, self._pattern
         x = self.positions(q, lam)
         N, M, S = self.split(forces)
         data = np.zeros(pattern.size)
-        kernels.sheet_tangent(
-            x, e.triangles, e.rest_square, e.K, N, e.kind, e.quad, e.ghost, e.place, e.rotation, e.B, M,
-            e.nodes, self._frame_of, self.constraints.frames, pattern.slots[0], data,
-        )  # fmt: skip
-        kernels.spring_tangent(
-            x, e.hinges, e.spring_stiffness, S, e.spring_nodes, self._frame_of, self.constraints.frames,
+        axes = (self._frame_of, self.constraints.frames)
+        kernels.stretching_tangent(x, e.triangles, e.K, N, *axes, pattern.slots[0], data)
+        kernels.bending_tangent(
+            x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, joined.B, M, e.nodes, *axes,
             pattern.slots[1], data,
         )  # fmt: skip
+        kernels.spring_tangent(
+            x, e.hinges, e.spring_stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
+        )
         self._tangent_at = x
         if not self.constraints.rigid_body:
             return pattern.matrix(data)
         rigid = self.displacements.rigid(x)
         Z = np.vstack((rigid, np.zeros((self.size - self.moving, rigid.shape[1]))))
         block = self.displacements.grounding(rigid, self._scale)
-        slots, number = pattern.slots[2][0], self.displacements.ground_numbers
+        slots, number = pattern.slots[3][0], self.displacements.ground_numbers
         np.add.at(data, slots[slots >= 0], block[np.tril_indices(9)][slots >= 0])
         inside = number >= 0
         return FreeBodyMatrix(pattern.matrix(data), Z, number[inside], block[np.ix_(inside, inside)])
 
     @cached_property
+    def _spring_nodes(self) -> Ints:
+        """(h, 5) nodes of a spring, and -1 for the block of its rotations."""
+        return np.pad(self.elements.hinges, ((0, 0), (0, 1)), constant_values=-1)
+
+    @cached_property
     def _pattern(self) -> Pattern:
-        """Rotations are numbered with their edges: vertices of the graph are nodes, then rotations."""
-        e, number, n = self.elements, self.displacements.number, len(self.mesh.points)
-        past = np.vstack((number, np.full((1, 3), -1)))
-        sheet, springs = past[e.nodes], past[e.spring_nodes]
-        turns = self.moving + np.where(e.rotation >= 0, e.rotation, -1 - self.moving)
-        sheet[:, -1] = np.where(e.rotation >= 0, turns, -1)
-        springs[:, -1, :2] = self.moving + e.turns
-        groups = [sheet.reshape(len(sheet), -1), springs.reshape(len(springs), 15)]
-        if self.constraints.rigid_body:
-            groups.append(self.displacements.ground_numbers[None, :])
-        rotations = np.where(e.rotation >= 0, n + 1 + e.rotation, n)
-        vertices = np.hstack((e.nodes[:, :-1], rotations))
-        joined = np.hstack((e.spring_nodes[:, :-1], n + 1 + e.turns))
-        order_vertices, _ = reverse_cuthill_mckee(*_pairs(vertices, joined, n), n + 1 + e.rotations)
-        unknowns = np.full((n + 1 + e.rotations, 3), -1, dtype=np.int64)
-        unknowns[:n] = number
-        unknowns[n + 1 :, 0] = self.moving + np.arange(e.rotations)
-        order = unknowns[order_vertices].ravel()
-        order = order[order >= 0]
-        position = np.empty(self.size, dtype=np.int64)
-        position[order] = np.arange(self.size)
-        keys = []
-        for group in groups:
-            width = group.shape[1]
-            slots = np.empty((len(group), width * (width + 1) // 2), dtype=np.int64)
-            kernels.dof_slots(group, position, self.size, slots)
-            keys.append(slots)
-        return pattern_of_keys(order, position, keys)
+        return rotation_pattern(
+            self.elements, self.displacements.number, self.size,
+            self.displacements.ground_numbers if self.constraints.rigid_body else None,
+        )  # fmt: skip
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         v = self.displacements.vectors(dq[: self.moving])
@@ -245,10 +248,12 @@ class ConsistentSystem:
         `controlled` adds what rest angles and couples do while lambda grows at the rate 1.
         """
         e, by = self.elements, float(controlled)
-        rates, turns = np.empty(6 * len(e.triangles) + len(e.springs)), np.empty(len(e.springs))
+        rates, turns = np.empty(sum(self._counts)), np.empty(len(e.springs))
         N, M, S = self.split(rates)
-        kernels.sheet_rates(
-            x, v, w, e.triangles, e.K, e.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, e.B, N, M
+        kernels.stretching_rates(x, v, e.triangles, e.K, N)
+        joined = e.patches
+        kernels.bending_rates(
+            x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, joined.B, M
         )
         kernels.spring_rates(
             x, v, w, e.hinges, e.spring_stiffness, by * e.spring_rest.rate, by * e.couple.rate, e.turns, S, turns
@@ -267,16 +272,16 @@ class ConsistentSystem:
         rates, turns = self._force_rates(x, v, np.zeros(e.rotations), controlled=True)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         (N, M, S), (dN, dM, dS) = self.split(now.forces), self.split(rates)
-        kernels.force_rates(
-            x, v, e.triangles, e.kind, e.quad, e.ghost, e.rotation, N, M, dN, dM, e.hinges, S, dS, e.turns, f, r
-        )
+        kernels.stretching_force_rates(x, v, e.triangles, N, dN, f)
+        kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, M, dM, f, r)
+        kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         return f, r, second
 
     def _rest_work(self, M: Array, S: Array) -> float:
         """Moments times the rates of the rest angles."""
         e = self.elements
-        turning = e.kind == kernels.TURN
+        turning = e.patches.kind == kernels.TURN
         return float(np.vdot(M[turning], e.rest.rate[turning])) + float(S @ e.spring_rest.rate)
 
     def control_rate(self, q: Array, lam: float) -> Array:
@@ -299,17 +304,5 @@ class ConsistentSystem:
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         before, after = self.positions(q, lam), self.positions(q_new, lam_new)
-        turn = float(kernels.largest_turn(before, after, self.mesh.topology.hinges))
+        turn = float(setup.largest_turn(before, after, self.mesh.topology.hinges))
         return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
-
-
-def _pairs(sheet: Ints, springs: Ints, absent: int) -> tuple[Ints, Ints]:
-    """Pairs of vertices that share an element; `absent` stands for none."""
-    rows, columns = [], []
-    for group in (sheet, springs):
-        for i in range(group.shape[1]):
-            for j in range(i):
-                both = (group[:, i] != absent) & (group[:, j] != absent)
-                rows.append(group[both, i])
-                columns.append(group[both, j])
-    return np.concatenate(rows), np.concatenate(columns)
