@@ -63,7 +63,7 @@ class Constraints:
         frame_of: (n,) row of `frames` for nodes whose local axes are not x, y, z; else -1.
         frames: (f, 3, 3) rows are the local axes.
         rigid_body: True if the remaining rigid motions are to be taken out.
-        clamped: (k,) rows of `mesh.topology.edges` across which the sheet keeps its slope.
+        clamped: (k, 2) boundary edges, as node pairs, across which the sheet keeps its slope.
     """
 
     fixed: NDArray[np.bool_]
@@ -72,7 +72,7 @@ class Constraints:
     frame_of: Ints
     frames: Array
     rigid_body: bool
-    clamped: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    clamped: Ints = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
 
 
 def directions(fix: str | Sequence[Sequence[float]]) -> list[Array]:
@@ -158,7 +158,7 @@ def resolve(
             frames.append(_complete(axes))
     stacked = np.array(frames).reshape(-1, 3, 3)
     held = [clamped_edges(mesh, item.at) for item in supports if isinstance(item, Support) and item.clamp]
-    clamped = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))
+    clamped = mesh.topology.edges[np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))]
     constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body, clamped)
     _check_rigid_motions(mesh, constraints)
     return constraints
@@ -206,6 +206,10 @@ def free_motions(points: Array, constraints: Constraints) -> Array:
     for node in np.flatnonzero(constraints.frame_of >= 0):
         motions[node] = constraints.frames[constraints.frame_of[node]] @ motions[node]
     rows = motions[constraints.fixed]
+    if len(constraints.clamped):  # no turn about a clamped edge
+        along = points[constraints.clamped[:, 1]] - points[constraints.clamped[:, 0]]
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        rows = np.vstack((rows, np.hstack((np.zeros_like(along), along))))
     if len(rows) == 0:
         return np.diag(scale)
     # the triangular factor has the same null space and six rows at most, where all left vectors would be (k, k)

@@ -89,7 +89,7 @@ def consistent_elements(
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
     B = bending_matrices(edges, areas, sheet.bending_stiffness(), sheet.nu)
     clamped = np.zeros(len(topology.edges), dtype=bool)
-    clamped[program.constraints.clamped] = True
+    clamped[topology.find_edges(program.constraints.clamped)] = True
     spring = law == SPRING
     joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh))
     rotation, turns, rotations = _number_rotations(mesh, joined, spring)
