@@ -95,7 +95,15 @@ def _cook(result: CaseResult, context: Context) -> None:
         )  # fmt: skip
         series.append(line(kind, [float(n) for n in cells], [abs(e) for e in errors]))
     result.plots.append(
-        plot("cook", "Cook's panel", "cells a side", "relative error", series, "Error of the tip deflection.", log="xy")
+        plot(
+            "cook",
+            "Cook's panel",
+            "cells a side",
+            "relative error",
+            series,
+            "Error of the tip deflection.",
+            log="xy",
+        )
     )
 
 

@@ -64,7 +64,9 @@ def stretching_error(mesh: SheetMesh, sheet: Sheet, F: Array) -> PatchError:
     shift = target - mesh.points
     nodes = rim(mesh).tolist()
     model = Model(mesh, sheet, formulation="consistent").support("all", "z")
-    model = model.step(*(Displace([n], axis, float(shift[n, i])) for n in nodes for i, axis in enumerate("xy")))
+    model = model.step(
+        *(Displace([n], axis, float(shift[n, i])) for n in nodes for i, axis in enumerate("xy"))
+    )
     path = trace(model)
     state = path[-1]
     green = 0.5 * (F.T @ F - np.eye(2))

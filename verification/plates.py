@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,4 +103,4 @@ def strip_ratio(load: str, kind: Kind, rows: int, alpha: float = 1.0, nu: float 
 
 def rates(errors: list[float]) -> list[float]:
     """Orders of convergence where each error belongs to half the cells of the next."""
-    return [math.log2(abs(a) / abs(b)) for a, b in zip(errors[:-1], errors[1:], strict=True)]
+    return [math.log2(abs(a) / abs(b)) for a, b in pairwise(errors)]

@@ -111,7 +111,10 @@ def consistent_elements(
     ends = mesh.points[topology.hinges[:, 1:3]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     k_fold = folding_hinge_stiffness(program.stiffness, length)[springs]
-    begin = held_start[springs] - moment_start[springs] / np.where(k_fold == 0.0, np.inf, k_fold)
+    couple = Ramp((program.moment.start * length)[springs], (program.moment.end * length)[springs])
+    # a released crease goes on with its moment, of which the couple carries its part
+    carried = moment_start[springs] - couple.start
+    begin = held_start[springs] - carried / np.where(k_fold == 0.0, np.inf, k_fold)
     begin = np.where(np.isnan(program.rest.start[springs]), begin, program.rest.start[springs])
     return ConsistentElements(
         triangles=mesh.triangles, rest_square=(edges**2).sum(axis=2),
@@ -119,7 +122,7 @@ def consistent_elements(
         quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
         width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=Ramp(begin, program.rest.end[springs]),
-        couple=Ramp((program.moment.start * length)[springs], (program.moment.end * length)[springs]),
+        couple=couple,
         held=Ramp(*(np.where(law == HELD, at, np.nan) for at in (held.start, held.end))), rotations=rotations,
     )  # fmt: skip
 
@@ -164,7 +167,7 @@ def _number_rotations(mesh: SheetMesh, joined: Patches, spring: Bools) -> tuple[
 
 
 def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
-    """Nodes (c, a, 4) of TURN angles and ghosts (c, a, 3) of clamps: where the sheet would go on, as far as the edge."""
+    """Nodes (c, a, 4) of TURN angles, and ghosts (c, a, 3) of clamps: where the sheet would go on, mm."""
     quad = np.zeros((*joined.kind.shape, 4), dtype=np.int64)
     ghost = np.zeros((*joined.kind.shape, 3))
     turning = (joined.kind == TURN) & (joined.hinge >= 0)

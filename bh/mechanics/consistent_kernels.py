@@ -3,10 +3,10 @@
 Stretching: a triangle measures three half squares of its edges, gamma_k = (l_k^2 - L_k^2) / 2 (mm^2), edge k opposite
 corner k; its energy is 1/2 gamma.K.gamma.
 
-Bending: a patch of one or more triangles measures angles theta (rad), its energy is 1/2 theta.B.theta. At an edge of the
-patch theta is the angle between the triangle and the sheet's tangent plane at the edge, positive as in a valley; at an
-edge inside it is what the two sides take together (how they share it is already eliminated from B). As `kind[c, a]`
-says, theta_a is
+Bending: a patch of one or more triangles measures angles theta (rad), its energy is 1/2 theta.B.theta. At an edge of
+the patch theta is the angle between the triangle and the sheet's tangent plane at the edge, positive as in a valley; at
+an edge inside it is what the two sides take together (how they share it is already eliminated from B). As
+`kind[c, a]` says, theta_a is
 
     NONE    0: not used (patches have different numbers of angles)
     OWN     alpha: the edge's unknown rotation, `rotation[c, a]`
@@ -14,14 +14,12 @@ says, theta_a is
             clamp)
 
 The two sides of an edge thus add up to phi - rest. Only TURN angles depend on positions: those of the four nodes
-`quad[c, a]` of the hinge, of which a clamp's last one is `ghost[c, a]` (mm) beside its second. The matrix of a patch has
-three rows for each of its nodes, where `place[c, a]` are those of the quad, then one for each rotation, `column[c, a]`.
-Constant matrices; mm, N, rad.
+`quad[c, a]` of the hinge, of which a clamp's last one is `ghost[c, a]` (mm) beside its second. The matrix of a patch
+has three rows for each of its nodes, where `place[c, a]` are those of the quad, then one for each rotation,
+`column[c, a]`. mm, N, rad.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numba import njit
@@ -238,7 +236,7 @@ def bending_rates(x, v, w, kind, quad, ghost, rest_rate, rotation, B, out):  # t
 def spring_forces(x, alpha, hinges, stiffness, rest, couple, rotation, f, r, S, turns):  # type: ignore[no-untyped-def]
     """Energy (N mm) and sum of squared forces of spring creases; adds the gradient to f and r.
 
-    Energy 1/2 k turn^2 + couple turn with turn = phi - alpha_1 - alpha_2 - rest. Writes the moments S and the turns (h,).
+    Energy 1/2 k turn^2 + couple turn with turn = phi - alpha_1 - alpha_2 - rest. Writes moments S and turns (h,).
     """
     g = np.empty(12)
     energy, size = 0.0, 0.0

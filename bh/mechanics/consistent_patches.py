@@ -49,7 +49,9 @@ def bending_matrices(edges: Array, areas: Array, D: float, nu: float) -> Array:
     """
     lengths = np.linalg.norm(edges, axis=2)
     tangent = edges / lengths[..., None]
-    cosine = np.einsum("tki,tli->tkl", tangent, tangent)  # of the normals too, which are turned by a right angle
+    cosine = np.einsum(
+        "tki,tli->tkl", tangent, tangent
+    )  # of the normals too, which are turned by a right angle
     weight = lengths[:, :, None] * lengths[:, None, :] * (D / areas)[:, None, None]
     return weight * ((1.0 - nu) * cosine**2 + nu)
 
@@ -79,7 +81,9 @@ class Patches:
     shares: Array
 
 
-def patches(mesh: SheetMesh, B: Array, spring: Bools, clamped: Bools, rank: Array, joined: int = JOINED) -> Patches:
+def patches(
+    mesh: SheetMesh, B: Array, spring: Bools, clamped: Bools, rank: Array, joined: int = JOINED
+) -> Patches:
     """Patches of a mesh.
 
     Args:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bh.mechanics.assembly import Pattern, pattern_of_keys
 from bh.mechanics.consistent_elements import ConsistentElements

@@ -146,7 +146,17 @@ class ConsistentSystem:
             x, alpha, joined.kind, e.quad, e.ghost, e.rest.at(lam), e.rotation, joined.B, f, r, M, theta
         )
         springs, more = kernels.spring_forces(
-            x, alpha, e.hinges, e.spring_stiffness, e.spring_rest.at(lam), e.couple.at(lam), e.turns, f, r, S, turns
+            x,
+            alpha,
+            e.hinges,
+            e.spring_stiffness,
+            e.spring_rest.at(lam),
+            e.couple.at(lam),
+            e.turns,
+            f,
+            r,
+            S,
+            turns,
         )
         size = float(np.sqrt((size + more) / len(forces)))
         bending = 0.5 * float(np.vdot(M, theta))
@@ -166,7 +176,12 @@ class ConsistentSystem:
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
-        energy = float(now.stretching.sum()) + now.bending + now.springs - float(np.vdot(load, x - self.mesh.points))
+        energy = (
+            float(now.stretching.sum())
+            + now.bending
+            + now.springs
+            - float(np.vdot(load, x - self.mesh.points))
+        )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
         return Evaluation(energy, residual, self._imbalance(residual, now.size, load, x), now.forces)
 
@@ -256,7 +271,16 @@ class ConsistentSystem:
             x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, joined.B, M
         )
         kernels.spring_rates(
-            x, v, w, e.hinges, e.spring_stiffness, by * e.spring_rest.rate, by * e.couple.rate, e.turns, S, turns
+            x,
+            v,
+            w,
+            e.hinges,
+            e.spring_stiffness,
+            by * e.spring_rest.rate,
+            by * e.couple.rate,
+            e.turns,
+            S,
+            turns,
         )
         return rates, turns
 

@@ -17,5 +17,7 @@ def simply_supported_uniform(terms: int = 60) -> float:
     total = 0.0
     for m in range(1, 2 * terms, 2):
         for n in range(1, 2 * terms, 2):
-            total += math.sin(0.5 * m * math.pi) * math.sin(0.5 * n * math.pi) / (m * n * (m * m + n * n) ** 2)
+            total += (
+                math.sin(0.5 * m * math.pi) * math.sin(0.5 * n * math.pi) / (m * n * (m * m + n * n) ** 2)
+            )
     return 16.0 / math.pi**6 * total
