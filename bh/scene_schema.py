@@ -151,7 +151,7 @@ class SupportTable(Table):
     def rigid_body_fixes_nothing(self) -> SupportTable:
         if self.at == "rigid-body" and (self.fix is not None or self.clamp):
             raise ValueError(
-                'at = "rigid-body" takes out the motions that are left and needs no fix or clamp; remove it'
+                'at = "rigid-body" takes out the motions that are left and needs neither; remove fix and clamp'
             )
         return self
 
