@@ -1,13 +1,14 @@
 """Crease-conforming meshes of any pattern by gmsh.
 
-Boundary curves and creases are cut into edges of about the wanted size whose nodes lie exactly on them; between them the
-sheet is filled with nearly equilateral triangles. Named edge sets know the curve that they lie on.
+Boundary curves and creases are cut into edges of about the wanted size whose nodes lie exactly on them; between them
+the sheet is filled with nearly equilateral triangles. Named edge sets know the curve that they lie on.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,9 @@ from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.topology import Ints
 
-Faces = list[tuple[list[list[int]], list[tuple[int, int]]]]  # of every face: its loops of nodes, and edges inside
+Faces = list[
+    tuple[list[list[int]], list[tuple[int, int]]]
+]  # of every face: its loops of nodes, and edges inside
 
 
 def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> SheetMesh:
@@ -32,12 +35,16 @@ def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> Sheet
         MeshError: a size that cannot be, an outline that its named edges do not make up, or gmsh failed.
     """
     if not isinstance(pattern, CreasePattern):
-        raise MeshError(f"a {type(pattern).__name__} cannot be meshed; give a pattern, such as meshes.strip(100, 10)")
+        raise MeshError(
+            f"a {type(pattern).__name__} cannot be meshed; give a pattern, such as meshes.strip(100, 10)"
+        )
     if not math.isfinite(size) or size <= 0.0:
         raise MeshError(f"size = {size} cannot be; use a positive edge length in mm")
     area = _area(pattern)
     if area / (0.43 * size**2) > 1e6:
-        raise MeshError(f"size = {size} would make some {area / (0.43 * size**2):.1g} triangles; use a larger size")
+        raise MeshError(
+            f"size = {size} would make some {area / (0.43 * size**2):.1g} triangles; use a larger size"
+        )
     curves = {f"edge:{name}": curve for name, curve in pattern.edges}
     if not curves:
         raise MeshError("this pattern names no boundary curves; an unstructured mesh needs them")
@@ -67,16 +74,18 @@ def _chains(curves: dict[str, Curve], size: float) -> tuple[Array, dict[str, Int
     ends = np.vstack([curve.point(np.array([0.0, 1.0])) for curve in curves.values()])
     near = 1e-6 * float(np.ptp(ends, axis=0).max() + size)
     points: list[Array] = []
+    joints: list[int] = []  # where curves may meet
     chains: dict[str, Ints] = {}
     for name, curve in curves.items():
         breaks = _breaks(curve, ends, near)
         u = [breaks[0]]
-        for a, b in zip(breaks[:-1], breaks[1:], strict=True):
+        for a, b in pairwise(breaks):
             cells = max(1, round((b - a) * curve.length / size))
             if curve.closed and len(breaks) == 2:
                 cells = max(3, cells)
-            u += list(a + (b - a) * np.arange(1, cells + 1) / cells)
-        nodes = [_node(points, at, near) for at in curve.point(np.array(u))]
+            u += [*(a + (b - a) * np.arange(1, cells) / cells).tolist(), b]
+        nodes = [_node(points, joints, at, near) if value in breaks else _new(points, at)
+                 for value, at in zip(u, curve.point(np.array(u)), strict=True)]  # fmt: skip
         chains[name] = np.column_stack((nodes[:-1], nodes[1:]))
     return np.array(points), chains
 
@@ -104,13 +113,16 @@ def _breaks(curve: Curve, ends: Array, near: float) -> list[float]:
     return [value for i, value in enumerate(found) if i == 0 or value - found[i - 1] > apart]
 
 
-def _node(points: list[Array], at: Array, near: float) -> int:
-    """Index of the point at that place, made if there is none."""
-    if points:
-        distance = np.linalg.norm(np.array(points) - at, axis=1)
-        k = int(distance.argmin())
-        if distance[k] < near:
+def _node(points: list[Array], joints: list[int], at: Array, near: float) -> int:
+    """Index of the joint at that place, made if there is none."""
+    for k in joints:
+        if math.dist(points[k], at) < near:
             return k
+    joints.append(_new(points, at))
+    return joints[-1]
+
+
+def _new(points: list[Array], at: Array) -> int:
     points.append(at)
     return len(points) - 1
 
@@ -138,7 +150,9 @@ def _faces(pattern: CreasePattern, points: Array, segments: Ints) -> Faces:
             pair for pair in loose if polygon.covers(shapely.Point(points[list(pair)].mean(axis=0)))
         ]  # creases that end inside the sheet
         found.append((loops, [(int(a), int(b)) for a, b in inside]))
-    covered = sum(shapely.Polygon(points[loops[0]], [points[loop] for loop in loops[1:]]).area for loops, _ in found)
+    covered = sum(
+        shapely.Polygon(points[loops[0]], [points[loop] for loop in loops[1:]]).area for loops, _ in found
+    )
     if abs(covered - sheet.area) > 0.05 * sheet.area:
         raise MeshError("the named boundary curves do not enclose the sheet; name all of its edges")
     return found
@@ -169,7 +183,9 @@ def _fill(points: Array, faces: Faces, size: float, seed: int) -> tuple[Array, I
         embedded = []
         for loops, inside in faces:
             tags = [
-                gmsh.model.geo.addCurveLoop([line(a, b) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)])
+                gmsh.model.geo.addCurveLoop(
+                    [line(a, b) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
+                )
                 for loop in loops
             ]
             embedded.append((gmsh.model.geo.addPlaneSurface(tags), [abs(line(a, b)) for a, b in inside]))
@@ -211,7 +227,10 @@ def _corners(chains: dict[str, Ints]) -> dict[str, int]:
     names: Sequence[str] = list(edges)
     for i, one in enumerate(names):
         for two in names[i + 1 :]:
-            shared = {int(edges[one][0, 0]), int(edges[one][-1, 1])} & {int(edges[two][0, 0]), int(edges[two][-1, 1])}
+            shared = {int(edges[one][0, 0]), int(edges[one][-1, 1])} & {
+                int(edges[two][0, 0]),
+                int(edges[two][-1, 1]),
+            }
             if len(shared) == 1:
                 found[f"corner:{one}-{two}"] = shared.pop()
     return found
