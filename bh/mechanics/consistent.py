@@ -49,7 +49,7 @@ class Consistent:
         topology = mesh.topology
         x = system.positions(q, lam)
         now = system.internal(x, q[system.moving :], lam)
-        _, M, S = system.split(now.forces)
+        _, M, S, L = system.split(now.forces)
         stretching, bending = now.stretching, system.bending_by_triangle(now.theta)
         folding = 0.5 * e.spring_stiffness * now.turns**2
 
@@ -60,14 +60,14 @@ class Consistent:
         moments = np.full(len(angles), np.nan)
         ends = mesh.points[topology.hinges[:, 1:3]]
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        moments[e.springs] = (S - e.couple.at(lam)) / lengths[e.springs]
+        moments[e.springs] = (S - e.couple.at(lam) + L[e.springs]) / lengths[e.springs]
         turning = (e.patches.kind == TURN) & (e.patches.hinge >= 0)
         by_hinge = np.zeros(len(angles))
         by_hinge[e.patches.hinge[turning]] = M[turning]
         moments[held] = (by_hinge / lengths)[held]
         return State(
             mesh=mesh, step=step, lam=lam, points=x,
-            energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum())),
+            energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock),
             dihedral_angles=angles,
             energy_density={
                 "stretching": stretching / mesh.areas,

@@ -17,8 +17,9 @@ from bh.mechanics.consistent_patches import (
     stretching_matrices,
     triangle_frames,
 )
+from bh.mechanics.hinge_lock import ZONE, until_closed
 from bh.mechanics.kinematics import dihedral_angles
-from bh.mechanics.stiffness import folding_hinge_stiffness
+from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.model import Model
 from bh.program import HELD, SHEET, SPRING, StepProgram
 from bh.solvers.matrices import reverse_cuthill_mckee
@@ -45,6 +46,7 @@ class ConsistentElements:
         springs: (h,) rows of `mesh.topology.hinges`; `hinges` (h, 4) their nodes, `turns` (h, 2) their rotations.
         spring_stiffness: (h,) N mm / rad; spring_rest, couple: (h,) rest angles (rad) and applied couples (N mm).
         held: (m,) held dihedral angles at every hinge, rad; nan where it is not held.
+        lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at held ones.
         rotations: how many there are.
     """
 
@@ -68,6 +70,7 @@ class ConsistentElements:
     spring_rest: Ramp
     couple: Ramp
     held: Ramp
+    lock: Array
     rotations: int
 
 
@@ -123,8 +126,26 @@ def consistent_elements(
         width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=Ramp(begin, program.rest.end[springs]),
         couple=couple,
-        held=Ramp(*(np.where(law == HELD, at, np.nan) for at in (held.start, held.end))), rotations=rotations,
+        held=Ramp(*(np.where(law == HELD, at, np.nan) for at in (held.start, held.end))),
+        lock=lock_stiffness(model, program), rotations=rotations,
     )  # fmt: skip
+
+
+def lock_stiffness(model: Model, program: StepProgram) -> Array:
+    """(m,) stiffness of the locks, N mm / rad: the spring's own or that of uncreased sheet (Eq. 3.11), the larger one.
+
+    Held creases follow their angle and have none, nor have hinges that are made closed.
+    """
+    mesh, topology = model.mesh, model.mesh.topology
+    if not model.hinge_lock or len(topology.hinges) == 0:
+        return np.zeros(len(topology.hinges))
+    ends = mesh.points[topology.hinges[:, 1:3]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    areas = mesh.areas[topology.edge_triangles[topology.hinge_edges]].sum(axis=1)
+    sheet = bending_hinge_stiffness(model.sheet.E, model.sheet.t, length, areas)
+    spring = np.where(program.law == SPRING, folding_hinge_stiffness(program.stiffness, length), 0.0)
+    without = (program.law == HELD) | (until_closed(dihedral_angles(mesh.points, topology.hinges)) < ZONE)
+    return np.where(without, 0.0, np.maximum(spring, sheet))
 
 
 def _check_moments(mesh: SheetMesh, program: StepProgram) -> None:

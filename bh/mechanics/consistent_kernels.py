@@ -25,6 +25,7 @@ import numpy as np
 from numba import njit
 
 from bh.mechanics.assembly import _rotate, _scatter
+from bh.mechanics.hinge_lock import in_zone
 from bh.mechanics.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
 
 NONE, OWN, TURN = 0, 1, 2
@@ -122,18 +123,20 @@ def _turn_geometry(x, quad, ghost, xl, g):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def bending_forces(x, alpha, kind, quad, ghost, rest, rotation, B, f, r, M, theta):  # type: ignore[no-untyped-def]
-    """Sum of squared forces (N^2); adds the gradient of the energy to f (n, 3) and, for alpha, to r (rotations,).
+    """Sum of squared forces (N^2), and whether a hinge is about to close.
 
-    `rest` (c, a) are rest angles. Writes the angles theta and the moments M = B theta (c, a), N mm.
+    Adds the gradient of the energy to f (n, 3) and, for alpha, to r (rotations,). `rest` (c, a) are rest angles.
+    Writes the angles theta and the moments M = B theta (c, a), N mm.
     """
     xl, g = np.empty((4, 3)), np.empty((kind.shape[1], 12))
-    size = 0.0
+    size, closing = 0.0, False
     for c in range(len(kind)):
         for a in range(kind.shape[1]):
             angle = alpha[rotation[c, a]] if rotation[c, a] >= 0 else 0.0
             if kind[c, a] == TURN:
                 geometry = _turn_geometry(x, quad[c, a], ghost[c, a], xl, g[a])
                 angle = geometry[0] - rest[c, a] - angle
+                closing = closing or in_zone(geometry[0])
             theta[c, a] = angle
         for a in range(kind.shape[1]):
             if kind[c, a] == NONE:
@@ -150,7 +153,7 @@ def bending_forces(x, alpha, kind, quad, ghost, rest, rotation, B, f, r, M, thet
                 for p in range(4):
                     for i in range(3):
                         f[quad[c, a, p], i] += s * g[a, 3 * p + i]
-    return size
+    return size, closing
 
 
 @njit(**OPTIONS)
@@ -172,7 +175,11 @@ def _add_placed(H, small, place):  # type: ignore[no-untyped-def]
 def bending_tangent(  # type: ignore[no-untyped-def]
     x, kind, quad, ghost, place, rotation, column, width, B, M, nodes, frame_of, frames, slots, data
 ):
-    """Add the tangent of the patches with moments M to `data`; `nodes` (c, p) are their nodes, then -1."""
+    """Add the tangent of the patches with moments M to `data`; `nodes` (c, p) are their nodes, then -1.
+
+    Returns whether a hinge is about to close.
+    """
+    closing = False
     angles, most = kind.shape[1], 3 * nodes.shape[1]
     H, small = np.empty((most, most)), np.zeros((12, 12))
     G, W = np.zeros((angles, most)), np.empty((angles, most))
@@ -186,6 +193,7 @@ def bending_tangent(  # type: ignore[no-untyped-def]
                 G[a, column[c, a]] = 1.0
             elif kind[c, a] == TURN:
                 geometry = _turn_geometry(x, quad[c, a], ghost[c, a], xl, g)
+                closing = closing or in_zone(geometry[0])
                 for p in range(4):
                     for i in range(3):
                         G[a, 3 * place[c, a, p] + i] += g[3 * p + i]
@@ -207,6 +215,7 @@ def bending_tangent(  # type: ignore[no-untyped-def]
         if len(frames) > 0:
             _rotate(H, nodes[c], frame_of, frames)
         _scatter(H, n, slots[c], data)
+    return closing
 
 
 @njit(**OPTIONS)
@@ -234,14 +243,16 @@ def bending_rates(x, v, w, kind, quad, ghost, rest_rate, rotation, B, out):  # t
 
 @njit(**OPTIONS)
 def spring_forces(x, alpha, hinges, stiffness, rest, couple, rotation, f, r, S, turns):  # type: ignore[no-untyped-def]
-    """Energy (N mm) and sum of squared forces of spring creases; adds the gradient to f and r.
+    """Energy (N mm) and sum of squared forces of spring creases, and whether one is about to close.
 
-    Energy 1/2 k turn^2 + couple turn with turn = phi - alpha_1 - alpha_2 - rest. Writes moments S and turns (h,).
+    Adds the gradient to f and r. Energy 1/2 k turn^2 + couple turn with
+    turn = phi - alpha_1 - alpha_2 - rest. Writes moments S and turns (h,).
     """
     g = np.empty(12)
-    energy, size = 0.0, 0.0
+    energy, size, closing = 0.0, 0.0, False
     for h in range(len(hinges)):
         geometry = hinge_geometry(x, hinges[h], g)
+        closing = closing or in_zone(geometry[0])
         turn = geometry[0] - alpha[rotation[h, 0]] - alpha[rotation[h, 1]] - rest[h]
         s = stiffness[h] * turn + couple[h]
         S[h], turns[h] = s, turn
@@ -252,31 +263,38 @@ def spring_forces(x, alpha, hinges, stiffness, rest, couple, rotation, f, r, S, 
         for p in range(4):
             for i in range(3):
                 f[hinges[h, p], i] += s * g[3 * p + i]
-    return energy, size
+    return energy, size, closing
 
 
 @njit(**OPTIONS)
 def _spring_matrix(x, hinge, stiffness, s, H, small, g):  # type: ignore[no-untyped-def]
-    """Tangent of a spring crease for its four nodes and two rotations into the lower triangle of H (15, 15)."""
+    """Tangent of a spring crease for its four nodes and two rotations into the lower triangle of H (15, 15).
+
+    Returns whether it is about to close.
+    """
     H[:, :] = 0.0
     small[:, :] = 0.0
-    add_hinge_hessian(hinge_geometry(x, hinge, g), s, small)
+    geometry = hinge_geometry(x, hinge, g)
+    add_hinge_hessian(geometry, s, small)
     for p in range(12):
         for q in range(p + 1):
             H[p, q] = small[p, q] + stiffness * g[p] * g[q]
         H[12, p] = H[13, p] = -stiffness * g[p]
     H[12, 12] = H[13, 12] = H[13, 13] = stiffness
+    return in_zone(geometry[0])
 
 
 @njit(**OPTIONS)
 def spring_tangent(x, hinges, stiffness, S, nodes, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]
     """Add the tangent of spring creases with moments S to `data`; `nodes` (h, 5) are their nodes, then -1."""
     H, small, g = np.empty((15, 15)), np.zeros((12, 12)), np.empty(12)
+    closing = False
     for h in range(len(hinges)):
-        _spring_matrix(x, hinges[h], stiffness[h], S[h], H, small, g)
+        closing = _spring_matrix(x, hinges[h], stiffness[h], S[h], H, small, g) or closing
         if len(frames) > 0:
             _rotate(H, nodes[h], frame_of, frames)
         _scatter(H, 15, slots[h], data)
+    return closing
 
 
 @njit(**OPTIONS)

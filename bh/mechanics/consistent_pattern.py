@@ -11,11 +11,14 @@ from bh.solvers.matrices import reverse_cuthill_mckee
 from meshes.topology import Ints
 
 
-def rotation_pattern(e: ConsistentElements, number: Ints, size: int, ground: Ints | None) -> Pattern:
-    """Pattern of triangles, patches, spring creases and (9,) unknowns of the grounded triangle, if there is one.
+def rotation_pattern(
+    e: ConsistentElements, hinges: Ints, number: Ints, size: int, ground: Ints | None
+) -> Pattern:
+    """Pattern of triangles, patches, spring creases, locks and (9,) unknowns of the grounded triangle, if there is one.
 
-    `number` (n, 3) numbers the displacements, -1 if prescribed; rotations come after them. In the graph that is ordered
-    every rotation is a vertex beside the nodes, so that rotations are numbered with their edges.
+    `hinges` (m, 4) are those with locks. `number` (n, 3) numbers the displacements, -1 if prescribed; rotations come
+    after them. In the graph that is ordered every rotation is a vertex beside the nodes, so that rotations are numbered
+    with their edges.
     """
     n, moving = len(number), size - e.rotations
     past = np.vstack((number, np.full((1, 3), -1)))
@@ -24,7 +27,12 @@ def rotation_pattern(e: ConsistentElements, number: Ints, size: int, ground: Int
     patches = past[e.nodes].reshape(len(e.nodes), -1)
     patches[c, e.column[c, a]] = moving + rotations
     springs = np.hstack((number[e.hinges].reshape(-1, 12), moving + e.turns, np.full((len(e.hinges), 1), -1)))
-    groups = [(number[e.triangles].reshape(-1, 9), None), (patches, e.width), (springs, None)]
+    groups = [
+        (number[e.triangles].reshape(-1, 9), None),
+        (patches, e.width),
+        (springs, None),
+        (number[hinges].reshape(-1, 12), None),
+    ]
     if ground is not None:
         groups.append((ground[None, :], None))
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
-from bh.mechanics.consistent_kernels import OWN  # noqa
-from bh.mechanics.kinematics import OPTIONS, hinge_geometry
+from bh.mechanics.kinematics import OPTIONS
 
 
 @njit(**OPTIONS)
@@ -72,14 +69,3 @@ def rotation_matrix(rotation, kind, B, turns, stiffness, rows, columns, values):
                 rows[at], columns[at], values[at] = turns[h, k], turns[h, j], stiffness[h]
                 at += 1
     return at
-
-
-@njit(**OPTIONS)
-def largest_turn(x, y, hinges):  # type: ignore[no-untyped-def]
-    """Largest change of a dihedral angle between positions x and y, rad."""
-    g = np.empty(12)
-    largest = 0.0
-    for h in range(len(hinges)):
-        before, after = hinge_geometry(x, hinges[h], g)[0], hinge_geometry(y, hinges[h], g)[0]
-        largest = max(largest, abs(after - before))
-    return largest if math.isfinite(largest) else math.inf

@@ -9,16 +9,19 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from bh.mechanics import closing as closings
 from bh.mechanics import consistent_kernels as kernels
 from bh.mechanics import consistent_setup as setup
 from bh.mechanics.assembly import Pattern
-from bh.mechanics.consistent_elements import consistent_elements
+from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent_pattern import rotation_pattern
 from bh.mechanics.displacements import Displacements
+from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
+from bh.mechanics.motions import describe_motion
 from bh.model import Model
-from bh.program import StepProgram
-from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.program import HELD, StepProgram
+from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
 from bh.solvers.system import Evaluation
 from bh.state import State
 from meshes.topology import Ints
@@ -29,17 +32,19 @@ ROUNDING = 8.0 * np.finfo(float).eps
 
 
 class ElementForces(NamedTuple):
-    """Edge forces N (t, 3), N/mm, moments M (c, a) of patches and moments S (h,) of spring creases, N mm."""
+    """Edge forces N (t, 3), N/mm; moments of patches M (c, a), spring creases S (h,) and locks L (m,), N mm."""
 
     N: Array
     M: Array
     S: Array
+    L: Array
 
 
 class Internal(NamedTuple):
     """Energies (N mm), their gradients to positions f (n, 3) and rotations r (r,), and element forces.
 
-    `stretching` (t,) is that of the triangles, `bending` the whole, `springs` that of the springs and their couples.
+    `stretching` (t,) is that of the triangles, `bending` the whole, `springs` that of the springs and their couples,
+    `lock` that of locks.
     `size` is a typical element force (N), `theta` (c, a) are the angles of the patches and `turns` (h,) what the
     springs have turned (rad).
     """
@@ -47,6 +52,7 @@ class Internal(NamedTuple):
     stretching: Array
     bending: float
     springs: float
+    lock: float
     size: float
     f: Array
     r: Array
@@ -62,12 +68,14 @@ class ConsistentSystem:
         self.mesh = mesh = model.mesh
         self.program = program
         self.force = program.force
-        hinges = mesh.topology.hinges
+        self.hinges = hinges = mesh.topology.hinges
         start_points = mesh.points if start is None else start.points
         reference = dihedral_angles(mesh.points, hinges)
         ends = mesh.points[hinges[:, 1:3]]
         moments = np.zeros(len(hinges)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        # a released crease begins with the moment that it has; what its lock takes of it is not the spring's
+        moments -= lock_terms(dihedral_angles(start_points, hinges), lock_stiffness(model, program))[:, 1]
         # a crease that was ordinary sheet up to here is smooth, whatever its triangles do
         angles = (
             reference
@@ -82,6 +90,7 @@ class ConsistentSystem:
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
         self._tangent_at = mesh.points
+        self._closing = False
         self._frame_of = np.append(self.constraints.frame_of, -1)
         if self.constraints.rigid_body:
             self.displacements.check_balance(self.force)
@@ -122,15 +131,15 @@ class ConsistentSystem:
         return self.displacements.positions(q[: self.moving], lam)
 
     @cached_property
-    def _counts(self) -> tuple[int, int, int]:
+    def _counts(self) -> tuple[int, int, int, int]:
         e = self.elements
-        return 3 * len(e.triangles), e.rotation.size, len(e.springs)
+        return 3 * len(e.triangles), e.rotation.size, len(e.springs), len(e.lock)
 
     def split(self, forces: Array) -> ElementForces:
         """Element forces as they belong together."""
-        t, c, _ = self._counts
-        angles = self.elements.rotation.shape
-        return ElementForces(forces[:t].reshape(-1, 3), forces[t : t + c].reshape(angles), forces[t + c :])
+        t, c, h, _ = self._counts
+        M = forces[t : t + c].reshape(self.elements.rotation.shape)
+        return ElementForces(forces[:t].reshape(-1, 3), M, forces[t + c : t + c + h], forces[t + c + h :])
 
     # ------------------------------------------------------------------------------- the System protocol
 
@@ -140,27 +149,20 @@ class ConsistentSystem:
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
         stretching, turns = np.empty(len(e.triangles)), np.empty(len(e.springs))
-        N, M, S = self.split(forces)
+        N, M, S, L = self.split(forces)
         size = kernels.stretching_forces(x, e.triangles, e.rest_square, e.K, f, N, stretching)
-        size += kernels.bending_forces(
+        more, closing = kernels.bending_forces(
             x, alpha, joined.kind, e.quad, e.ghost, e.rest.at(lam), e.rotation, joined.B, f, r, M, theta
         )
-        springs, more = kernels.spring_forces(
-            x,
-            alpha,
-            e.hinges,
-            e.spring_stiffness,
-            e.spring_rest.at(lam),
-            e.couple.at(lam),
-            e.turns,
-            f,
-            r,
-            S,
-            turns,
+        rest, couple = e.spring_rest.at(lam), e.couple.at(lam)
+        springs, most, too = kernels.spring_forces(
+            x, alpha, e.hinges, e.spring_stiffness, rest, couple, e.turns, f, r, S, turns
         )
-        size = float(np.sqrt((size + more) / len(forces)))
+        L[:] = 0.0
+        lock = closings.lock_forces(x, self.hinges, e.lock, f, L) if closing or too else 0.0
+        size = float(np.sqrt((size + more + most) / (len(forces) - len(L))))
         bending = 0.5 * float(np.vdot(M, theta))
-        return Internal(stretching, bending, springs, size, f, r, forces, theta, turns)
+        return Internal(stretching, bending, springs, lock, size, f, r, forces, theta, turns)
 
     def bending_by_triangle(self, theta: Array) -> Array:
         """(t,) energy of bending, N mm, for the angles (c, a) of the patches."""
@@ -180,6 +182,7 @@ class ConsistentSystem:
             float(now.stretching.sum())
             + now.bending
             + now.springs
+            + now.lock
             - float(np.vdot(load, x - self.mesh.points))
         )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
@@ -218,24 +221,27 @@ class ConsistentSystem:
     def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
         e, joined, pattern = self.elements, self.elements.patches, self._pattern
         x = self.positions(q, lam)
-        N, M, S = self.split(forces)
+        N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)
         axes = (self._frame_of, self.constraints.frames)
         kernels.stretching_tangent(x, e.triangles, e.K, N, *axes, pattern.slots[0], data)
-        kernels.bending_tangent(
+        closing = kernels.bending_tangent(
             x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, joined.B, M, e.nodes, *axes,
             pattern.slots[1], data,
         )  # fmt: skip
-        kernels.spring_tangent(
+        closing |= kernels.spring_tangent(
             x, e.hinges, e.spring_stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
         )
+        if closing or L.any():
+            closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
+        self._closing = bool(closing)
         self._tangent_at = x
         if not self.constraints.rigid_body:
             return pattern.matrix(data)
         rigid = self.displacements.rigid(x)
         Z = np.vstack((rigid, np.zeros((self.size - self.moving, rigid.shape[1]))))
         block = self.displacements.grounding(rigid, self._scale)
-        slots, number = pattern.slots[3][0], self.displacements.ground_numbers
+        slots, number = pattern.slots[4][0], self.displacements.ground_numbers
         np.add.at(data, slots[slots >= 0], block[np.tril_indices(9)][slots >= 0])
         inside = number >= 0
         return FreeBodyMatrix(pattern.matrix(data), Z, number[inside], block[np.ix_(inside, inside)])
@@ -248,23 +254,26 @@ class ConsistentSystem:
     @cached_property
     def _pattern(self) -> Pattern:
         return rotation_pattern(
-            self.elements, self.displacements.number, self.size,
+            self.elements, self.hinges, self.displacements.number, self.size,
             self.displacements.ground_numbers if self.constraints.rigid_body else None,
         )  # fmt: skip
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         v = self.displacements.vectors(dq[: self.moving])
-        rates, _ = self._force_rates(self._tangent_at, v, dq[self.moving :], controlled=False)
+        rates, _ = self._force_rates(self._tangent_at, v, dq[self.moving :], self._closing, controlled=False)
         return forces + rates
 
-    def _force_rates(self, x: Array, v: Array, w: Array, controlled: bool) -> tuple[Array, Array]:
+    def _force_rates(
+        self, x: Array, v: Array, w: Array, closing: bool, controlled: bool
+    ) -> tuple[Array, Array]:
         """Rates of the element forces and of the springs' turns for velocities v (n, 3) and w (rotations,) at x.
 
-        `controlled` adds what rest angles and couples do while lambda grows at the rate 1.
+        `controlled` adds what rest angles and couples do while lambda grows at the rate 1; without `closing` there are
+        no locks.
         """
         e, by = self.elements, float(controlled)
         rates, turns = np.empty(sum(self._counts)), np.empty(len(e.springs))
-        N, M, S = self.split(rates)
+        N, M, S, L = self.split(rates)
         kernels.stretching_rates(x, v, e.triangles, e.K, N)
         joined = e.patches
         kernels.bending_rates(
@@ -282,6 +291,9 @@ class ConsistentSystem:
             S,
             turns,
         )
+        L[:] = 0.0
+        if closing:
+            closings.lock_rates(x, v, self.hinges, e.lock, L)
         return rates, turns
 
     def _gradient_rates(self, q: Array, lam: float) -> tuple[Array, Array, float]:
@@ -293,12 +305,14 @@ class ConsistentSystem:
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         v = self.displacements.to_global(self.displacements.prescribed_rate)
-        rates, turns = self._force_rates(x, v, np.zeros(e.rotations), controlled=True)
+        rates, turns = self._force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
-        (N, M, S), (dN, dM, dS) = self.split(now.forces), self.split(rates)
+        (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
         kernels.stretching_force_rates(x, v, e.triangles, N, dN, f)
         kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, M, dM, f, r)
         kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
+        if L.any():
+            closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         return f, r, second
 
@@ -315,7 +329,7 @@ class ConsistentSystem:
     def power(self, q: Array, lam: float) -> float:
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
-        _, M, S = self.split(now.forces)
+        _, M, S, _ = self.split(now.forces)
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
         total -= float(np.vdot(self.force.rate, x - self.mesh.points))
         unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
@@ -326,7 +340,46 @@ class ConsistentSystem:
         v = self.displacements.to_global(self.displacements.prescribed_rate)
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v))
 
+    # ------------------------------------------------------------------------------- what to say of a state
+
+    def angles(self, q: Array, lam: float) -> Array:
+        """(m,) dihedral angles between the triangles at every hinge of the mesh, rad."""
+        return dihedral_angles(self.positions(q, lam), self.hinges)
+
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        before, after = self.positions(q, lam), self.positions(q_new, lam_new)
-        turn = float(setup.largest_turn(before, after, self.mesh.topology.hinges))
-        return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
+        before, after = self.angles(q, lam), self.angles(q_new, lam_new)
+        through = closings.crossing(self.mesh, before, after)
+        turn = float(np.abs(after - before).max(initial=0.0))
+        return through or (f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else "")
+
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Which panels passed through each other at a hinge between two states, or an empty string."""
+        return closings.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
+
+    def contact(self, q: Array, lam: float) -> str:
+        """Which panels have met at a hinge that is not held, or an empty string."""
+        reference = dihedral_angles(self.mesh.points, self.hinges)
+        return closings.touching(self.mesh, self.angles(q, lam), reference, self.program.law != HELD)
+
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        touching = self.contact(q, lam)
+        if touching:
+            return "contact", touching
+        if not self.constraints.rigid_body or not (self.force.start.any() or self.force.end.any()):
+            return "", ""
+        # an accepted state is in equilibrium; do the forces stay so a little further along the path?
+        try:
+            factor = self.tangent(q, lam, self.evaluate(q, lam).forces).factorise(1e-9)
+        except IndefiniteError:
+            return "", ""
+        ahead = 1e-3 * max(lam, 0.01)
+        moved = q - ahead * factor.solve(self.control_rate(q, lam))
+        after = self.displacements.unbalanced(self.positions(moved, lam + ahead), self.force.at(lam + ahead))
+        if after - self.displacements.unbalanced(self.positions(q, lam), self.force.at(lam)) <= 1e-6 * ahead:
+            return "", ""
+        return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        return describe_motion(
+            self.mesh, self.positions(q, lam), self.displacements.vectors(motion[: self.moving])
+        )

@@ -110,12 +110,16 @@ class Displacements:
         Q = np.linalg.qr(rows)[0] if Z.shape[1] else rows
         return np.asarray(stiffness * (Q @ Q.T))
 
+    def unbalanced(self, x: Array, force: Array) -> float:
+        """Part of dead forces (n, 3) that works on rigid motions at positions x, of their sum."""
+        local = self.components(force)
+        size = max(float(np.abs(local).sum()), 1e-300)
+        return float(np.abs(self.rigid(x).T @ local).max(initial=0.0)) / size
+
     def check_balance(self, force: Ramp) -> None:
         """Raises `ModelError` where dead forces would push a sheet that is free to move rigidly."""
-        Z = self.rigid(self.reference)
         for load in (force.start, force.end):
-            local = self.components(load)
-            if np.abs(Z.T @ local).max(initial=0.0) > 1e-9 * max(float(np.abs(local).sum()), 1e-300):
+            if self.unbalanced(self.reference, load) > 1e-9:
                 raise ModelError(
                     "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
                 )

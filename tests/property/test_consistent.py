@@ -201,6 +201,69 @@ def test_flat_start_needs_no_rotations() -> None:
     assert not system.start().any()
 
 
+# --------------------------------------------------------------------------------------- hinges that close
+
+
+def nearly_closed(angle: float, held: bool) -> tuple[ConsistentSystem, Array]:
+    """A strip with a straight crease, one half turned about it until `angle` (rad) is left."""
+    mesh = meshes.structured(meshes.strip(6.0, 4.0, creases=(2.0,)), along=4)
+    model = sheet(mesh).support("corner:inner-start", [[1.0, 0.5, 0.2]]).support("rigid-body")
+    model = model.step(
+        Displace("corner:inner-end", (0.3, 0.2, 1.0), 0.02),
+        Fold("crease", to=angle) if held else Fold("crease", rest=1.0, Lstar=3.0),
+    )
+    system = formulation("consistent").system(model, program(model)[0], None)
+    x = mesh.points.copy()
+    turned = x[:, 1] > 2.0
+    y = x[turned, 1] - 2.0
+    x[turned, 1], x[turned, 2] = 2.0 - y * math.cos(angle), -y * math.sin(angle)
+    q = np.zeros(system.size)
+    q[: system.moving] = system.displacements.components(x - mesh.points)
+    return system, q
+
+
+@pytest.mark.parametrize("angle", [0.01, 0.03, 2.0 * math.pi - 0.01])
+def test_locks_belong_to_their_derivatives(angle: float) -> None:
+    system, q = nearly_closed(angle, held=False)
+    q[: system.moving] += 1e-4 * np.random.default_rng(3).normal(size=system.moving)
+    q[system.moving :] += 0.05 * np.random.default_rng(4).normal(size=system.size - system.moving)
+    now = system.internal(system.positions(q, 0.4), q[system.moving :], 0.4)
+    assert now.lock > 0.0
+    errors = differences(system, q, 0.4, np.random.default_rng(5))
+    assert max(errors.values()) < 1e-4, (
+        errors
+    )  # the law of the lock is steep beside the step of the differences
+    assert "touch" in system.contact(q, 0.4)
+    assert system.obstacle(q, 0.4)[0] == "contact"
+    system.tangent(q, 0.4, now.forces)
+    v = np.random.default_rng(6).normal(size=system.size)
+    wrong = []
+    for step in (2e-5, 1e-5):
+        ahead = system.predicted_forces(now.forces, step * v)
+        wrong.append(float(np.abs(ahead - system.evaluate(q + step * v, 0.4).forces).max()))
+    assert wrong[0] / wrong[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_held_creases_and_open_hinges_have_no_lock() -> None:
+    for system, q in (nearly_closed(0.01, held=True), nearly_closed(0.2, held=False)):
+        assert system.internal(system.positions(q, 0.4), q[system.moving :], 0.4).lock == 0.0
+        assert system.contact(q, 0.4) == ""
+
+
+def test_passing_through_is_seen() -> None:
+    (system, q), (_, other) = nearly_closed(0.3, held=False), nearly_closed(2.0 * math.pi - 0.3, held=False)
+    assert "crease 'crease'" in system.crossing(q, 0.4, other, 0.4)
+    assert "would pass through" in system.objection(q, 0.4, other, 0.4)
+    assert system.crossing(q, 0.4, q, 0.4) == ""
+
+
+def test_spring_presses_shut() -> None:
+    """A spring whose rest is shut ends within the zone of the lock, in equilibrium."""
+    path = trace(sheet(sector()).fold("crease", rest=0.0, Lstar=0.05))
+    assert path[-1].dihedral("crease").min() > 0.0
+    assert path.outcome in ("reached", "contact")
+
+
 # --------------------------------------------------------------------------------------- invariance
 
 
