@@ -39,7 +39,7 @@ def stretching_matrices(edges: Array, areas: Array, E: float, t: float, nu: floa
     strain = np.linalg.inv(np.stack((x * x, y * y, 2.0 * x * y), axis=2))  # (E_xx, E_yy, E_xy) from gamma
     modulus = E * t / (1.0 - nu**2)
     C = modulus * np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 2.0 * (1.0 - nu)]])
-    return np.einsum("t,tik,ij,tjl->tkl", areas, strain, C, strain, optimize=True)
+    return areas[:, None, None] * (np.swapaxes(strain, 1, 2) @ C @ strain)
 
 
 def bending_matrices(edges: Array, areas: Array, D: float, nu: float) -> Array:
