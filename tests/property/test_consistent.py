@@ -133,6 +133,18 @@ def test_derivatives(name: str, seed: int) -> None:
         assert max(errors.values()) < 1e-7, errors
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_derivatives_of_a_thick_sheet_that_slides_in_its_clamp(seed: int) -> None:
+    """Thick, so that bending is not lost beside stretching; the nodes of the clamped edge move in every way."""
+    mesh = sector(rows=2)
+    model = replace(sheet(mesh), sheet=replace(SHEET, t=20.0)).support("node:7", "xyz").support("node:9", "xy")
+    model = model.support("edge:start", [[0.0, 0.3, 1.0]], clamp=True).fold("crease", to=2.3)
+    system = formulation("consistent").system(model, program(model)[0], None)
+    rng = np.random.default_rng(seed)
+    q = np.concatenate((rng.normal(size=system.moving), 0.3 * rng.normal(size=system.size - system.moving)))
+    assert max(differences(system, q, 0.37, rng).values()) < 1e-8
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_predicted_forces_are_first_order(name: str) -> None:
     """Halving the increment quarters the error of the predicted element forces."""
