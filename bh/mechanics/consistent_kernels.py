@@ -268,7 +268,7 @@ def spring_forces(x, alpha, hinges, stiffness, rest, couple, rotation, f, r, S, 
 
 @njit(**OPTIONS)
 def _spring_matrix(x, hinge, stiffness, s, H, small, g):  # type: ignore[no-untyped-def]
-    """Tangent of a spring crease for its four nodes and two rotations into the lower triangle of H (15, 15).
+    """Tangent of a spring crease for its four nodes and two rotations into the lower triangle of H (14, 14).
 
     Returns whether it is about to close.
     """
@@ -293,7 +293,7 @@ def spring_tangent(x, hinges, stiffness, S, nodes, frame_of, frames, slots, data
         closing = _spring_matrix(x, hinges[h], stiffness[h], S[h], H, small, g) or closing
         if len(frames) > 0:
             _rotate(H, nodes[h], frame_of, frames)
-        _scatter(H, 15, slots[h], data)
+        _scatter(H, 14, slots[h], data)
     return closing
 
 

@@ -34,25 +34,6 @@ def join_pairs(sides, order, patch_of, patches):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def element_keys(dofs, width, position, stride, keys):  # type: ignore[no-untyped-def]
-    """Keys row + stride * column of the lower entries of every element (e, w) of unknowns, -1 where one is missing.
-
-    Of each element only the first `width` (e,) unknowns are used; the rest of `keys` must hold -1.
-    """
-    for e in range(len(dofs)):
-        at = 0
-        for i in range(width[e]):
-            for j in range(i + 1):
-                a, b = dofs[e, i], dofs[e, j]
-                if a < 0 or b < 0:
-                    keys[e, at] = -1
-                else:
-                    row, column = position[a], position[b]
-                    keys[e, at] = max(row, column) + stride * min(row, column)
-                at += 1
-
-
-@njit(**OPTIONS)
 def rotation_matrix(rotation, kind, B, turns, stiffness, rows, columns, values):  # type: ignore[no-untyped-def]
     """Entries of the constant Hessian of the energy in the rotations alone; returns how many."""
     at = 0

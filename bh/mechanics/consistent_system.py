@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from bh.mechanics import closing as closings
 from bh.mechanics import consistent_kernels as kernels
 from bh.mechanics import consistent_setup as setup
-from bh.mechanics.assembly import Pattern
 from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent_pattern import rotation_pattern
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.motions import describe_motion
+from bh.mechanics.pattern import Pattern
 from bh.model import Model
 from bh.program import HELD, StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
@@ -253,10 +253,8 @@ class ConsistentSystem:
 
     @cached_property
     def _pattern(self) -> Pattern:
-        return rotation_pattern(
-            self.elements, self.hinges, self.displacements.number, self.size,
-            self.displacements.ground_numbers if self.constraints.rigid_body else None,
-        )  # fmt: skip
+        ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
+        return rotation_pattern(self.mesh, self.elements, self.displacements.number, ground)
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         v = self.displacements.vectors(dq[: self.moving])

@@ -15,7 +15,7 @@ import bh
 import meshes
 from bh import Displace, Fold, Force, Model, Moment, Sheet, trace
 from bh.formulations import formulation
-from bh.mechanics import assembly, consistent_elements
+from bh.mechanics import consistent_elements, pattern
 from bh.mechanics.consistent_patches import patches
 from bh.mechanics.consistent_system import ConsistentSystem
 from bh.program import program
@@ -397,7 +397,7 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     model = KINDS[name]
     responses = []
     for banded in (True, False):
-        monkeypatch.setattr(assembly, "band_is_cheaper", lambda n, bandwidth, banded=banded: banded)
+        monkeypatch.setattr(pattern, "band_is_cheaper", lambda n, bandwidth, banded=banded: banded)
         system = formulation(model.formulation).system(model, program(model)[0], None)
         assert system._pattern.banded is banded
         q = solved(name).records[0].q
