@@ -137,7 +137,9 @@ def test_derivatives(name: str, seed: int) -> None:
 def test_derivatives_of_a_thick_sheet_that_slides_in_its_clamp(seed: int) -> None:
     """Thick, so that bending is not lost beside stretching; the nodes of the clamped edge move in every way."""
     mesh = sector(rows=2)
-    model = replace(sheet(mesh), sheet=replace(SHEET, t=20.0)).support("node:7", "xyz").support("node:9", "xy")
+    model = (
+        replace(sheet(mesh), sheet=replace(SHEET, t=20.0)).support("node:7", "xyz").support("node:9", "xy")
+    )
     model = model.support("edge:start", [[0.0, 0.3, 1.0]], clamp=True).fold("crease", to=2.3)
     system = formulation("consistent").system(model, program(model)[0], None)
     rng = np.random.default_rng(seed)
