@@ -201,9 +201,14 @@ class Model:
                 model = model.support([node], letters)
         return model
 
-    def support(self, at: str | Sequence[int], fix: str | Sequence[Sequence[float]] = "xyz") -> Model:
-        """Hold nodes; at "rigid-body" take out what rigid motions are left (see `bh.supports`)."""
-        item = RigidBody() if at == "rigid-body" else Support(at, fix)
+    def support(
+        self, at: str | Sequence[int], fix: str | Sequence[Sequence[float]] = "xyz", clamp: bool = False
+    ) -> Model:
+        """Hold nodes, and the slope too with `clamp`; at "rigid-body" take out what rigid motions are left.
+
+        See `bh.supports`.
+        """
+        item = RigidBody() if at == "rigid-body" else Support(at, fix, clamp)
         return replace(self, supports=(*self.supports, item))
 
     def crease(self, name: str, **law: Any) -> Model:

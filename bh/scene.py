@@ -241,14 +241,14 @@ def _support(item: Any, at: str) -> Support | RigidBody:
         return RigidBody()
     place = table.at if isinstance(table.at, str) else tuple(table.at)
     if table.fix is None:
-        return Support(place)
+        return Support(place, clamp=table.clamp)
     fix: Any = table.fix
     if not isinstance(fix, str):
         vectors = fix if isinstance(fix[0], list) else [fix]
         fix = tuple(_direction(vector, f"{at}.fix") for vector in vectors)
     with within(f"{at}.fix"):
         directions(fix)
-    return Support(place, fix)
+    return Support(place, fix, table.clamp)
 
 
 def _crease(item: Any, at: str) -> CreaseLaw:

@@ -145,12 +145,13 @@ class SupportTable(Table):
     fix: str | Vector | Annotated[list[Vector], Field(min_length=1)] | None = Field(
         None, description='letters out of "xyz", a direction [x, y, z], or a list of directions'
     )
+    clamp: bool = Field(False, description="true or false: also hold the slope across the edges of the place")
 
     @model_validator(mode="after")
     def rigid_body_fixes_nothing(self) -> SupportTable:
-        if self.at == "rigid-body" and self.fix is not None:
+        if self.at == "rigid-body" and (self.fix is not None or self.clamp):
             raise ValueError(
-                'at = "rigid-body" takes out the motions that are left and needs no fix; remove fix'
+                'at = "rigid-body" takes out the motions that are left and needs neither; remove fix and clamp'
             )
         return self
 

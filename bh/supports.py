@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,13 @@ class Support:
     Attributes:
         at: a place of the mesh ("corner:inner-start", "edge:inner", "crease:NAME", "node:N", "all") or node indices.
         fix: letters out of "xyz", or one or more direction vectors (k, 3) that need not be unit or orthogonal.
+        clamp: also hold the slope of the sheet across the boundary edges of the place: there it keeps the outward
+            direction that it had (a clamped edge, or a plane of symmetry). Else the sheet can turn about its edge.
     """
 
     at: str | Sequence[int]
     fix: str | Sequence[Sequence[float]] = "xyz"
+    clamp: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,7 @@ class Constraints:
         frame_of: (n,) row of `frames` for nodes whose local axes are not x, y, z; else -1.
         frames: (f, 3, 3) rows are the local axes.
         rigid_body: True if the remaining rigid motions are to be taken out.
+        clamped: (k, 2) boundary edges, as node pairs, across which the sheet keeps its slope.
     """
 
     fixed: NDArray[np.bool_]
@@ -68,6 +72,7 @@ class Constraints:
     frame_of: Ints
     frames: Array
     rigid_body: bool
+    clamped: Ints = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
 
 
 def directions(fix: str | Sequence[Sequence[float]]) -> list[Array]:
@@ -152,9 +157,29 @@ def resolve(
             frame_of[node] = len(frames)
             frames.append(_complete(axes))
     stacked = np.array(frames).reshape(-1, 3, 3)
-    constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body)
+    held = [clamped_edges(mesh, item.at) for item in supports if isinstance(item, Support) and item.clamp]
+    clamped = mesh.topology.edges[np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))]
+    constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body, clamped)
     _check_rigid_motions(mesh, constraints)
     return constraints
+
+
+def clamped_edges(mesh: SheetMesh, at: str | Sequence[int]) -> Ints:
+    """Rows of `mesh.topology.edges` that a clamp at a place holds: its edges, or boundary edges between its nodes.
+
+    Raises:
+        ModelError: the place has no edges, or some inside the sheet, where there is no outward direction to hold.
+    """
+    topology = mesh.topology
+    if isinstance(at, str) and at in mesh.edge_sets:
+        found = topology.find_edges(mesh.edge_sets[at])
+    else:
+        inside = np.zeros(len(mesh.points), dtype=bool)
+        inside[select(mesh, at)] = True
+        found = np.flatnonzero(inside[topology.edges].all(axis=1) & (topology.edge_triangles[:, 1] < 0))
+    if len(found) == 0 or (topology.edge_triangles[found, 1] >= 0).any():
+        raise ModelError(f"a clamp at '{at}' needs edges of the boundary; name one, such as edge:start")
+    return found
 
 
 def rigid_motions(points: Array) -> Array:
@@ -181,6 +206,10 @@ def free_motions(points: Array, constraints: Constraints) -> Array:
     for node in np.flatnonzero(constraints.frame_of >= 0):
         motions[node] = constraints.frames[constraints.frame_of[node]] @ motions[node]
     rows = motions[constraints.fixed]
+    if len(constraints.clamped):  # no turn about a clamped edge
+        along = points[constraints.clamped[:, 1]] - points[constraints.clamped[:, 0]]
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        rows = np.vstack((rows, np.hstack((np.zeros_like(along), along))))
     if len(rows) == 0:
         return np.diag(scale)
     # the triangular factor has the same null space and six rows at most, where all left vectors would be (k, k)

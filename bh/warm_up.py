@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import meshes
 from bh.analysis.contact import candidates
@@ -24,6 +25,9 @@ def warm_up() -> None:
         .support("edge:end", [[0.0, 1.0, 1.0]])
         .fold("crease", rest=3.0, Lstar=1.0)
     )
+    consistent = replace(sheet, formulation="consistent")
+    trace(consistent.fold("crease", to=math.pi - 0.1))
+    trace(consistent.support("edge:start", "xyz", clamp=True).fold("crease", rest=3.0, Lstar=1.0))
     system = path._system(0)
     linear_response(system, path.records[0].q)
     displaced = (

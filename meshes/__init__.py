@@ -6,6 +6,7 @@ from meshes.library import annulus_sector, full_annulus, strip
 from meshes.mesh import SheetMesh
 from meshes.pattern import Crease, CreasePattern
 from meshes.structured import structured
+from meshes.unstructured import unstructured
 
 __all__ = [
     "Arc",
@@ -22,4 +23,5 @@ __all__ = [
     "full_annulus",
     "strip",
     "structured",
+    "unstructured",
 ]

@@ -12,6 +12,8 @@ CASES = {
     "shear_calibration": "verification.shear_calibration",
     "cone": "verification.cone",
     "appendix_b": "verification.appendix_b",
+    "consistent": "verification.consistent",
+    "convergence": "verification.convergence",
     "derivatives": "verification.derivatives",
     "hard_cases": "verification.hard_cases",
 }

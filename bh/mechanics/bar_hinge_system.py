@@ -42,6 +42,10 @@ class BarsAndHingesSystem:
     def __init__(self, model: Model, program: StepProgram, start: State | None) -> None:
         self.mesh = model.mesh
         mesh = self.mesh
+        if len(program.constraints.clamped):
+            raise ModelError(
+                "bars and hinges have no slope at an edge to clamp; take formulation consistent, or hold the next row"
+            )
         self.reference = mesh.points
         start_points = mesh.points if start is None else start.points
         held_start = dihedral_angles(start_points, mesh.topology.hinges)

@@ -53,3 +53,8 @@ def twist_ratio_staggered(alpha: float) -> float:
 def bending_ratio_alternating(alpha: float) -> float:
     """Out-of-plane bending over beam theory far from the ends: vertical and diagonal hinges in series."""
     return 2.0 / (1.0 + (1.0 + alpha**-2) ** -2)
+
+
+def uniform_load_work(E: float, L: float, H: float, t: float, pressure: float = 1.0) -> float:
+    """1/2 q u integrated over a simply supported beam: (p H)^2 L^5 / (240 E I), I = H t^3 / 12."""
+    return (pressure * H) ** 2 * L**5 / (240.0 * E * H * t**3 / 12.0)

@@ -1,0 +1,236 @@
+"""Crease-conforming meshes of any pattern by gmsh.
+
+Boundary curves and creases are cut into edges of about the wanted size whose nodes lie exactly on them; between them
+the sheet is filled with nearly equilateral triangles. Named edge sets know the curve that they lie on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from meshes.curves import Array, Curve
+from meshes.errors import MeshError
+from meshes.mesh import SheetMesh
+from meshes.pattern import CreasePattern
+from meshes.topology import Ints
+
+Faces = list[
+    tuple[list[list[int]], list[tuple[int, int]]]
+]  # of every face: its loops of nodes, and edges inside
+
+
+def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> SheetMesh:
+    """Mesh a pattern with triangles of edge length about `size` (mm).
+
+    Args:
+        size: wanted edge length; shorter where curves meet.
+        seed: of gmsh's own small random shifts; the same seed gives the same mesh.
+
+    Raises:
+        MeshError: a size that cannot be, an outline that its named edges do not make up, or gmsh failed.
+    """
+    if not isinstance(pattern, CreasePattern):
+        raise MeshError(
+            f"a {type(pattern).__name__} cannot be meshed; give a pattern, such as meshes.strip(100, 10)"
+        )
+    if not math.isfinite(size) or size <= 0.0:
+        raise MeshError(f"size = {size} cannot be; use a positive edge length in mm")
+    area = _area(pattern)
+    if area / (0.43 * size**2) > 1e6:
+        raise MeshError(
+            f"size = {size} would make some {area / (0.43 * size**2):.1g} triangles; use a larger size"
+        )
+    curves = {f"edge:{name}": curve for name, curve in pattern.edges}
+    if not curves:
+        raise MeshError("this pattern names no boundary curves; an unstructured mesh needs them")
+    curves |= {f"crease:{crease.name}": crease.curve for crease in pattern.creases}
+    points, chains = _chains(curves, size)
+    segments = np.vstack(list(chains.values()))
+    points, triangles = _fill(points, _faces(pattern, points, segments), size, seed)
+    return SheetMesh(
+        points=points,
+        triangles=triangles,
+        edge_sets=chains,
+        corners=_corners(chains),
+        folds=pattern.folds,
+        curves=curves,
+        kind="gmsh",
+    )
+
+
+def _area(pattern: CreasePattern) -> float:
+    import shapely
+
+    return float(shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).area)
+
+
+def _chains(curves: dict[str, Curve], size: float) -> tuple[Array, dict[str, Ints]]:
+    """Points (k, 2) on all curves, and each curve as a chain of node pairs; curves that meet share nodes."""
+    ends = np.vstack([curve.point(np.array([0.0, 1.0])) for curve in curves.values()])
+    near = 1e-6 * float(np.ptp(ends, axis=0).max() + size)
+    points: list[Array] = []
+    joints: list[int] = []  # where curves may meet
+    chains: dict[str, Ints] = {}
+    for name, curve in curves.items():
+        breaks = _breaks(curve, ends, near)
+        u = [breaks[0]]
+        for a, b in pairwise(breaks):
+            cells = max(1, round((b - a) * curve.length / size))
+            if curve.closed and len(breaks) == 2:
+                cells = max(3, cells)
+            u += [*(a + (b - a) * np.arange(1, cells) / cells).tolist(), b]
+        nodes = [_node(points, joints, at, near) if value in breaks else _new(points, at)
+                 for value, at in zip(u, curve.point(np.array(u)), strict=True)]  # fmt: skip
+        chains[name] = np.column_stack((nodes[:-1], nodes[1:]))
+    return np.array(points), chains
+
+
+def _breaks(curve: Curve, ends: Array, near: float) -> list[float]:
+    """Parameters where the curve begins, ends, or another curve meets it."""
+    u = np.linspace(0.0, 1.0, 2049)
+    samples = curve.point(u)
+    found = [0.0, 1.0]
+    for end in ends:
+        distance = np.linalg.norm(samples - end, axis=1)
+        k = int(distance.argmin())
+        if distance[k] > 2.0 * curve.length / 2048.0:
+            continue
+        low, high = u[max(k - 1, 0)], u[min(k + 1, 2048)]
+        for _ in range(60):  # the distance has one minimum between neighbouring samples
+            third = (high - low) / 3.0
+            one, two = np.linalg.norm(curve.point(np.array([low + third, high - third])) - end, axis=1)
+            low, high = (low, high - third) if one < two else (low + third, high)
+        middle = 0.5 * (low + high)
+        if np.linalg.norm(curve.point(np.array([middle]))[0] - end) < near:
+            found.append(middle)
+    found.sort()
+    apart = 2.0 * near / curve.length
+    return [value for i, value in enumerate(found) if i == 0 or value - found[i - 1] > apart]
+
+
+def _node(points: list[Array], joints: list[int], at: Array, near: float) -> int:
+    """Index of the joint at that place, made if there is none."""
+    for k in joints:
+        if math.dist(points[k], at) < near:
+            return k
+    joints.append(_new(points, at))
+    return joints[-1]
+
+
+def _new(points: list[Array], at: Array) -> int:
+    points.append(at)
+    return len(points) - 1
+
+
+def _faces(pattern: CreasePattern, points: Array, segments: Ints) -> Faces:
+    """Regions that the segments cut the sheet into."""
+    import shapely
+
+    sheet = shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:]))
+
+    lines = shapely.linestrings(points[segments])
+    polygons, _, dangles, _ = shapely.polygonize_full(lines)
+    where = {tuple(point): k for k, point in enumerate(points.tolist())}
+
+    def loop(ring: Any) -> list[int]:
+        return [where[tuple(at)] for at in np.asarray(ring.coords)[:-1].tolist()]
+
+    loose = [tuple(where[tuple(at)] for at in line.coords) for line in shapely.get_parts(dangles)]
+    found: Faces = []
+    for polygon in shapely.get_parts(polygons):
+        if not sheet.covers(polygon.representative_point()):
+            continue  # a hole
+        loops = [loop(polygon.exterior), *(loop(ring) for ring in polygon.interiors)]
+        inside = [
+            pair for pair in loose if polygon.covers(shapely.Point(points[list(pair)].mean(axis=0)))
+        ]  # creases that end inside the sheet
+        found.append((loops, [(int(a), int(b)) for a, b in inside]))
+    covered = sum(
+        shapely.Polygon(points[loops[0]], [points[loop] for loop in loops[1:]]).area for loops, _ in found
+    )
+    if abs(covered - sheet.area) > 0.05 * sheet.area:
+        raise MeshError("the named boundary curves do not enclose the sheet; name all of its edges")
+    return found
+
+
+def _fill(points: Array, faces: Faces, size: float, seed: int) -> tuple[Array, Ints]:
+    """Nodes (n, 2), the given points first, and counter-clockwise triangles (t, 3) by gmsh."""
+    import gmsh
+
+    gmsh.initialize(argv=["", "-v", "0"], readConfigFiles=False, interruptible=False)
+    try:
+        for name, value in (("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.Algorithm", 6),
+                            ("Mesh.RandomSeed", seed), ("Mesh.MeshSizeMax", 1.15 * size)):  # fmt: skip
+            gmsh.option.setNumber(name, value)
+        gmsh.model.add("sheet")
+        for k, (x, y) in enumerate(points):
+            gmsh.model.geo.addPoint(x, y, 0.0, size, k + 1)
+        lines: dict[tuple[int, int], int] = {}
+
+        def line(a: int, b: int) -> int:
+            if (b, a) in lines:
+                return -lines[b, a]
+            if (a, b) not in lines:
+                lines[a, b] = gmsh.model.geo.addLine(a + 1, b + 1)
+                gmsh.model.geo.mesh.setTransfiniteCurve(lines[a, b], 2)
+            return lines[a, b]
+
+        embedded = []
+        for loops, inside in faces:
+            tags = [
+                gmsh.model.geo.addCurveLoop(
+                    [line(a, b) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
+                )
+                for loop in loops
+            ]
+            embedded.append((gmsh.model.geo.addPlaneSurface(tags), [abs(line(a, b)) for a, b in inside]))
+        gmsh.model.geo.synchronize()
+        for surface, inner in embedded:
+            if inner:
+                gmsh.model.mesh.embed(1, inner, 2, surface)
+        gmsh.model.mesh.generate(2)
+        return _read(gmsh, len(points))
+    except MeshError:
+        raise
+    except Exception as failed:  # gmsh raises plain exceptions
+        raise MeshError(f"gmsh could not mesh the pattern ({failed}); try another size") from failed
+    finally:
+        gmsh.finalize()
+
+
+def _read(gmsh: Any, fixed: int) -> tuple[Array, Ints]:
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    _, corners = gmsh.model.mesh.getElementsByType(2)
+    triangles = np.asarray(corners, dtype=np.int64).reshape(-1, 3)
+    tags = np.asarray(tags, dtype=np.int64)
+    order = np.argsort(tags)
+    # nodes on geometric points have the tags of these points
+    used = np.isin(tags[order], triangles) | (tags[order] <= fixed)
+    order = order[used]
+    points = np.asarray(coordinates).reshape(-1, 3)[order, :2]
+    triangles = np.searchsorted(tags[order], triangles)
+    p, q, r = (points[triangles[:, k]] for k in range(3))
+    turn = (q - p)[:, 0] * (r - p)[:, 1] - (q - p)[:, 1] * (r - p)[:, 0]
+    triangles[turn < 0.0] = triangles[turn < 0.0][:, ::-1]
+    return points, triangles
+
+
+def _corners(chains: dict[str, Ints]) -> dict[str, int]:
+    """Nodes where two boundary curves end together, as "corner:inner-start"; first the long edges' names."""
+    edges = {name.removeprefix("edge:"): pairs for name, pairs in chains.items() if name.startswith("edge:")}
+    found: dict[str, int] = {}
+    names: Sequence[str] = list(edges)
+    for i, one in enumerate(names):
+        for two in names[i + 1 :]:
+            shared = {int(edges[one][0, 0]), int(edges[one][-1, 1])} & {
+                int(edges[two][0, 0]),
+                int(edges[two][-1, 1]),
+            }
+            if len(shared) == 1:
+                found[f"corner:{one}-{two}"] = shared.pop()
+    return found
