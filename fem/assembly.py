@@ -1,8 +1,4 @@
-"""Numbering of the shell's unknowns, and the fixed pattern that element matrices are added into.
-
-All components, prescribed ones included, in one vector: 3 positions a node (local axes), 2 alpha an edge, 2 beta a creased
-edge. An element sees 30 of them: 18 positions, 6 alpha, 6 beta (-1 where its edge is not creased).
-"""
+"""The fixed pattern that element matrices of the shell are added into; see `fem.components` for their 30 components."""
 
 from __future__ import annotations
 
@@ -14,24 +10,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from bh.solvers.matrices import BandMatrix, SparseMatrix, reverse_cuthill_mckee
-from fem.kernels import OPTIONS
+from fem.points import OPTIONS
 from meshes.curved import QuadraticMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 LOWER = np.tril_indices(30)
-
-
-def element_components(mesh: QuadraticMesh, sides: Array, of_edge: Ints) -> Ints:
-    """(t, 30) components of every element; the two ends of edge j are corners j + 1 and j + 2."""
-    nodes, edges = mesh.triangles, mesh.sheet.topology.triangle_edges
-    x = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 18)
-    first = 3 * len(mesh.nodes)
-    high = np.stack((sides < 0, sides > 0), axis=-1)  # is this end the higher node of the edge
-    alpha = first + 2 * edges[:, :, None] + high
-    crease = of_edge[edges][:, :, None]
-    beta = np.where(crease >= 0, first + 2 * len(of_edge) + 2 * crease + high, -1)
-    return np.hstack((x, alpha.reshape(-1, 6), beta.reshape(-1, 6))).astype(np.int64)
 
 
 @njit(**OPTIONS)
@@ -159,7 +143,9 @@ def _sparse(n: int, order: Ints, position: Ints, keys: Ints, bandwidth: int) -> 
     probe = sp.csc_matrix((np.full(len(unique), -1e-3), (row, column)), shape=(n, n))
     probe = sp.csc_matrix(probe + probe.T + 2.0 * n * sp.eye_array(n))
     options = {"SymmetricMode": True, "Equil": False}
-    new = splu(probe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).perm_c.astype(np.int64)
+    new = splu(probe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).perm_c.astype(
+        np.int64
+    )
     new_order = np.empty(n, dtype=np.int64)
     new_order[new] = order
     low, high = np.maximum(new[row], new[column]), np.minimum(new[row], new[column])

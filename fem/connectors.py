@@ -22,7 +22,9 @@ from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.model import Model
 from bh.program import HELD, SHEET, SPRING, StepProgram
+from fem.shell import edge_tangents
 from fem.spaces import tables
+from meshes.curved import QuadraticMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -83,13 +85,12 @@ class Connectors:
 
 
 def connectors(
-    model: Model, program: StepProgram, speed: Array, beta: Array, moment: Array
+    mesh: QuadraticMesh, model: Model, program: StepProgram, beta: Array, moment: Array
 ) -> Connectors:
-    """Creased edges of a step.
+    """Creased edges of a step that begins with fold angles beta (m, 2) and crease moments a length (m,) of all hinges.
 
-    Args:
-        speed: (e, p) length of the tangent at the points of every edge, mm.
-        beta: (m, 2) fold angles and `moment` (m,) crease moments a length that the step begins with.
+    Raises:
+        ModelError: a couple acts where there is no crease to turn.
     """
     topology = model.mesh.topology
     loaded = (program.law == SHEET) & ((program.moment.start != 0.0) | (program.moment.end != 0.0))
@@ -104,6 +105,7 @@ def connectors(
     of_edge[edges] = np.arange(len(edges))
     table = tables()
     shape = np.column_stack((1.0 - table.s, table.s))
+    speed = np.linalg.norm(edge_tangents(mesh, mesh.nodes), axis=-1)
     mass = np.einsum("p,cp,pi,pj->cij", table.edge_weights, speed[edges], shape, shape)
     held = program.law[hinges] == HELD
     stiffness = np.where(program.law == SPRING, program.stiffness, 0.0)[hinges]
@@ -114,7 +116,9 @@ def connectors(
 
     begin = beta[hinges]
     angle = Ramp(
-        np.where(held[:, None], np.where(np.isnan(fold(program.held.start)), begin, fold(program.held.start)), 0.0),
+        np.where(
+            held[:, None], np.where(np.isnan(fold(program.held.start)), begin, fold(program.held.start)), 0.0
+        ),
         np.where(held[:, None], fold(program.held.end), 0.0),
     )
     # a held crease that is released keeps its moment: k (rest - beta) is what the crease carried

@@ -41,11 +41,19 @@ class Shell:
             ModelError, MeshError: the model is not one that a shell can take.
         """
         if start is not None and not isinstance(start, ShellState):
-            raise ModelError(f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}")
+            raise ModelError(
+                f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
+            )
         return ShellSystem(model, program, start, _elements(model.mesh, model.sheet), conditions)
 
     def observe(
-        self, model: Model, system: ShellSystem, q: Array, lam: float, step: int = 0, stable: bool | None = None
+        self,
+        model: Model,
+        system: ShellSystem,
+        q: Array,
+        lam: float,
+        step: int = 0,
+        stable: bool | None = None,
     ) -> ShellState:
         """Everything that can be read from the unknowns `q` at `lam`."""
         return observe(model, system, q, lam, step, stable)
@@ -58,7 +66,9 @@ def _elements(mesh: SheetMesh, sheet: Sheet) -> ShellElements:
 
 
 def follow(
-    model: Model, conditions: Sequence[EdgeConditions] | EdgeConditions = FREE, strategy: Strategy | None = None
+    model: Model,
+    conditions: Sequence[EdgeConditions] | EdgeConditions = FREE,
+    strategy: Strategy | None = None,
 ) -> tuple[list[ShellState], list[Increment]]:
     """Follow a model whose boundary edges are clamped or loaded by couples, which `bh.trace` cannot be told.
 

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.actuation import Actuation, Fold, Force, Ramp
+from bh.errors import ModelError
 from bh.model import Model
 from bh.program import program
 from bh.supports import Constraints, select
+from fem.components import edge_set
+from fem.shell import ShellElements
 from meshes.curved import QuadraticMesh
 from meshes.topology import Ints
 
@@ -23,12 +26,12 @@ class EdgeConditions:
 
     Attributes:
         clamped: edge sets whose edges cannot turn about themselves (they keep the turn that the step begins with).
-        moments: couple a length, N, by edge set at the end of the step, zero at its start; positive raises the outside
+        moments: edge set and couple a length, N, at the start and at the end of the step; positive raises the outside
             of the boundary edge toward the sheet's normal.
     """
 
     clamped: tuple[str, ...] = ()
-    moments: tuple[tuple[str, float], ...] = ()
+    moments: tuple[tuple[str, float, float], ...] = ()
 
 
 def constraints(mesh: QuadraticMesh, model: Model, step: int) -> Constraints:
@@ -78,8 +81,9 @@ def _force(mesh: QuadraticMesh, item: Force, lengths: Array) -> Array:
         edges = mesh.sheet.topology.find_edges(mesh.sheet.edge_sets[item.at])
         share = lengths[edges] / lengths[edges].sum()
         ends = mesh.sheet.topology.edges[edges]
-        for nodes, part in ((ends[:, 0], 1.0), (ends[:, 1], 1.0), (len(mesh.sheet.points) + edges, 4.0)):
-            np.add.at(out, nodes, part / 6.0 * share[:, None] * total)  # Simpson's rule
+        middle = len(mesh.sheet.points) + edges
+        for rows, part in ((ends[:, 0], 1.0), (ends[:, 1], 1.0), (middle, 4.0)):
+            np.add.at(out, rows, part / 6.0 * share[:, None] * total)  # Simpson's rule
         return out
     nodes: Ints = select(mesh.sheet, item.at)
     if item.each is not None:
@@ -87,3 +91,17 @@ def _force(mesh: QuadraticMesh, item: Force, lengths: Array) -> Array:
     else:
         out[nodes] = np.asarray(item.total, dtype=float) / len(nodes)
     return out
+
+
+def edge_moments(elements: ShellElements, conditions: EdgeConditions) -> Ramp:
+    """(e, 2) couples on the rotations alpha of edges, N mm / rad."""
+    sheet = elements.mesh.sheet
+    out = np.zeros((2, len(elements.lengths), 2))
+    side = np.zeros(len(elements.lengths))
+    side[elements.loops.edges] = elements.loops.sides
+    for name, *couple in conditions.moments:
+        chosen = edge_set(sheet, name)
+        if (sheet.topology.edge_triangles[chosen, 1] >= 0).any():
+            raise ModelError(f"edge moments act on boundary edges; '{name}' lies inside")
+        out[:, chosen] += 0.5 * np.reshape(couple, (2, 1, 1)) * (side * elements.lengths)[chosen, None]
+    return Ramp(out[0], out[1])

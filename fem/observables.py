@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from bh.model import Model, Sheet
 from bh.state import Energy, State
-from fem.shell import Frames, ShellElements
+from fem.kernels import Frames
+from fem.shell import ShellElements
 from fem.spaces import MOMENTS, STRAINS, gradients, local_order
 
 if TYPE_CHECKING:
@@ -70,10 +71,12 @@ def observe(
     """Everything that can be read from the unknowns `q` at `lam`."""
     here = system.at(q, lam)
     e, mesh, creases = system.elements, model.mesh, system.creases
-    strain, curvature = e.measures(here.x, system.gather(here.components)[:, 18:].reshape(-1, 3, 2), system.frames)
+    strain, curvature = e.measures(
+        here.x, system.components.gather(here.components)[:, 18:].reshape(-1, 3, 2), system.frames
+    )
     stretching = 0.5 * np.einsum("tk,tk->t", here.forces[:, :9], strain)
     bending = 0.5 * np.einsum("tk,tk->t", here.forces[:, 9:], curvature)
-    beta = system.beta(here.components)
+    beta = system.components.beta(here.components)
     folding = creases.energy(beta, lam)
     sides = mesh.topology.edge_triangles[creases.edges]
     by_triangle = np.zeros(len(mesh.triangles))
@@ -85,7 +88,7 @@ def observe(
     angles = np.mod(math.pi - _jumps(system, here), 2.0 * math.pi)
     angles[creases.hinges] = math.pi - beta.mean(axis=1)
     reactions = np.zeros_like(here.x)
-    local = system.gradient(here)[: system.first_alpha].reshape(-1, 3)
+    local = system.gradient(here)[: system.components.first_alpha].reshape(-1, 3)
     reactions[system.constraints.fixed] = local[system.constraints.fixed]
     membrane, moments = stresses(e, model.sheet, here.forces, strain)
     return ShellState(
@@ -93,7 +96,7 @@ def observe(
         energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum())),
         dihedral_angles=angles,
         energy_density={"stretching": stretching / e.areas, "bending": bending / e.areas, "folding": by_triangle},
-        reactions=_to_corners(system, system.to_global(reactions)),
+        reactions=_to_corners(system, system.components.to_global(reactions)),
         crease_moments=_crease_moments(system, here), stable=stable, nodes=here.x,
         frames=system.carried_frames(here.components), fold_angles=fold_angles,
         membrane_forces=membrane, moments=moments,
@@ -113,9 +116,9 @@ def _crease_moments(system: ShellSystem, here: Here) -> Array:
     """(m,) moment a length of crease, nan elsewhere: a spring's own, and what an imposed angle takes."""
     creases = system.creases
     out = np.full(len(system.program.law), np.nan)
-    beta = system.beta(here.components)
+    beta = system.components.beta(here.components)
     lengths = creases.mass.sum(axis=(1, 2))
-    sheet = system.beta(system.spread(here.pull)).sum(axis=1) / lengths
+    sheet = system.components.beta(system.components.spread(here.pull)).sum(axis=1) / lengths
     turn = np.einsum("cij,cj->c", creases.mass, creases.rest.at(here.lam) - beta) / lengths
     out[creases.hinges] = np.where(creases.held, sheet, creases.stiffness * turn)
     return out
@@ -131,8 +134,8 @@ def _jumps(system: ShellSystem, here: Here) -> Array:
     normal = np.cross(tau, across)
     topology = system.mesh.sheet.topology
     left, right = topology.edge_triangles[topology.hinge_edges].T
-    one = np.argmax(e.edges[left] == topology.hinge_edges[:, None], axis=1)
-    two = np.argmax(e.edges[right] == topology.hinge_edges[:, None], axis=1)
+    one = np.argmax(e.loops.edges[left] == topology.hinge_edges[:, None], axis=1)
+    two = np.argmax(e.loops.edges[right] == topology.hinge_edges[:, None], axis=1)
     a, b, edge = normal[left, one], normal[right, two], tau[left, one]
     triple = np.einsum("mc,mc->m", edge, np.cross(a, b)) / np.linalg.norm(edge, axis=1)
     out: Array = np.arctan2(triple, np.einsum("mc,mc->m", a, b))

@@ -22,20 +22,11 @@ from numpy.typing import NDArray
 
 from bh.model import Sheet
 from fem import kernels
-from fem.spaces import Tables, local_order, tables
+from fem.kernels import Frames, Loops
+from fem.spaces import MOMENTS, STRAINS, Tables, local_order, tables
 from meshes.curved import QuadraticMesh
-from meshes.topology import Ints
 
 Array = NDArray[np.float64]
-TENSOR = np.array([[0, 2], [2, 1]])  # components 11, 22, 12 of a symmetric tensor
-
-
-@dataclass(frozen=True, eq=False)
-class Frames:
-    """Unit tangents t0 and frame vectors d0 at the p points of every edge (e, p, 3), from its lower to its higher node."""
-
-    t0: Array
-    d0: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +34,6 @@ class ShellElements:
     """Elements of a flat sheet; t triangles, q points inside, p points on an edge.
 
     Attributes:
-        edges: (t, 3) edge of the topology opposite each corner; `sides` +1 where it runs counter-clockwise.
-        inside: (t, q) weight over Jacobian; `rim` (t, 3, p) weight over length of the edge tangent.
         membrane, bending: (t, 9, 9) stiffness against generalised strains and curvatures.
         strain0: (t, 9) strains that the metric of the flat sheet would have.
         lengths: (e,) lengths of the (curved) edges, mm; areas: (t,), mm^2.
@@ -52,10 +41,7 @@ class ShellElements:
 
     mesh: QuadraticMesh
     tables: Tables
-    edges: Ints
-    sides: Array
-    inside: Array
-    rim: Array
+    loops: Loops
     membrane: Array
     bending: Array
     strain0: Array
@@ -64,15 +50,15 @@ class ShellElements:
 
     def measures(self, x: Array, gamma: Array, frames: Frames) -> tuple[Array, Array]:
         """Strains and curvatures, (t, 9) each, at positions x (n, 3) and side rotations gamma (t, 3, 2), rad."""
-        count = len(self.edges)
+        count = len(self.areas)
         strain, curvature = np.empty((count, 9)), np.empty((count, 9))
-        kernels.measures(x, gamma, *self._arguments(frames), strain, curvature)
+        kernels.measures(x, gamma, self.loops, frames, strain, curvature)
         return strain - self.strain0, curvature
 
     def gradients(self, x: Array, frames: Frames) -> Array:
         """(t, 18, 24) derivatives of strains and curvatures by positions and side rotations."""
-        B = np.empty((len(self.edges), 18, 24))
-        kernels.gradients(x, *self._arguments(frames), B)
+        B = np.empty((len(self.areas), 18, 24))
+        kernels.gradients(x, self.loops, frames, B)
         return B
 
     def forces(self, strain: Array, curvature: Array) -> Array:
@@ -87,17 +73,10 @@ class ShellElements:
 
     def tangent(self, x: Array, forces: Array, B: Array, frames: Frames) -> Array:
         """(t, 24, 24) element tangents with the given forces (t, 18) in their geometric part."""
-        K = np.zeros((len(self.edges), 24, 24))
+        K = np.zeros((len(self.areas), 24, 24))
         kernels.add_material(B, self.membrane, self.bending, K)
-        kernels.add_geometric(x, forces, *self._arguments(frames), K)
+        kernels.add_geometric(x, forces, self.loops, frames, K)
         return K
-
-    def _arguments(self, frames: Frames) -> tuple[Array | Ints, ...]:
-        t = self.tables
-        return (
-            self.mesh.triangles, self.edges, self.sides, frames.t0, frames.d0, t.Q, t.bary, t.slopes, t.bend, t.S,
-            t.along, t.across, t.s, self.inside, self.rim,
-        )  # fmt: skip
 
 
 def shell_elements(mesh: QuadraticMesh, sheet: Sheet) -> ShellElements:
@@ -114,9 +93,12 @@ def shell_elements(mesh: QuadraticMesh, sheet: Sheet) -> ShellElements:
     sides = np.where(np.roll(corners, -1, axis=1) < np.roll(corners, -2, axis=1), 1.0, -1.0)
     lengths = np.empty(len(mesh.sheet.topology.edges))
     lengths[edges] = speed @ table.edge_weights
+    loops = Loops(
+        mesh.triangles, np.ascontiguousarray(edges), sides, table.weights / J, table.edge_weights / speed,
+        table.Q, table.bary, table.slopes, table.bend, table.S, table.along, table.across, table.s,
+    )  # fmt: skip
     elements = ShellElements(
-        mesh, table, np.ascontiguousarray(edges), sides, table.weights / J, table.edge_weights / speed,
-        membrane_stiffness(table, metric, J, sheet), bending_stiffness(table, metric, J, sheet),
+        mesh, table, loops, membrane_stiffness(table, metric, J, sheet), bending_stiffness(table, metric, J, sheet),
         np.zeros((len(edges), 9)), lengths, J @ table.weights,
     )  # fmt: skip
     frames = flat_frames(mesh)
@@ -133,8 +115,6 @@ def _basis(table: Tables, tensors: Array) -> Array:
 
 def membrane_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> Array:
     """(t, 9, 9) of int C : eps : eps dA; eps covariant, C = E t / (1 - nu^2) [(1 - nu) eps : eps + nu tr(eps)^2]."""
-    from fem.spaces import STRAINS
-
     stiffness = sheet.E * sheet.t / (1.0 - sheet.nu**2)
     raised = np.linalg.inv(metric)
     eps = _basis(table, STRAINS)
@@ -148,15 +128,11 @@ def membrane_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> 
 
 def bending_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> Array:
     """(t, 9, 9) inverse of int 12 / (E t^3) [(1 + nu) sigma : sigma - nu tr(sigma)^2] dA, sigma = F s F^T / J^2."""
-    from fem.spaces import MOMENTS
-
     compliance = 12.0 / (sheet.E * sheet.t**3)
     lowered = np.einsum("tqab,qkbc->tqkac", metric, _basis(table, MOMENTS))
     trace = np.einsum("tqkaa->tqk", lowered)
     weight = compliance * table.weights / J**3
-    flexibility = (1.0 + sheet.nu) * np.einsum(
-        "tq,tqkab,tqlba->tkl", weight, lowered, lowered, optimize=True
-    )
+    flexibility = (1.0 + sheet.nu) * np.einsum("tq,tqkab,tqlba->tkl", weight, lowered, lowered, optimize=True)
     flexibility -= sheet.nu * np.einsum("tq,tqk,tql->tkl", weight, trace, trace, optimize=True)
     out: Array = np.linalg.inv(flexibility)
     return 0.5 * (out + out.transpose(0, 2, 1))

@@ -1,0 +1,59 @@
+"""Rigid motions that the supports of a shell leave free, and the stiffness that holds them without any force."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.supports import free_motions, rigid_motions
+from fem.components import Components
+from fem.shell import ShellElements
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+
+
+def free_rigid_motions(components: Components, elements: ShellElements, x: Array, B: Array) -> Array:
+    """(n, r) orthonormal rates of the unknowns in the rigid motions left free at positions x (all nodes).
+
+    Edges turn such that no curvature arises, with B (t, 18, 24) the gradients there; clamped edges do not turn.
+    """
+    motions = rigid_motions(x) @ free_motions(x, components.constraints)
+    count = motions.shape[1]
+    moves = motions.reshape(-1, 3, count)
+    element = moves[elements.mesh.triangles].reshape(-1, 18, count)
+    whole = np.zeros((len(components.number), count))
+    for column in range(count):
+        whole[: components.first_alpha, column] = components.to_local(moves[..., column]).ravel()
+    for j in range(3):
+        rows, columns = slice(9 + 3 * j, 11 + 3 * j), slice(18 + 2 * j, 20 + 2 * j)
+        rate = -np.linalg.solve(B[:, rows, columns], B[:, rows, :18] @ element)
+        whole[components.of_element[:, columns]] = elements.loops.sides[:, j, None, None] * rate
+    edges = slice(components.first_alpha, components.first_beta)
+    clamped = whole[edges][components.number[edges] < 0]
+    if len(clamped) and count:
+        _, values, right = np.linalg.svd(np.linalg.qr(clamped, mode="r"))
+        size = elements.mesh.sheet.size
+        rank = int((values > 1e-7 * max(values[0], float(np.abs(whole).max()) / size)).sum())
+        whole = whole @ right[rank:].T
+    out: Array = np.linalg.qr(whole[components.free])[0]
+    return out
+
+
+def ground_triangle(components: Components, elements: ShellElements) -> int:
+    """The triangle that is held against rigid motions: in the middle, with few supports of its own."""
+    centres = elements.mesh.nodes[elements.mesh.triangles].mean(axis=1)
+    distance = np.linalg.norm(centres - elements.mesh.nodes.mean(axis=0), axis=1)
+    held = (components.number[components.of_element[:, :18]] < 0).sum(axis=1)
+    return int(np.lexsort((distance, held))[0])
+
+
+def ground_stiffness(
+    components: Components, elements: ShellElements, triangle: int, Z: Array
+) -> tuple[Ints, Array]:
+    """Unknowns (18,) of a triangle (-1 if prescribed) and a stiffness (18, 18) against its rigid motions Z."""
+    number = components.number[components.of_element[triangle, :18]]
+    rows = np.where(number[:, None] >= 0, Z[np.maximum(number, 0)], 0.0)
+    Q = np.linalg.qr(rows)[0]
+    size = float(elements.membrane[triangle].trace()) / (9.0 * elements.areas[triangle])
+    return number, size * (Q @ Q.T)
