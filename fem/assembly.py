@@ -91,7 +91,8 @@ class Pattern:
 
 
 def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints) -> Pattern:
-    """Pattern of the unknowns `number` (all components, -1 if prescribed); unknowns of a node and its edge stay together.
+    """Pattern of the unknowns `number` (all components, -1 if prescribed); unknowns of a node and its edge stay
+    together.
 
     A band where LAPACK's factorisation is expected to be cheaper than SuperLU's, by their measured costs
     (docs/decisions.md).

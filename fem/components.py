@@ -1,8 +1,9 @@
 """All components of the shell in one vector, prescribed ones included, and what an element sees of them.
 
-Displacements of all nodes in local axes (mm), two rotations alpha an edge and two fold angles beta a creased edge (rad; at
-the lower and the higher node). An element sees 30 of them: 18 displacements, 6 alpha, 6 beta (-1 where its edge is not
-creased), and works with 24: its positions and the rotations gamma = +-alpha + beta / 2 of its side of its edges.
+Displacements of all nodes in local axes (mm), two rotations alpha an edge and two fold angles beta a creased edge
+(rad; at the lower and the higher node). An element sees 30 of them: 18 displacements, 6 alpha, 6 beta (-1 where its
+edge is not creased), and works with 24: its positions and the rotations gamma = +-alpha + beta / 2 of its side of its
+edges.
 """
 
 from __future__ import annotations
@@ -102,7 +103,7 @@ class Components:
         used = beta >= 0
         rows = np.concatenate((alpha.ravel(), beta[used]))
         values = np.concatenate(((element[:, 18:] * self.sides).ravel(), 0.5 * element[:, 18:][used]))
-        out = np.bincount(rows, values, minlength=len(self.number))
+        out: Array = np.bincount(rows, values, minlength=len(self.number)).astype(float)
         out[: self.first_alpha] = self.to_local(x).ravel()
         return out
 

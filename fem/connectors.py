@@ -1,13 +1,14 @@
 """Creases of the shell: a fold angle beta between the two sides of an edge, linear along it.
 
-The side rotations of an edge are gamma = +-alpha + beta / 2 (+ for the triangle on its left), alpha the rotation of the edge
-and beta the fold angle pi - phi, positive where the sides drop away from the crease (a mountain). Ordinary edges have none.
+The side rotations of an edge are gamma = +-alpha + beta / 2 (+ for the triangle on its left), alpha the rotation of
+the edge and beta the fold angle pi - phi, positive where the sides drop away from the crease (a mountain). Ordinary
+edges have none.
 - rigid: beta is prescribed, its reaction is the crease's moment;
 - elastic: 1/2 k_f int (beta - beta_R)^2 ds; free hinge: k_f = 0;
 - moment-driven: - int m beta ds, on top of either.
 
-As the moment of a side is conjugate to gamma, an elastic crease is the same as a compliance -sigma_nn^2 / (2 k_f) in the
-mixed energy.
+As the moment of a side is conjugate to gamma, an elastic crease is the same as a compliance -sigma_nn^2 / (2 k_f) in
+the mixed energy.
 """
 
 from __future__ import annotations

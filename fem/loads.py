@@ -59,8 +59,8 @@ def _plain(item: Actuation) -> Actuation:
 def forces(mesh: QuadraticMesh, model: Model, step: int, lengths: Array) -> Ramp:
     """Dead forces (n, 3) on all nodes, N, at the start and the end of step `step`.
 
-    A `total` on a named set of edges is a uniform line load a length of edge; everything else acts on the corners named.
-    A force stays until another one acts on the same place, as in `bh.program`.
+    A `total` on a named set of edges is a uniform line load a length of edge; everything else acts on the corners
+    named. A force stays until another one acts on the same place, as in `bh.program`.
     """
     acting: dict[object, Array] = {}
     before: dict[object, Array] = {}

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.model import Model, Sheet
+from bh.program import crease_hinges
 from bh.state import Energy, State
 from fem.kernels import Frames
 from fem.shell import ShellElements
@@ -26,8 +27,8 @@ MIDDLE = np.array([[1.0 / 3.0, 1.0 / 3.0]])
 class ShellState(State):
     """A state of the shell.
 
-    Dihedral angles of creases are the connector's, averaged along the edge; of other hinges they are pi minus the jump of
-    the normal at the middle of the edge, which vanishes under refinement.
+    Dihedral angles of creases are the connector's, averaged along the edge; of other hinges they are pi minus the
+    jump of the normal at the middle of the edge, which vanishes under refinement.
 
     Attributes:
         nodes: (n + e, 3) positions of corners and middle nodes, mm.
@@ -44,8 +45,7 @@ class ShellState(State):
     moments: Array
 
     def fold_angles_along(self, crease: str) -> Array:
-        """(k, 2) fold angles at both ends of every edge along a crease, in order of the crease, rad; mountain positive."""
-        from bh.program import crease_hinges
+        """(k, 2) fold angles at both ends of every edge along a crease, in its order, rad; mountain positive."""
 
         hinges = crease_hinges(self.mesh, crease)
         pairs = self.mesh.crease_edges(crease)

@@ -4,14 +4,14 @@ Two kinds of point functions of the deformed position x(xi):
 
 curvature inside, with tangents p = x_,1 and r = x_,2, N = p x r, nu = N / |N|: kappa_ab = nu . x_,ab;
 
-angle on an edge, with the tangent tau along the edge (counter-clockwise), c = derivative of x toward the opposite corner,
-N = tau x c, t = tau / |tau|: theta is the angle by which the outward conormal t x nu rises above the plane normal to the
-edge's frame vector d,
+angle on an edge, with the tangent tau along the edge (counter-clockwise), c = derivative of x toward the opposite
+corner, N = tau x c, t = tau / |tau|: theta is the angle by which the outward conormal t x nu rises above the plane
+normal to the edge's frame vector d,
 
     theta = atan2(d . (t x nu), d . nu),   d = d0 - (d0 . t) / (1 + t0 . t) (t0 + t),
 
-where (t0, d0) are unit tangent and frame at the start of the step and d is d0 carried by the smallest rotation that takes t0
-to t (parallel transport, as of a Bishop frame; Bergou et al. 2008). Its derivatives need no d at all:
+where (t0, d0) are unit tangent and frame at the start of the step and d is d0 carried by the smallest rotation that
+takes t0 to t (parallel transport, as of a Bishop frame; Bergou et al. 2008). Its derivatives need no d at all:
 
     d theta / d c   = -|tau| N / |N|^2
     d theta / d tau = (c . t) N / |N|^2 - (t0 x tau) / (|tau|^2 + |tau| t0 . tau)

@@ -6,8 +6,9 @@ Weak form in docs/fem.md. An element has 18 measures and 18 forces conjugate to 
   linear Regge space (Neunteufel and Schoeberl 2021), exactly quadratic in the nodes; forces N = membrane . strain;
 - 9 curvatures, one for each linear moment tensor sigma of the Hellan-Herrmann-Johnson space (Neunteufel and Schoeberl
   2019): int_T sigma : (nu . x_,ab) - int_dT sigma_nn (theta - gamma) ds, with theta the angle of the element's outward
-  conormal to the frame of the edge and gamma the rotation of that side of the edge, an unknown: the hybridised form in which
-  moments are local to the element. Condensing them leaves m = bending . curvature and the energy 1/2 curvature . m.
+  conormal to the frame of the edge and gamma the rotation of that side of the edge, an unknown: the hybridised form
+  in which moments are local to the element. Condensing them leaves m = bending . curvature and the energy 1/2
+  curvature . m.
 
 So the energy of the sheet is a plain minimum over positions and edge rotations, and keeping the forces as independent
 variables in Newton's method is the mixed method itself.

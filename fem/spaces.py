@@ -1,17 +1,17 @@
 """Tables of the reference triangle: quadratic positions, linear moments (HHJ) and linear membrane strains (Regge).
 
 Reference triangle with corners (0, 0), (1, 0), (0, 1) and barycentric coordinates l_0, l_1, l_2. Edge j lies opposite
-corner j and runs counter-clockwise, r_j = v_(j+2) - v_(j+1) its vector, n_j = (r_y, -r_x) its outward normal; both carry the
-length of the edge. Node 3 + j is the middle of edge j.
+corner j and runs counter-clockwise, r_j = v_(j+2) - v_(j+1) its vector, n_j = (r_y, -r_x) its outward normal; both
+carry the length of the edge. Node 3 + j is the middle of edge j.
 
-Moments and strains are symmetric tensors with linear components, nine functions each: number 3 j + k is l_i S_j or l_i R_j
-with i = j + 1, j + 2, j for k = 0, 1, 2 and
+Moments and strains are symmetric tensors with linear components, nine functions each: number 3 j + k is l_i S_j or
+l_i R_j with i = j + 1, j + 2, j for k = 0, 1, 2 and
 
     S_j = -sym(r_(j+1) r_(j+2)),  n_i S_j n_i = delta_ij   (contravariant; normal-normal component on edge j alone)
     R_j = -sym(n_(j+1) n_(j+2)),  r_i R_j r_i = delta_ij   (covariant; tangential-tangential one on edge j alone)
 
-so that the first two of each three live on the edge and the third is zero on all edges. Both families are complete, local
-to the triangle, and are condensed there; how they are joined across edges is told in `fem.shell`.
+so that the first two of each three live on the edge and the third is zero on all edges. Both families are complete,
+local to the triangle, and are condensed there; how they are joined across edges is told in `fem.shell`.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ def regge_interpolation() -> Array:
     """(9, 6, 6) coefficients of the interpolated strain: eps_c = 1/2 sum_ij Q[c, i, j] x_i . x_j.
 
     The canonical Regge interpolant of degree one (Li 2018; Neunteufel and Schoeberl 2021) of the covariant tensor
-    1/2 x_,a . x_,b: it keeps the tangential-tangential moments against linear functions on each edge (which are those of
-    the edge's own stretch, equal from both sides) and the mean of the tensor.
+    1/2 x_,a . x_,b: it keeps the tangential-tangential moments against linear functions on each edge (which are those
+    of the edge's own stretch, equal from both sides) and the mean of the tensor.
     """
     s, weights = get_quadrature(RefLine, 7)
     points, area_weights = get_quadrature(RefTri, 6)
@@ -111,8 +111,8 @@ def regge_interpolation() -> Array:
     on_edges = [edge_points(k, s[0]) for k in range(3)]
     of_basis = functionals([basis(at) for at in on_edges], basis(points.T))
     of_metric = functionals([metric(at) for at in on_edges], metric(points.T))
-    out: Array = np.linalg.solve(of_basis, of_metric.reshape(9, 36)).reshape(9, 6, 6)
-    return out
+    coefficients = np.linalg.solve(of_basis, of_metric.reshape(9, 36))
+    return np.asarray(coefficients, dtype=float).reshape(9, 6, 6)
 
 
 def edge_points(edge: int, s: Array) -> Array:

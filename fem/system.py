@@ -48,9 +48,9 @@ class Here:
 class ShellSystem:
     """`bh.solvers.System` of one step.
 
-    Unknowns: free displacements of all nodes in local axes (mm), rotations alpha of edges and fold angles beta of elastic
-    creases (rad). All of them minimise the energy; imposed angles are prescribed, not constrained. `start` None is the flat
-    sheet.
+    Unknowns: free displacements of all nodes in local axes (mm), rotations alpha of edges and fold angles beta of
+    elastic creases (rad). All of them minimise the energy; imposed angles are prescribed, not constrained. `start`
+    None is the flat sheet.
     """
 
     def __init__(

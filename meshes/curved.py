@@ -1,7 +1,7 @@
 """Sheets lifted to second order: a node in the middle of every edge, on the curve that the edge lies on.
 
-High-order shells need it: with straight edges along a curved crease their energy is 10-40 % wrong and converges at first
-order only.
+High-order shells need it: with straight edges along a curved crease their energy is 10-40 % wrong and converges at
+first order only.
 """
 
 from __future__ import annotations

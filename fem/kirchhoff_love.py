@@ -76,8 +76,8 @@ def follow(
         conditions: one a step, or one for all.
 
     Returns:
-        the state at the beginning and after every accepted increment, and all increments. The last increment's outcome is
-        "reached" only if every step was.
+        the state at the beginning and after every accepted increment, and all increments. The last increment's
+        outcome is "reached" only if every step was.
     """
     shell, strategy = Shell(), strategy or LoadControl()
     states: list[ShellState] = []
