@@ -69,33 +69,35 @@ class Pattern:
 
     Attributes:
         order: (n,) permutation of the unknowns, order[k] is the unknown in row k.
-        diagonal: (n,) slots of the diagonal, by unknown.
         size: number of values. A band has `bandwidth`, a sparse matrix `indices`, `indptr` and `both`, else empty.
     """
 
     order: Ints
     slots: Ints
-    diagonal: Ints
     size: int
     bandwidth: int
     indices: Ints
     indptr: Ints
     both: Ints
 
+    @property
+    def banded(self) -> bool:
+        return len(self.indptr) == 0
+
     def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
         n = len(self.order)
-        if len(self.indptr) == 0:
+        if self.banded:
             return BandMatrix(data.reshape((self.bandwidth + 1, n), order="F"), self.order)
         csc = sp.csc_matrix((data[self.both], self.indices, self.indptr), shape=(n, n))
         return SparseMatrix(csc, self.order)
 
 
-def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints) -> Pattern:
+def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
     """Pattern of the unknowns `number` (all components, -1 if prescribed); unknowns of a node and its edge stay
     together.
 
     A band where LAPACK's factorisation is expected to be cheaper than SuperLU's, by their measured costs
-    (docs/decisions.md).
+    (docs/decisions.md), unless `banded` says which.
     """
     n = int(number.max(initial=-1)) + 1
     position, order = _order(mesh, components, number, n)
@@ -106,12 +108,12 @@ def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints) -> Patter
     row, column = np.maximum(row, column), np.minimum(row, column)
     bandwidth = int((row - column)[free].max(initial=0))
     fits = 8 * n * (bandwidth + 1) < 2e9
-    if fits and 2.6e-11 * n * (bandwidth + 1.0) ** 2 < 1.5e-7 * n**1.45:
+    cheaper = fits and 2.6e-11 * n * (bandwidth + 1.0) ** 2 < 1.5e-7 * n**1.45
+    if cheaper if banded is None else banded:
         slots = np.where(free, (row - column) + column * (bandwidth + 1), -1)
         empty = np.zeros(0, dtype=np.int64)
-        diagonal = position * (bandwidth + 1)
-        return Pattern(order, slots, diagonal, (bandwidth + 1) * n, bandwidth, empty, empty, empty)
-    return _sparse(n, order, position, np.where(free, row + n * column, -1), bandwidth)
+        return Pattern(order, slots, (bandwidth + 1) * n, bandwidth, empty, empty, empty)
+    return _sparse(n, order, np.where(free, row + n * column, -1), bandwidth)
 
 
 def _order(mesh: QuadraticMesh, components: Ints, number: Ints, n: int) -> tuple[Ints, Ints]:
@@ -134,7 +136,7 @@ def _order(mesh: QuadraticMesh, components: Ints, number: Ints, n: int) -> tuple
     return position, order
 
 
-def _sparse(n: int, order: Ints, position: Ints, keys: Ints, bandwidth: int) -> Pattern:
+def _sparse(n: int, order: Ints, keys: Ints, bandwidth: int) -> Pattern:
     """Compressed lower values and the map to both triangles, in SuperLU's minimum-degree order."""
     from scipy.sparse.linalg import splu
 
@@ -157,8 +159,7 @@ def _sparse(n: int, order: Ints, position: Ints, keys: Ints, bandwidth: int) -> 
     sorting = np.lexsort((rows, columns))
     indptr = np.concatenate(([0], np.cumsum(np.bincount(columns, minlength=n))))
     slots = np.where(keys >= 0, np.searchsorted(unique, np.maximum(keys, 0)), -1)
-    diagonal = np.searchsorted(unique, position + n * position)
     return Pattern(
-        new_order, slots, diagonal, size, bandwidth, rows[sorting].astype(np.int32), indptr.astype(np.int32),
+        new_order, slots, size, bandwidth, rows[sorting].astype(np.int32), indptr.astype(np.int32),
         source[sorting],
     )  # fmt: skip

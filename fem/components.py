@@ -143,7 +143,7 @@ def lay_out(
     given = np.concatenate((constraints.start.ravel(), none, creases.angle.start.ravel()))
     end = np.concatenate((constraints.end.ravel(), none, creases.angle.end.ravel()))
     free = np.flatnonzero(~fixed)
-    if len(free) == 0:
+    if not (free < 3 * nodes).any():
         raise ModelError("the supports hold every node; nothing can move, so remove some of them")
     number = np.full(len(fixed), -1, dtype=np.int64)
     number[free] = np.arange(len(free))

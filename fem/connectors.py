@@ -72,6 +72,13 @@ class Connectors:
         out: Array = np.einsum("cij,cj->ci", self.mass, turn)
         return out
 
+    def largest(self, beta: Array, lam: float) -> float:
+        """Largest couple of a spring or of a load on one value of beta, N mm / rad."""
+        turn = self.stiffness[:, None] * (beta - self.rest.at(lam))
+        spring = np.abs(np.einsum("cij,cj->ci", self.mass, turn)).max(initial=0.0)
+        load = np.abs(self.moment.at(lam)[:, None] * self.mass.sum(axis=2)).max(initial=0.0)
+        return float(max(spring, load))
+
     def gradient_rate(self) -> Array:
         """(c, 2) derivative of `gradient` by lambda."""
         turn = -self.stiffness[:, None] * self.rest.rate - self.moment.rate[:, None]
@@ -86,9 +93,9 @@ class Connectors:
 
 
 def connectors(
-    mesh: QuadraticMesh, model: Model, program: StepProgram, beta: Array, moment: Array
+    mesh: QuadraticMesh, model: Model, program: StepProgram, beta: Array, couple: Array
 ) -> Connectors:
-    """Creased edges of a step that begins with fold angles beta (m, 2) and crease moments a length (m,) of all hinges.
+    """Creased edges of a step that begins with fold angles beta (m, 2) and couples on them (m, 2), N mm / rad.
 
     Raises:
         ModelError: a couple acts where there is no crease to turn.
@@ -123,7 +130,8 @@ def connectors(
         np.where(held[:, None], fold(program.held.end), 0.0),
     )
     # a held crease that is released keeps its moment: k (rest - beta) is what the crease carried
-    released = begin + (moment[hinges] / np.where(stiffness > 0.0, stiffness, np.inf))[:, None]
+    turn = np.linalg.solve(mass, couple[hinges][..., None])[..., 0]
+    released = begin + turn / np.where(stiffness > 0.0, stiffness, np.inf)[:, None]
     start = fold(program.rest.start)
     rest = Ramp(np.where(np.isnan(start), released, start), fold(program.rest.end))
     couple = Ramp(

@@ -34,6 +34,7 @@ class ShellState(State):
         nodes: (n + e, 3) positions of corners and middle nodes, mm.
         frames: frames of all edges, turned with them; the next step begins from here.
         fold_angles: (m, 2) beta at the lower and the higher node of each hinge's edge, rad; zero off creases.
+        crease_couples: (m, 2) couples that the crease takes there, conjugate to fold_angles, N mm / rad.
         membrane_forces, moments: (t, 3) components xx, yy, xy in the flat sheet's axes at the middle of each triangle
             (second Piola-Kirchhoff), N/mm and N; a moment is positive where it bends the sheet's edges up.
     """
@@ -41,6 +42,7 @@ class ShellState(State):
     nodes: Array
     frames: Frames
     fold_angles: Array
+    crease_couples: Array
     membrane_forces: Array
     moments: Array
 
@@ -83,8 +85,9 @@ def observe(
     share = folding / e.areas[sides].sum(axis=1)
     for side in range(2):
         np.add.at(by_triangle, sides[:, side], share)
-    fold_angles = np.zeros((len(mesh.topology.hinges), 2))
+    fold_angles, couples = np.zeros((2, len(mesh.topology.hinges), 2))
     fold_angles[creases.hinges] = beta
+    couples[creases.hinges] = _couples(system, here)
     angles = np.mod(math.pi - _jumps(system, here), 2.0 * math.pi)
     angles[creases.hinges] = math.pi - beta.mean(axis=1)
     reactions = np.zeros_like(here.x)
@@ -97,8 +100,8 @@ def observe(
         dihedral_angles=angles,
         energy_density={"stretching": stretching / e.areas, "bending": bending / e.areas, "folding": by_triangle},
         reactions=_to_corners(system, system.components.to_global(reactions)),
-        crease_moments=_crease_moments(system, here), stable=stable, nodes=here.x,
-        frames=system.carried_frames(here.components), fold_angles=fold_angles,
+        crease_moments=_crease_moments(system, couples), stable=stable, nodes=here.x,
+        frames=system.carried_frames(here.components), fold_angles=fold_angles, crease_couples=couples,
         membrane_forces=membrane, moments=moments,
     )  # fmt: skip
 
@@ -112,15 +115,21 @@ def _to_corners(system: ShellSystem, nodal: Array) -> Array:
     return out
 
 
-def _crease_moments(system: ShellSystem, here: Here) -> Array:
-    """(m,) moment a length of crease, nan elsewhere: a spring's own, and what an imposed angle takes."""
+def _couples(system: ShellSystem, here: Here) -> Array:
+    """(c, 2) couples on the fold angles: a spring's own, and what an imposed angle takes, N mm / rad."""
     creases = system.creases
-    out = np.full(len(system.program.law), np.nan)
-    beta = system.components.beta(here.components)
-    lengths = creases.mass.sum(axis=(1, 2))
-    sheet = system.components.beta(system.components.spread(here.pull)).sum(axis=1) / lengths
-    turn = np.einsum("cij,cj->c", creases.mass, creases.rest.at(here.lam) - beta) / lengths
-    out[creases.hinges] = np.where(creases.held, sheet, creases.stiffness * turn)
+    sheet = system.components.beta(system.components.spread(here.pull))
+    turn = creases.rest.at(here.lam) - system.components.beta(here.components)
+    spring = creases.stiffness[:, None] * np.einsum("cij,cj->ci", creases.mass, turn)
+    out: Array = np.where(creases.held[:, None], sheet, spring)
+    return out
+
+
+def _crease_moments(system: ShellSystem, couples: Array) -> Array:
+    """(m,) mean moment a length of crease, nan elsewhere."""
+    creases = system.creases
+    out = np.full(len(couples), np.nan)
+    out[creases.hinges] = couples[creases.hinges].sum(axis=1) / creases.mass.sum(axis=(1, 2))
     return out
 
 

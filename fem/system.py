@@ -72,8 +72,8 @@ class ShellSystem:
         self.frames = flat_frames(mesh) if start is None else start.frames
         flat = np.zeros((len(model.mesh.topology.hinges), 2))
         beta = flat if start is None else start.fold_angles
-        moments = flat[:, 0] if start is None else np.nan_to_num(start.crease_moments)
-        self.creases = connectors(mesh, model, program, beta, moments)
+        couple = flat if start is None else start.crease_couples
+        self.creases = connectors(mesh, model, program, beta, couple)
         self.constraints = loads.constraints(mesh, model, step)
         clamped = [edge_set(mesh.sheet, name) for name in conditions.clamped]
         none = np.zeros(0, dtype=np.int64)
@@ -179,18 +179,17 @@ class ShellSystem:
         eps = ROUNDING * float(np.abs(here.x).max())
         load = self.load.at(here.lam)
         floors = (eps * self._stiffest[0], eps * self._stiffest[1])
+        couples = self.creases.largest(self.components.beta(here.components), here.lam)
+        first = self.components.first_alpha
         groups = (
-            (residual[moves], here.pull[:, :18], load[: self.components.first_alpha], floors[0]),
-            (residual[~moves], here.pull[:, 18:], load[self.components.first_alpha :], floors[1]),
+            (residual[moves], here.pull[:, :18], float(np.abs(load[:first]).max()), floors[0]),
+            (residual[~moves], here.pull[:, 18:], max(couples, float(np.abs(load[first:]).max())), floors[1]),
         )
         worst = 0.0
-        for part, elements, loads_, floor in groups:
+        for part, inner, outer, floor in groups:
             largest = float(np.abs(part).max(initial=0.0)) - floor
             if largest > 0.0:
-                size = max(
-                    float(np.sqrt(np.mean(elements**2))), float(np.abs(loads_).max(initial=0.0)), 1e-300
-                )
-                worst = max(worst, largest / size)
+                worst = max(worst, largest / max(float(np.sqrt(np.mean(inner**2))), outer, 1e-300))
         return worst
 
     @cached_property
