@@ -134,7 +134,7 @@ def connectors(
     released = begin + turn / np.where(stiffness > 0.0, stiffness, np.inf)[:, None]
     start = fold(program.rest.start)
     rest = Ramp(np.where(np.isnan(start), released, start), fold(program.rest.end))
-    couple = Ramp(
+    load = Ramp(
         np.where(held, 0.0, program.moment.start[hinges]), np.where(held, 0.0, program.moment.end[hinges])
     )
-    return Connectors(hinges, edges, of_edge, held, angle, mass, stiffness, rest, couple)
+    return Connectors(hinges, edges, of_edge, held, angle, mass, stiffness, rest, load)
