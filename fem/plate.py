@@ -1,9 +1,10 @@
 """The linear Kirchhoff plate, by two elements of scikit-fem that share nothing with the nonlinear shell: its limit at
 small deflections.
 
-- Morley (1968): piecewise quadratic, nonconforming, int D [(1 - nu) H : H + nu tr(H)^2] / 2 with H the second derivatives.
-- HHJ (Hellan 1967, Herrmann 1967, Johnson 1973): quadratic w, linear moments with continuous normal-normal component,
-  not hybridised. With compliance C^-1 and f the load,
+- Morley (1968): piecewise quadratic, nonconforming, int D [(1 - nu) H : H + nu tr(H)^2] / 2 with H the second
+  derivatives.
+- HHJ (Hellan 1967, Herrmann 1967, Johnson 1973): quadratic w, linear moments whose normal-normal component is
+  continuous, not hybridised. With compliance C^-1 and f the load,
 
       int C^-1 m : t - b(t, w) = 0,  b(m, v) = int f v,  b(t, w) = sum_T [ int_T t : H - int_dT t_nn dw/dn ds ].
 
@@ -88,7 +89,10 @@ def hhj(mesh: skfem.MeshTri, plate: Plate) -> Deflection:
     B = curvature.assemble(bending, inside)
     interior = np.setdiff1d(np.arange(mesh.facets.shape[1]), mesh.boundary_facets())
     for facets, side in ((interior, 0), (interior, 1), (mesh.boundary_facets(), 0)):
-        edges = [skfem.InteriorFacetBasis(mesh, e, facets=facets, side=side, intorder=4) for e in (quadratic, moment)]
+        edges = [
+            skfem.InteriorFacetBasis(mesh, e, facets=facets, side=side, intorder=4)
+            for e in (quadratic, moment)
+        ]
         # the normal is that of side 0 on both sides
         B = B + (1.0 - 2.0 * side) * kink.assemble(*edges)
     f = _load(bending, mesh, plate)

@@ -1,13 +1,15 @@
-"""Rigid motions that the supports of a shell leave free, and the stiffness that holds them without any force."""
+"""Rigid motions that the supports of a shell leave free, what holds them without force, and motions in words."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.supports import free_motions, rigid_motions
+from bh.supports import MOTIONS, free_motions, rigid_motions
 from fem.components import Components
+from fem.connectors import Connectors
 from fem.shell import ShellElements
+from meshes.curved import QuadraticMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -20,6 +22,8 @@ def free_rigid_motions(components: Components, elements: ShellElements, x: Array
     """
     motions = rigid_motions(x) @ free_motions(x, components.constraints)
     count = motions.shape[1]
+    if count == 0:
+        return np.zeros((len(components.free), 0))
     moves = motions.reshape(-1, 3, count)
     element = moves[elements.mesh.triangles].reshape(-1, 18, count)
     whole = np.zeros((len(components.number), count))
@@ -31,7 +35,7 @@ def free_rigid_motions(components: Components, elements: ShellElements, x: Array
         whole[components.of_element[:, columns]] = elements.loops.sides[:, j, None, None] * rate
     edges = slice(components.first_alpha, components.first_beta)
     clamped = whole[edges][components.number[edges] < 0]
-    if len(clamped) and count:
+    if len(clamped):
         _, values, right = np.linalg.svd(np.linalg.qr(clamped, mode="r"))
         size = elements.mesh.sheet.size
         rank = int((values > 1e-7 * max(values[0], float(np.abs(whole).max()) / size)).sum())
@@ -57,3 +61,28 @@ def ground_stiffness(
     Q = np.linalg.qr(rows)[0]
     size = float(elements.membrane[triangle].trace()) / (9.0 * elements.areas[triangle])
     return number, size * (Q @ Q.T)
+
+
+def describe_motion(mesh: QuadraticMesh, creases: Connectors, x: Array, moves: Array, beta: Array) -> str:
+    """What moves, as a clause to be followed by how: the whole sheet, a crease, or a few nodes.
+
+    Args:
+        x: (n, 3) positions of all nodes; moves: (n, 3) their motion; beta: (c, 2) that of fold angles.
+    """
+    size = float(np.linalg.norm(moves))
+    if size > 0.0:
+        rigid = rigid_motions(x)
+        rigid /= np.linalg.norm(rigid, axis=0)
+        share, *_ = np.linalg.lstsq(rigid, moves.ravel() / size, rcond=None)
+        if float(np.linalg.norm(rigid @ share)) > 0.99:
+            most = np.abs(share).max()
+            named = " and ".join(MOTIONS[k] for k in np.flatnonzero(np.abs(share) > 0.3 * most))
+            return f"the whole sheet moves ({named})"
+    total = float(np.vdot(beta, beta))
+    for crease in mesh.sheet.creases:
+        rows = creases.of_edge[mesh.sheet.topology.find_edges(mesh.sheet.crease_edges(crease))]
+        if float((beta[rows[rows >= 0]] ** 2).sum()) > 0.5 * total:
+            return f"crease '{crease}' turns"
+    node = int(np.argmax(np.linalg.norm(moves, axis=1)))
+    at = ", ".join(f"{c:.4g}" for c in x[node])
+    return f"the sheet moves near ({at})"

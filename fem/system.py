@@ -12,7 +12,7 @@ from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.model import Model
 from bh.program import StepProgram
-from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
 from bh.solvers.system import Evaluation
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
@@ -21,7 +21,7 @@ from fem.connectors import connectors
 from fem.kernels import Frames
 from fem.loads import EdgeConditions
 from fem.observables import ShellState
-from fem.rigid import free_rigid_motions, ground_stiffness, ground_triangle
+from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
 from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, unit
 from meshes.topology import Ints
 
@@ -271,6 +271,27 @@ class ShellSystem:
             return f"an edge turned by {np.degrees(angle):.0f} degrees within the step; split the step in two"
         return ""
 
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        if not self.constraints.rigid_body or not (self.load.start.any() or self.load.end.any()):
+            return "", ""
+        # an accepted state is in equilibrium; do the forces stay so a little further along the path?
+        try:
+            factor = self.tangent(q, lam, self.evaluate(q, lam).forces).factorise(1e-9)
+        except IndefiniteError:
+            return "", ""
+        ahead = 1e-3 * max(lam, 0.01)
+        moved = q - ahead * factor.solve(self.control_rate(q, lam))
+        lost = self._unbalanced(moved, lam + ahead) - self._unbalanced(q, lam)
+        if lost <= 1e-6 * ahead:
+            return "", ""
+        return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        c = self.components
+        whole = np.zeros(len(c.number))
+        whole[c.free] = motion
+        return describe_motion(self.mesh, self.creases, self.at(q, lam).x, c.moves(whole), c.beta(whole))
+
     # ------------------------------------------------------------------------------- pattern, springs, grounding
 
     @cached_property
@@ -310,11 +331,15 @@ class ShellSystem:
         inside = number >= 0
         return number[inside], block[np.ix_(inside, inside)]
 
+    def _unbalanced(self, q: Array, lam: float) -> float:
+        """Part of the loads that works on free rigid motions."""
+        load = self.load.at(lam)[self.components.free]
+        work = self._rigid(self.at(q, lam)).T @ load
+        return float(np.abs(work).max(initial=0.0)) / max(float(np.abs(load).sum()), 1e-300)
+
     def _check_balance(self) -> None:
-        Z = self._rigid(self.at(self.start(), 0.0))
-        for load in (self.load.start, self.load.end):
-            local = load[self.components.free]
-            if np.abs(Z.T @ local).max(initial=0.0) > 1e-9 * max(float(np.abs(local).sum()), 1e-300):
+        for lam in (0.0, 1.0):
+            if self._unbalanced(self.start(), lam) > 1e-9:
                 raise ModelError(
                     "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
                 )

@@ -18,7 +18,8 @@ from meshes import SheetMesh
 from verification.theory.shell_benchmarks import rectangle
 
 # deflection of the middle of a unit square under unit pressure over a^4 / D, and under a unit force over a^2 / D:
-# Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, tables 8, 35 and 23, 37 (more digits: Taylor and Govindjee 2004)
+# Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, tables 8, 35 and 23, 37
+# (more digits: Taylor and Govindjee 2004)
 PRESSURE = {True: 1.26532e-3, False: 4.06235e-3}
 FORCE = {True: 5.6120e-3, False: 1.16008e-2}
 
@@ -71,7 +72,7 @@ def triangles_of(sheet: SheetMesh) -> skfem.MeshTri:
 
 @pytest.mark.parametrize("clamped", [True, False])
 def test_the_shell_at_small_load_is_the_plate(clamped: bool) -> None:
-    """Its linear response to a force is the deflection of the HHJ plate on the same mesh: hybridised or not is the same."""
+    """Its linear response to a force is that of the HHJ plate on the same mesh: hybridised or not is the same."""
     sheet = Sheet(E=12.0 * (1.0 - 0.09) / 0.1**3, nu=0.3, t=0.1)  # D = 1
     mesh = rectangle(1.0, 1.0, 6, 6)
     edges = ("edge:start", "edge:end", "edge:rail-0", "edge:rail-6")

@@ -196,3 +196,16 @@ def test_states_of_bars_cannot_begin_a_step_of_the_shell() -> None:
     model = sheet().fold("crease", by=0.2)
     with pytest.raises(ModelError, match="begins at a state of the shell"):
         Shell().system(model, program(model)[0], bars)
+
+
+def test_a_free_hinge_is_named() -> None:
+    """Nothing resists a couple on a free hinge between flat wings: the path says which crease turns."""
+    model = (
+        sheet(STRIP)
+        .crease("crease", stiffness=0.0)
+        .support("edge:inner", "xyz")
+        .support("crease:crease", "xyz")
+    )
+    path = bh.trace(model.support("rigid-body").moment("crease", to=1e-3))
+    assert path.outcome == "mechanism"
+    assert "crease 'crease' turns" in path.reason
