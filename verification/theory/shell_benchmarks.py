@@ -86,8 +86,8 @@ def clamped_sheet(mesh: SheetMesh, sheet: Sheet) -> Model:
 
 
 def rolled_strip(along: int, steps: int = 3) -> tuple[Model, list[EdgeConditions]]:
-    """The strip under an end moment, in steps of at most 120 degrees at the tip."""
-    model = clamped_sheet(rectangle(STRIP_LENGTH, 1.0, along), STRIP)
+    """The strip under an end moment, in steps of at most 120 degrees at the tip; cells of one shape at any `along`."""
+    model = clamped_sheet(rectangle(STRIP_LENGTH, 1.0, along, max(1, along // 12)), STRIP)
     conditions = []
     for step in range(steps):
         model = model.force("corner:low-end", each=(0.0, 0.0, 0.0))  # a step has to act in some way
