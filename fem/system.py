@@ -113,7 +113,7 @@ class ShellSystem:
     @cached_property
     def energy_scale(self) -> float:
         """Moments against the rotations of all edges by one radian, N mm."""
-        B = self.elements.gradients(self.mesh.nodes, self.frames)[:, 9:, 18:]
+        B = self.elements.gradients(self.mesh.nodes, flat_frames(self.mesh))[:, 9:, 18:]
         return 0.5 * float(np.einsum("tki,tkl,tli->", B, self.elements.bending, B, optimize=True))
 
     def start(self) -> Array:
@@ -195,7 +195,7 @@ class ShellSystem:
     @cached_property
     def _stiffest(self) -> tuple[float, float]:
         """Largest force, N, and moment on an edge, N mm, per mm of displacement of one node."""
-        B = self.elements.gradients(self.mesh.nodes, self.frames)
+        B = self.elements.gradients(self.mesh.nodes, flat_frames(self.mesh))
         K = np.zeros((len(B), 24, 24))
         for part, stiffness in ((B[:, :9], self.elements.membrane), (B[:, 9:], self.elements.bending)):
             K += np.einsum("tki,tkl,tlj->tij", part, stiffness, part, optimize=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -125,6 +126,26 @@ def test_angles_an_edge() -> None:
     angles = math.pi - np.linspace(0.6, 0.8, 6)
     last = solve(sheet().fold("crease", to=tuple(angles)))[-1]
     np.testing.assert_allclose(last.dihedral("crease"), angles, rtol=1e-13)
+
+
+def test_crease_that_ends_inside_the_sheet() -> None:
+    """A small constant angle that drops to zero at the end node is a dislocation of slopes: curvatures go with 1 / r
+    and the energy grows by D beta^2 (3 + nu) (1 - nu) / (8 pi) for every e-fold of refinement.
+
+    From w = c r theta sin(theta) + k r ln(r) cos(theta) with c = beta / (2 pi), k = -c (1 + nu) / 2 from equilibrium.
+    """
+    energies, beta = [], 0.01
+    for along in (8, 16, 32):
+        mesh = meshes.structured(
+            meshes.strip(40.0, 20.0, [10.0]), along=along, rows=along // 4, kind="alternating"
+        )
+        pairs = mesh.crease_edges("crease")
+        short = replace(mesh, edge_sets={**mesh.edge_sets, "crease:crease": pairs[: along // 2]})
+        last = solve(sheet(short).fold("crease", by=beta))[-1]
+        np.testing.assert_allclose(last.fold_angle("crease"), beta, rtol=1e-12)
+        energies.append(last.energy.total)
+    rate = D * beta**2 * (3.0 + MYLAR.nu) * (1.0 - MYLAR.nu) / (8.0 * math.pi)
+    np.testing.assert_allclose(np.diff(energies), rate * math.log(2.0), rtol=2e-3)
 
 
 def test_free_sheet_needs_no_support() -> None:
