@@ -48,7 +48,6 @@ class ShellState(State):
 
     def fold_angles_along(self, crease: str) -> Array:
         """(k, 2) fold angles at both ends of every edge along a crease, in its order, rad; mountain positive."""
-
         hinges = crease_hinges(self.mesh, crease)
         pairs = self.mesh.crease_edges(crease)
         beta = self.fold_angles[hinges]

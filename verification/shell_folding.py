@@ -32,6 +32,7 @@ ACTUATIONS = {
 # couple a length of crease (b, N) and force a length (c, N/mm) that fold by more than a right angle
 ENOUGH = {"b": 9.0e-3, "c-spring": 2.6e-3, "c-hinge": 6.0e-4}
 ROTATE = LoadControl(first_rotation=2.0, largest_rotation=2.0)  # a right angle in one increment
+BUCKLE = LoadControl(first_rotation=math.radians(2.0), largest_rotation=math.radians(20.0))
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,10 @@ def solve(actuation: str, along: int, rows: int) -> Solved:
     return load(crease.force("crease:crease", total=(0.0, 0.0, most * length)), most)
 
 
-def rotate(model: Model, crease: str = "crease") -> Solved:
-    """Impose the right angle, in one increment from flat."""
+def rotate(model: Model, crease: str = "crease", strategy: LoadControl = ROTATE) -> Solved:
+    """Impose the right angle, mountain or valley as drawn; by default in one increment from flat."""
     began = time.perf_counter()
-    path = trace(model.fold(crease, by=ANGLE), strategy=ROTATE)
+    path = trace(model.fold(crease, by=ANGLE), strategy=strategy)
     state = path[-1]
     assert isinstance(state, ShellState)
     spent = time.perf_counter() - began

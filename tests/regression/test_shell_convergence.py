@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bh
+import meshes
 from bh.model import Model
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment
@@ -102,3 +103,27 @@ def fold(model: Model) -> ShellState:
     state = path[-1]
     assert isinstance(state, ShellState)
     return state
+
+
+def test_appendix_b_by_a_force_has_two_readings() -> None:
+    """The table's 5.87e-2 N mm lies between the spring resisting the force and the crease a free hinge."""
+    spring, hinge = folding.solve("c-spring", 16, 2), folding.solve("c-hinge", 16, 2)
+    totals = []
+    for solved in (spring, hinge):
+        assert solved.outcome == "reached"
+        assert solved.state.fold_angle("crease").mean() == pytest.approx(math.pi / 2, abs=1e-6)
+        energy = solved.state.energy
+        totals.append(energy.stretching + energy.bending)
+    assert totals[0] > 1.05 * TABLE_B1["c"][2]
+    assert totals[1] < 0.95 * TABLE_B1["c"][2]
+    assert hinge.load < 0.25 * spring.load
+
+
+def test_three_creases_fold_alternately() -> None:
+    """Fig. B.7 (b): mountain, valley, mountain, in one increment from flat and without supports."""
+    arcs = meshes.annulus_sector([90.0, 100.0, 110.0], 10.0, 0.4, folds=["mountain", "valley", "mountain"])
+    mesh = meshes.structured(arcs, along=8, rows=1, kind="mirrored")
+    solved = folding.rotate(Model(mesh, folding.SHEET, formulation="shell"), "all")
+    assert solved.outcome == "reached"
+    for crease, sign in (("crease-1", 1.0), ("crease-2", -1.0), ("crease-3", 1.0)):
+        np.testing.assert_allclose(solved.state.fold_angle(crease), sign * math.pi / 2, rtol=1e-12)
