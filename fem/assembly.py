@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import BandMatrix, SparseMatrix, reverse_cuthill_mckee
+from bh.solvers.matrices import BandMatrix, reverse_cuthill_mckee
+from bh.solvers.sparse import SparseMatrix, SparsePattern, band_is_cheaper
 from fem.points import OPTIONS
 from meshes.curved import QuadraticMesh
 from meshes.topology import Ints
@@ -69,97 +69,106 @@ class Pattern:
 
     Attributes:
         order: (n,) permutation of the unknowns, order[k] is the unknown in row k.
-        size: number of values. A band has `bandwidth`, a sparse matrix `indices`, `indptr` and `both`, else empty.
+        size: number of values.
+        bandwidth: of the banded matrix; unused where there is a `sparse` pattern.
     """
 
     order: Ints
     slots: Ints
     size: int
     bandwidth: int
-    indices: Ints
-    indptr: Ints
-    both: Ints
+    sparse: SparsePattern | None
 
     @property
     def banded(self) -> bool:
-        return len(self.indptr) == 0
+        return self.sparse is None
 
     def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
-        n = len(self.order)
-        if self.banded:
-            return BandMatrix(data.reshape((self.bandwidth + 1, n), order="F"), self.order)
-        csc = sp.csc_matrix((data[self.both], self.indices, self.indptr), shape=(n, n))
-        return SparseMatrix(csc, self.order)
+        if self.sparse is None:
+            return BandMatrix(data.reshape((self.bandwidth + 1, len(self.order)), order="F"), self.order)
+        return SparseMatrix(data, self.sparse)
 
 
 def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
-    """Pattern of the unknowns `number` (all components, -1 if prescribed); unknowns of a node and its edge stay
+    """Pattern of the unknowns `number` (all components, -1 if prescribed); unknowns of a node and of its edge stay
     together.
 
-    A band where LAPACK's factorisation is expected to be cheaper than SuperLU's, by their measured costs
-    (docs/decisions.md), unless `banded` says which.
+    A band or a sparse matrix, whichever is factorised faster, unless `banded` says which.
     """
-    n = int(number.max(initial=-1)) + 1
-    position, order = _order(mesh, components, number, n)
-    element = np.where(components >= 0, number[components], -1)
-    a, b = element[:, LOWER[0]], element[:, LOWER[1]]
-    free = (a >= 0) & (b >= 0)
-    row, column = position[np.maximum(a, 0)], position[np.maximum(b, 0)]
-    row, column = np.maximum(row, column), np.minimum(row, column)
-    bandwidth = int((row - column)[free].max(initial=0))
-    fits = 8 * n * (bandwidth + 1) < 2e9
-    cheaper = fits and 2.6e-11 * n * (bandwidth + 1.0) ** 2 < 1.5e-7 * n**1.45
-    if cheaper if banded is None else banded:
-        slots = np.where(free, (row - column) + column * (bandwidth + 1), -1)
-        empty = np.zeros(0, dtype=np.int64)
-        return Pattern(order, slots, (bandwidth + 1) * n, bandwidth, empty, empty, empty)
-    return _sparse(n, order, np.where(free, row + n * column, -1), bandwidth)
+    owner = _owners(mesh, components, number)
+    free = np.flatnonzero(number >= 0)
+    sizes = np.bincount(owner[free], minlength=len(mesh.nodes))
+    used = np.flatnonzero(sizes)  # nodes with unknowns
+    vertex = np.full(len(sizes), -1, dtype=np.int64)
+    vertex[used] = np.arange(len(used))
+    by_node = free[np.argsort(owner[free], kind="stable")]  # components node by node
+    starts = np.concatenate(([0], np.cumsum(sizes[used])))
+
+    def unknowns(nodes: Ints) -> Ints:
+        """Unknowns in the order of their nodes (rows of `used`)."""
+        length = sizes[used][nodes]
+        inside = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
+        return number[by_node[np.repeat(starts[nodes], length) + inside]]
+
+    high, low = _pairs(vertex[mesh.triangles], len(used))
+    order = unknowns(reverse_cuthill_mckee(high, low, len(used))[0])
+    rows = _rows(components, number, order)
+    reach = rows.max(axis=1) - np.where(rows >= 0, rows, len(order)).min(axis=1)
+    bandwidth = int(reach.max(initial=0))
+    if band_is_cheaper(len(order), bandwidth) if banded is None else banded:
+        a, b = rows[:, LOWER[0]], rows[:, LOWER[1]]
+        column = np.minimum(a, b)
+        slots = np.where(column >= 0, np.abs(a - b) + column * (bandwidth + 1), -1)
+        return Pattern(order, slots, (bandwidth + 1) * len(order), bandwidth, None)
+    sparse, _ = SparsePattern.dissected(high, low, sizes[used], mesh.nodes[used, :2], unknowns)
+    slots = _sparse_slots(_rows(components, number, sparse.order), sparse.indptr, sparse.indices)
+    return Pattern(sparse.order, slots, len(sparse.indices), bandwidth, sparse)
 
 
-def _order(mesh: QuadraticMesh, components: Ints, number: Ints, n: int) -> tuple[Ints, Ints]:
-    """Row of every unknown and unknown of every row, narrow by reverse Cuthill-McKee on the nodes."""
-    nodes = mesh.triangles
-    i, j = np.tril_indices(6, -1)
-    order_nodes, _ = reverse_cuthill_mckee(nodes[:, i].ravel(), nodes[:, j].ravel(), len(mesh.nodes))
-    rank = np.empty(len(mesh.nodes), dtype=np.int64)
-    rank[order_nodes] = np.arange(len(rank))
-    # the node that each component belongs to: rotations go with the middle node of their edge
+def _owners(mesh: QuadraticMesh, components: Ints, number: Ints) -> Ints:
+    """Node that each component belongs to: rotations go with the middle node of their edge."""
     owner = np.zeros(len(number), dtype=np.int64)
     local = np.concatenate((np.repeat(np.arange(6), 3), np.tile(np.repeat([3, 4, 5], 2), 2)))
     used = components >= 0
-    owner[components[used]] = nodes[:, local][used]
-    free = np.flatnonzero(number >= 0)
-    sequence = free[np.argsort(rank[owner[free]], kind="stable")]
-    order = number[sequence]
-    position = np.empty(n, dtype=np.int64)
-    position[order] = np.arange(n)
-    return position, order
+    owner[components[used]] = mesh.triangles[:, local][used]
+    return owner
 
 
-def _sparse(n: int, order: Ints, keys: Ints, bandwidth: int) -> Pattern:
-    """Compressed lower values and the map to both triangles, in SuperLU's minimum-degree order."""
-    from scipy.sparse.linalg import splu
+def _pairs(triangles: Ints, count: int) -> tuple[Ints, Ints]:
+    """Every pair of nodes with unknowns that share a triangle, once, as (high, low); -1 are nodes without."""
+    i, j = np.tril_indices(6, -1)
+    a, b = triangles[:, i].ravel(), triangles[:, j].ravel()
+    both = (a >= 0) & (b >= 0)
+    keys = np.unique(np.maximum(a, b)[both] * count + np.minimum(a, b)[both])
+    return keys // count, keys % count
 
-    unique = np.unique(keys[keys >= 0])
-    row, column = unique % n, unique // n
-    # fill-reducing order once: factorise a diagonally dominant matrix of this pattern
-    probe = sp.csc_matrix((np.full(len(unique), -1e-3), (row, column)), shape=(n, n))
-    probe = sp.csc_matrix(probe + probe.T + 2.0 * n * sp.eye_array(n))
-    options = {"SymmetricMode": True, "Equil": False}
-    new = splu(probe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).perm_c.astype(
-        np.int64
-    )
-    new_order = np.empty(n, dtype=np.int64)
-    new_order[new] = order
-    low, high = np.maximum(new[row], new[column]), np.minimum(new[row], new[column])
-    size = len(unique)
-    off = np.flatnonzero(low != high)
-    rows, columns = np.concatenate((low, high[off])), np.concatenate((high, low[off]))
-    source = np.concatenate((np.arange(size), off))
-    sorting = np.lexsort((rows, columns))
-    indptr = np.concatenate(([0], np.cumsum(np.bincount(columns, minlength=n))))
-    slots = np.where(keys >= 0, np.searchsorted(unique, np.maximum(keys, 0)), -1)
-    return Pattern(
-        new_order, slots, size, bandwidth, rows[sorting].astype(np.int32), indptr.astype(np.int32),
-        source[sorting],
-    )  # fmt: skip
+
+def _rows(components: Ints, number: Ints, order: Ints) -> Ints:
+    """(t, 30) row of every component of an element, -1 if it is prescribed or missing."""
+    position = np.empty(len(order) + 1, dtype=np.int64)
+    position[order], position[-1] = np.arange(len(order)), -1
+    return position[np.where(components >= 0, number[components], -1)]
+
+
+@njit(**OPTIONS)
+def _sparse_slots(rows, indptr, indices):  # type: ignore[no-untyped-def]
+    """Slots of the lower entries of all elements in compressed columns, by bisection."""
+    width = rows.shape[1]
+    slots = np.full((len(rows), width * (width + 1) // 2), -1, dtype=np.int64)
+    for e in range(len(rows)):
+        at = -1
+        for i in range(width):
+            for j in range(i + 1):
+                at += 1
+                row, column = max(rows[e, i], rows[e, j]), min(rows[e, i], rows[e, j])
+                if column < 0:
+                    continue
+                low, high = indptr[column], indptr[column + 1]
+                while high - low > 1:
+                    middle = (low + high) // 2
+                    if indices[middle] <= row:
+                        low = middle
+                    else:
+                        high = middle
+                slots[e, at] = low
+    return slots

@@ -15,6 +15,7 @@ from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
+from bh.threads import one_blas_thread
 from fem.loads import EdgeConditions
 from fem.observables import ShellState, observe
 from fem.shell import ShellElements, shell_elements
@@ -79,7 +80,14 @@ def follow(
         the state at the beginning and after every accepted increment, and all increments. The last increment's
         outcome is "reached" only if every step was.
     """
-    shell, strategy = Shell(), strategy or LoadControl()
+    with one_blas_thread():
+        return _follow(model, conditions, strategy or LoadControl())
+
+
+def _follow(
+    model: Model, conditions: Sequence[EdgeConditions] | EdgeConditions, strategy: Strategy
+) -> tuple[list[ShellState], list[Increment]]:
+    shell = Shell()
     states: list[ShellState] = []
     increments: list[Increment] = []
     programs = program(model)

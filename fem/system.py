@@ -45,6 +45,14 @@ class Here:
     pull: Array  # (t, 24) element forces by positions and side rotations
 
 
+def root_mean_square(values: Array) -> float:
+    """Also of values whose squares overflow, which a wild trial step may have."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if not 0.0 < largest < np.inf:
+        return largest
+    return largest * float(np.sqrt(np.mean((values / largest) ** 2)))
+
+
 class ShellSystem:
     """`bh.solvers.System` of one step.
 
@@ -189,7 +197,7 @@ class ShellSystem:
         for part, inner, outer, floor in groups:
             largest = float(np.abs(part).max(initial=0.0)) - floor
             if largest > 0.0:
-                worst = max(worst, largest / max(float(np.sqrt(np.mean(inner**2))), outer, 1e-300))
+                worst = max(worst, largest / max(root_mean_square(inner), outer, 1e-300))
         return worst
 
     @cached_property
@@ -270,6 +278,9 @@ class ShellSystem:
         if angle > LARGEST_ANGLE:
             return f"an edge turned by {np.degrees(angle):.0f} degrees within the step; split the step in two"
         return ""
+
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        return ""  # the shell knows no contact: its sides may pass through each other
 
     def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
         if not self.constraints.rigid_body or not (self.load.start.any() or self.load.end.any()):

@@ -15,6 +15,7 @@ from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Point, extrapolate, point
 from bh.solvers.newton import Newton
 from bh.solvers.trace import Walk, walk
+from bh.threads import one_blas_thread
 from fem.kirchhoff_love import Shell
 from fem.observables import ShellState
 from fem.system import ShellSystem
@@ -92,6 +93,11 @@ def rotate(model: Model, crease: str = "crease", strategy: LoadControl = ROTATE)
 
 def load(model: Model, most: float) -> Solved:
     """Load until the mean fold angle is a right angle; `most` is the load at lambda = 1."""
+    with one_blas_thread():
+        return _load(model, most)
+
+
+def _load(model: Model, most: float) -> Solved:
     began = time.perf_counter()
     shell = Shell()
     system = shell.system(model, program(model)[0], None)
