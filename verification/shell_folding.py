@@ -67,6 +67,22 @@ def sheet_model(
     return model.support("edge:inner", "z").support("edge:outer", "z")
 
 
+def full_annulus(along: int, rows: int) -> Model:
+    """Fig. B.7 (a): the whole ring, which buckles into two waves when it is folded.
+
+    The phase of the waves costs nothing, which leaves the states undetermined. Supports at the places that stay put by
+    symmetry take it away, and carry no force: z where the crease crosses its own plane, y and x at the crests.
+    """
+    mesh = meshes.structured(meshes.full_annulus(100.0, 10.0), along=along, rows=rows, kind="mirrored")
+    nodes = mesh.nodes("crease:crease")
+    phase = np.arctan2(mesh.points[nodes, 1], mesh.points[nodes, 0])
+    model = Model(mesh, SHEET, formulation="shell")
+    for eighth, fix in ((1, "z"), (3, "z"), (5, "z"), (7, "z"), (0, "y"), (4, "y"), (2, "x")):
+        off = np.abs(np.angle(np.exp(1j * (phase - eighth * math.pi / 4))))
+        model = model.support([int(nodes[np.argmin(off)])], fix)
+    return model
+
+
 def solve(actuation: str, along: int, rows: int) -> Solved:
     """Fold to a mean fold angle of 90 degrees by one of `ACTUATIONS`."""
     model = sheet_model(actuation, along, rows)

@@ -127,3 +127,17 @@ def test_three_creases_fold_alternately() -> None:
     assert solved.outcome == "reached"
     for crease, sign in (("crease-1", 1.0), ("crease-2", -1.0), ("crease-3", 1.0)):
         np.testing.assert_allclose(solved.state.fold_angle(crease), sign * math.pi / 2, rtol=1e-12)
+
+
+def test_full_annulus_buckles_into_two_waves() -> None:
+    """Fig. B.7 (a); the supports that hold the phase of the waves carry nothing but what the mesh lacks in symmetry."""
+    model = folding.full_annulus(48, 1)
+    solved = folding.rotate(model, strategy=folding.BUCKLE)
+    assert solved.outcome == "reached"
+    assert solved.state.stable
+    height = solved.state.crease_points("crease")[:, 2]
+    waves = np.abs(np.fft.rfft(height - height.mean()))
+    assert np.argmax(waves) == 2
+    assert waves[2] > 50 * np.delete(waves, 2).max()
+    moment = np.nanmean(solved.state.crease_moments)
+    assert np.abs(solved.state.reactions).max() < 1e-2 * abs(moment)  # 1e-5 with 144 cells
