@@ -16,7 +16,7 @@ from bh.solvers.increments import Increment, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
 from bh.threads import one_blas_thread
-from fem.loads import EdgeConditions
+from fem.loads import EdgeMoments
 from fem.observables import ShellState, observe
 from fem.shell import ShellElements, shell_elements
 from fem.system import ShellSystem
@@ -24,7 +24,7 @@ from meshes import SheetMesh
 from meshes.curved import lift
 
 Array = NDArray[np.float64]
-FREE = EdgeConditions()
+FREE = EdgeMoments()
 
 
 class Shell:
@@ -34,7 +34,7 @@ class Shell:
     takes_nu = True
 
     def system(
-        self, model: Model, program: StepProgram, start: State | None, conditions: EdgeConditions = FREE
+        self, model: Model, program: StepProgram, start: State | None, moments: EdgeMoments = FREE
     ) -> ShellSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet).
 
@@ -45,7 +45,7 @@ class Shell:
             raise ModelError(
                 f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
             )
-        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet), conditions)
+        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet), moments)
 
     def observe(
         self,
@@ -68,31 +68,31 @@ def _elements(mesh: SheetMesh, sheet: Sheet) -> ShellElements:
 
 def follow(
     model: Model,
-    conditions: Sequence[EdgeConditions] | EdgeConditions = FREE,
+    moments: Sequence[EdgeMoments] = (),
     strategy: Strategy | None = None,
 ) -> tuple[list[ShellState], list[Increment]]:
-    """Follow a model whose boundary edges are clamped or loaded by couples, which `bh.trace` cannot be told.
+    """Follow a model whose boundary edges are loaded by couples, which `bh.trace` cannot be told.
 
     Args:
-        conditions: one a step, or one for all.
+        moments: one a step, or none.
 
     Returns:
         the state at the beginning and after every accepted increment, and all increments. The last increment's
         outcome is "reached" only if every step was.
     """
     with one_blas_thread():
-        return _follow(model, conditions, strategy or LoadControl())
+        return _follow(model, moments, strategy or LoadControl())
 
 
 def _follow(
-    model: Model, conditions: Sequence[EdgeConditions] | EdgeConditions, strategy: Strategy
+    model: Model, moments: Sequence[EdgeMoments], strategy: Strategy
 ) -> tuple[list[ShellState], list[Increment]]:
     shell = Shell()
     states: list[ShellState] = []
     increments: list[Increment] = []
     programs = program(model)
     for step, ramps in enumerate(programs):
-        now = conditions if isinstance(conditions, EdgeConditions) else conditions[step]
+        now = moments[step] if moments else FREE
         system = shell.system(model, ramps, states[-1] if states else None, now)
         begin = point(system, system.start(), 0.0)
         if not states:

@@ -21,17 +21,15 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class EdgeConditions:
-    """What a model of bars and hinges cannot say: rotations of boundary edges.
+class EdgeMoments:
+    """Couples on boundary edges, which a model of bars and hinges cannot say.
 
     Attributes:
-        clamped: edge sets whose edges cannot turn about themselves (they keep the turn that the step begins with).
-        moments: edge set and couple a length, N, at the start and at the end of the step; positive raises the outside
-            of the boundary edge toward the sheet's normal.
+        at: edge set and couple a length, N, at the start and at the end of the step; positive raises the outside of the
+            boundary edge toward the sheet's normal.
     """
 
-    clamped: tuple[str, ...] = ()
-    moments: tuple[tuple[str, float, float], ...] = ()
+    at: tuple[tuple[str, float, float], ...] = ()
 
 
 def constraints(mesh: QuadraticMesh, model: Model, step: int) -> Constraints:
@@ -93,13 +91,13 @@ def _force(mesh: QuadraticMesh, item: Force, lengths: Array) -> Array:
     return out
 
 
-def edge_moments(elements: ShellElements, conditions: EdgeConditions) -> Ramp:
+def edge_moments(elements: ShellElements, moments: EdgeMoments) -> Ramp:
     """(e, 2) couples on the rotations alpha of edges, N mm / rad."""
     sheet = elements.mesh.sheet
     out = np.zeros((2, len(elements.lengths), 2))
     side = np.zeros(len(elements.lengths))
     side[elements.loops.edges] = elements.loops.sides
-    for name, *couple in conditions.moments:
+    for name, *couple in moments.at:
         chosen = edge_set(sheet, name)
         if (sheet.topology.edge_triangles[chosen, 1] >= 0).any():
             raise ModelError(f"edge moments act on boundary edges; '{name}' lies inside")

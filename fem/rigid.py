@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 def free_rigid_motions(components: Components, elements: ShellElements, x: Array, B: Array) -> Array:
     """(n, r) orthonormal rates of the unknowns in the rigid motions left free at positions x (all nodes).
 
-    Edges turn such that no curvature arises, with B (t, 18, 24) the gradients there; clamped edges do not turn.
+    Edges turn such that no curvature arises, with B (t, 18, 24) the gradients there.
     """
     motions = rigid_motions(x) @ free_motions(x, components.constraints)
     count = motions.shape[1]
@@ -33,13 +33,6 @@ def free_rigid_motions(components: Components, elements: ShellElements, x: Array
         rows, columns = slice(9 + 3 * j, 11 + 3 * j), slice(18 + 2 * j, 20 + 2 * j)
         rate = -np.linalg.solve(B[:, rows, columns], B[:, rows, :18] @ element)
         whole[components.of_element[:, columns]] = elements.loops.sides[:, j, None, None] * rate
-    edges = slice(components.first_alpha, components.first_beta)
-    clamped = whole[edges][components.number[edges] < 0]
-    if len(clamped):
-        _, values, right = np.linalg.svd(np.linalg.qr(clamped, mode="r"))
-        size = elements.mesh.sheet.size
-        rank = int((values > 1e-7 * max(values[0], float(np.abs(whole).max()) / size)).sum())
-        whole = whole @ right[rank:].T
     out: Array = np.linalg.qr(whole[components.free])[0]
     return out
 

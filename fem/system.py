@@ -16,10 +16,10 @@ from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
 from bh.solvers.system import Evaluation
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
-from fem.components import edge_set, lay_out
+from fem.components import lay_out
 from fem.connectors import connectors
 from fem.kernels import Frames
-from fem.loads import EdgeConditions
+from fem.loads import EdgeMoments
 from fem.observables import ShellState
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
 from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, unit
@@ -67,7 +67,7 @@ class ShellSystem:
         program: StepProgram,
         start: ShellState | None,
         elements: ShellElements,
-        conditions: EdgeConditions,
+        moments: EdgeMoments,
     ) -> None:
         if model.stiffness is not None:
             raise ModelError(
@@ -83,20 +83,17 @@ class ShellSystem:
         couple = flat if start is None else start.crease_couples
         self.creases = connectors(mesh, model, program, beta, couple)
         self.constraints = loads.constraints(mesh, model, step)
-        clamped = [edge_set(mesh.sheet, name) for name in conditions.clamped]
-        none = np.zeros(0, dtype=np.int64)
-        self.components = lay_out(
-            elements, self.constraints, self.creases, x, beta, np.concatenate((none, *clamped))
-        )
-        self.load = self._loads(model, step, conditions)
+        clamped = mesh.sheet.topology.find_edges(program.constraints.clamped)
+        self.components = lay_out(elements, self.constraints, self.creases, x, beta, clamped)
+        self.load = self._loads(model, step, moments)
         self._here: Here | None = None
         if self.constraints.rigid_body:
             self._check_balance()
 
-    def _loads(self, model: Model, step: int, conditions: EdgeConditions) -> Ramp:
+    def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
         force = loads.forces(self.mesh, model, step, self.elements.lengths)
-        couple = loads.edge_moments(self.elements, conditions)
+        couple = loads.edge_moments(self.elements, moments)
         none = np.zeros(2 * len(self.creases))
         ends = [
             np.concatenate((self.components.to_local(f).ravel(), m.ravel(), none))

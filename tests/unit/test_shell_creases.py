@@ -16,7 +16,7 @@ from bh.path import Path
 from bh.program import program
 from bh.solvers.continuation import LoadControl
 from fem.kirchhoff_love import Shell, follow
-from fem.loads import EdgeConditions
+from fem.loads import EdgeMoments
 from fem.observables import ShellState
 from verification.theory.shell_benchmarks import clamped_sheet, rectangle
 
@@ -184,7 +184,7 @@ def test_end_moment_rolls_a_strip() -> None:
     """A clamped strip under an end couple takes the same moment everywhere."""
     model = clamped_sheet(rectangle(12.0, 1.0, 8), Sheet(E=1.2e6, nu=0.0, t=0.1))
     model = model.force("corner:low-end", each=(0.0, 0.0, 0.0))
-    states, increments = follow(model, EdgeConditions(("edge:start",), (("edge:end", 0.0, 10.0),)))
+    states, increments = follow(model, [EdgeMoments((("edge:end", 0.0, 10.0),))])
     assert increments[-1].outcome == "reached"
     assert states[-1].moments[:, 0].mean() == pytest.approx(10.0, rel=1e-3)
     assert states[-1].points[-1, 2] > 3.0
@@ -203,13 +203,13 @@ def test_bad_models_are_refused(make: object, message: str) -> None:
         bh.trace(make())  # type: ignore[operator]
 
 
-def test_bad_edge_conditions_are_refused() -> None:
+def test_bad_edge_moments_are_refused() -> None:
     model = clamped_sheet(rectangle(4.0, 1.0, 2), MYLAR).force("edge:end", total=(0.0, 0.0, 1e-4))
     with pytest.raises(ModelError, match="no edge set 'edge:left'; use one of edge:start, edge:end"):
-        follow(model, EdgeConditions(clamped=("edge:left",)))
+        follow(model, [EdgeMoments((("edge:left", 0.0, 1.0),))])
     model = sheet().fold("crease", to=2.0)
     with pytest.raises(ModelError, match="'crease:crease' lies inside"):
-        follow(model, EdgeConditions(moments=(("crease:crease", 0.0, 1.0),)))
+        follow(model, [EdgeMoments((("crease:crease", 0.0, 1.0),))])
 
 
 def test_states_of_bars_cannot_begin_a_step_of_the_shell() -> None:
@@ -230,3 +230,15 @@ def test_a_free_hinge_is_named() -> None:
     path = bh.trace(model.support("rigid-body").moment("crease", to=1e-3))
     assert path.outcome == "mechanism"
     assert "crease 'crease' turns" in path.reason
+
+
+def test_a_clamp_that_slides_is_a_plane_of_symmetry() -> None:
+    """Half of a sector, its end free to move in the plane of symmetry but not to turn out of it: half the energy."""
+    whole = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.8), along=12, kind="alternating")
+    half = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.4), along=6, kind="alternating")
+    normal = [[-math.sin(0.4), math.cos(0.4), 0.0]]
+    model = sheet(half).support("edge:end", normal, clamp=True).support("rigid-body").fold("crease", by=1.0)
+    energy = solve(sheet(whole).fold("crease", by=1.0))[-1].energy.total
+    assert 2.0 * solve(model)[-1].energy.total == pytest.approx(energy, rel=2e-4)
+    loose = sheet(half).support("edge:end", normal).support("rigid-body").fold("crease", by=1.0)
+    assert 2.0 * solve(loose)[-1].energy.total < 0.99 * energy

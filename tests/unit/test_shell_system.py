@@ -15,7 +15,6 @@ from bh.program import program
 from fem import system as system_module
 from fem.assembly import build_pattern
 from fem.kirchhoff_love import Shell
-from fem.loads import EdgeConditions
 from fem.shell import carried_frames, flat_frames, shell_elements
 from fem.system import ShellSystem
 from meshes import SheetMesh
@@ -37,8 +36,8 @@ def distorted(mesh: SheetMesh, amount: float = 0.25) -> SheetMesh:
     return replace(mesh, points=points)
 
 
-def system_of(model: Model, step: int = 0, conditions: EdgeConditions | None = None) -> ShellSystem:
-    return Shell().system(model, program(model)[step], None, conditions or EdgeConditions())
+def system_of(model: Model) -> ShellSystem:
+    return Shell().system(model, program(model)[0], None)
 
 
 def held() -> Model:

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.model import Model, Sheet
-from fem.loads import EdgeConditions
+from fem.loads import EdgeMoments
 from meshes import Arc, SheetMesh
 
 Array = NDArray[np.float64]
-CLAMP = EdgeConditions(clamped=("edge:start",))
 
 STRIP = Sheet(E=1.2e6, nu=0.0, t=0.1)  # width 1: E I = 100
 STRIP_LENGTH, SHEAR_LENGTH = 12.0, 10.0
@@ -81,19 +80,19 @@ def slit_ring(along: int, across: int) -> SheetMesh:
 
 
 def clamped_sheet(mesh: SheetMesh, sheet: Sheet) -> Model:
-    """Held at "edge:start"; the clamp itself is `CLAMP`, and the supports know nothing of it."""
-    return Model(mesh, sheet, formulation="shell").support("edge:start", "xyz").support("rigid-body")
+    """Clamped at "edge:start"."""
+    return Model(mesh, sheet, formulation="shell").support("edge:start", "xyz", clamp=True)
 
 
-def rolled_strip(along: int, steps: int = 3) -> tuple[Model, list[EdgeConditions]]:
+def rolled_strip(along: int, steps: int = 3) -> tuple[Model, list[EdgeMoments]]:
     """The strip under an end moment, in steps of at most 120 degrees at the tip; cells of one shape at any `along`."""
     model = clamped_sheet(rectangle(STRIP_LENGTH, 1.0, along, max(1, along // 12)), STRIP)
-    conditions = []
+    moments = []
     for step in range(steps):
         model = model.force("corner:low-end", each=(0.0, 0.0, 0.0))  # a step has to act in some way
         ends = (FULL_MOMENT * step / steps, FULL_MOMENT * (step + 1) / steps)
-        conditions.append(EdgeConditions(("edge:start",), (("edge:end", *ends),)))
-    return model, conditions
+        moments.append(EdgeMoments((("edge:end", *ends),)))
+    return model, moments
 
 
 def rolled_strip_exact(moment: float = FULL_MOMENT) -> tuple[float, float, float]:
