@@ -20,8 +20,6 @@ from fem.spaces import (
     tables,
 )
 
-RANDOM = np.random.default_rng(5)
-
 
 def unit(v: np.ndarray) -> np.ndarray:
     return v / np.linalg.norm(v)
@@ -59,15 +57,16 @@ def test_the_edge_angle_is_the_slope_of_the_outside() -> None:
 
 def test_a_turned_frame_shifts_the_edge_angle() -> None:
     """Two frames that differ by a turn about t0 give angles that differ by that turn, wherever the edge has gone."""
-    t0, z = unit(RANDOM.normal(size=3)), RANDOM.normal(size=6)
-    d0 = unit(np.cross(t0, RANDOM.normal(size=3)))
+    random = np.random.default_rng(5)
+    t0, z = unit(random.normal(size=3)), random.normal(size=6)
+    d0 = unit(np.cross(t0, random.normal(size=3)))
     turned = np.cos(0.4) * d0 - np.sin(0.4) * np.cross(t0, d0)
     shift = angle(z, t0, d0)[0] - angle(z, t0, turned)[0]
     assert np.mod(shift, 2 * np.pi) == pytest.approx(0.4, abs=1e-14)
 
 
 def test_hessian_of_the_curvature() -> None:
-    z = RANDOM.normal(size=9)
+    z = np.random.default_rng(6).normal(size=9)
     H = np.empty((3, 3, 3, 3))
     curvature_hessian(z[:3].copy(), z[3:6].copy(), z[6:].copy(), H)
 
@@ -80,14 +79,14 @@ def test_hessian_of_the_curvature() -> None:
         for b in e
     ]
     np.testing.assert_allclose(
-        H.transpose(0, 2, 1, 3).reshape(9, 9), np.array(values) / (4 * h * h), atol=2e-6
+        H.transpose(0, 2, 1, 3).reshape(9, 9), np.array(values) / (4 * h * h), atol=1e-6 * np.abs(H).max()
     )
 
 
 def test_shape_functions() -> None:
     nodes = np.vstack((CORNERS, [edge_points(j, np.array([0.5]))[0] for j in range(3)]))
     np.testing.assert_allclose(shapes(nodes), np.eye(6), atol=1e-15)
-    at = RANDOM.random((5, 2)) / 2
+    at = np.random.default_rng(7).random((5, 2)) / 2
     h = 1e-5
     for b in range(2):
         step = h * np.eye(2)[b]
@@ -108,7 +107,7 @@ def test_moment_and_strain_tensors_live_on_one_edge() -> None:
 def test_regge_interpolation_keeps_linear_strains() -> None:
     """Positions (x, y) -> A (x, y) have the constant metric A^T A, which the interpolant has to give back exactly."""
     nodes = np.vstack((CORNERS, [edge_points(j, np.array([0.5]))[0] for j in range(3)]))
-    A = RANDOM.normal(size=(3, 2))
+    A = np.random.default_rng(8).normal(size=(3, 2))
     x = nodes @ A.T
     coefficients = 0.5 * np.einsum("cij,ia,ja->c", regge_interpolation(), x, x)
     expected = 0.5 * np.einsum("ka,ab,kb->k", EDGES, A.T @ A, EDGES)
