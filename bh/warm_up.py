@@ -18,7 +18,9 @@ def warm_up() -> None:
     mesh = meshes.structured(meshes.annulus_sector(10.0, 1.0, 0.3), along=2)
     for formulation in names():
         path = _fold(Model(mesh, Sheet(E=1.0, t=0.1), formulation=formulation))
-    clamped = Model(mesh, Sheet(E=1.0, t=0.1), formulation="consistent").support("edge:start", "xyz", clamp=True)
+    clamped = Model(mesh, Sheet(E=1.0, t=0.1), formulation="consistent").support(
+        "edge:start", "xyz", clamp=True
+    )
     trace(clamped.fold("crease", rest=3.0, Lstar=1.0))
     intersecting(path[-1].points, mesh.triangles, candidates(path[-1].points, mesh.triangles), 1e-9)
     wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
