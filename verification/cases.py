@@ -16,6 +16,8 @@ CASES = {
     "convergence": "verification.convergence",
     "derivatives": "verification.derivatives",
     "hard_cases": "verification.hard_cases",
+    "appendix_b_shell": "verification.appendix_b_shell",
+    "shell_benchmarks": "verification.shell_benchmarks",
 }
 LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds
 ALL_CASES = {**CASES, **LONG_CASES}
