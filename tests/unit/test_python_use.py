@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import bh
@@ -87,5 +88,5 @@ def test_models_and_paths_can_be_pickled() -> None:
     assert other.mesh.creases == mesh.creases
     assert other.mesh.aspect_ratio == mesh.aspect_ratio
     with pytest.raises(TypeError):
-        other.mesh.corners["corner:inner-start"] = 3
+        other.mesh.corners["corner:inner-start"] = 3  # type: ignore[index]
     assert not other.mesh.points.flags.writeable
