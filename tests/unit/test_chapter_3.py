@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from verification import fig3_10
+from verification import fig3_8, fig3_10
 
 
 def test_lifted_annulus_is_softest_on_the_coarse_mesh_of_bars() -> None:
@@ -29,3 +31,43 @@ def test_work_of_the_lifting_force_is_the_energy_gained(formulation: str) -> Non
     assert work == pytest.approx(gained, rel=0.02)
     nodes = item.folded.mesh.nodes("edge:start")
     assert np.abs(states[-1].points[nodes] - item.folded.points[nodes]).max() < 1e-9
+
+
+@pytest.mark.parametrize("formulation", ["bars-and-hinges", "consistent"])
+def test_reached_angles_by_rest_angle_and_length_scale(formulation: str) -> None:
+    """Fig. 3.8 (a): stiff creases take their rest angle; soft ones and small angles stay behind."""
+    study = fig3_8.studies()[0]
+    items = [fig3_8.reach(study, Lstar, formulation, study.coarse) for Lstar in (0.01, 25.0, 700.0)]
+    assert all(item.path.outcome == "reached" for item in items)
+    angles = np.array([item.angles[0] for item in items])
+    assert angles.shape == (3, len(study.rests))
+    assert np.abs(angles[0, :4] - study.rests[:4]).max() < 0.1
+    assert (np.diff(angles, axis=0) > 0.0).all()
+    off = angles - np.array(study.rests)
+    assert (np.diff(off[1:], axis=1) > 0.0).all()
+    # the states in between belong to rest angles in between
+    assert items[1].all_rests[-1] == 0.0
+    assert (items[1].all_angles[0] > items[1].all_rests)[1:].all()  # the first is flat
+
+
+def test_small_deviation_of_a_stiff_crease_is_the_moment_over_its_stiffness() -> None:
+    """phi - phi_R = M / k_f (Eq. 3.12): ten times the L*, ten times the distance, while both are small."""
+    study = fig3_8.studies()[0]
+    first, second = (fig3_8.reach(study, Lstar, "consistent", (16, 2)) for Lstar in (0.01, 0.1))
+    column = study.rests.index(90)
+    ratio = (second.angles[0, column] - 90.0) / (first.angles[0, column] - 90.0)
+    assert ratio == pytest.approx(10.0, rel=0.01)
+    path = second.path
+    state = next(item for item in path if math.isclose(item.step + item.lam, column + 1.0))
+    k_f = path.model.sheet.bending_stiffness(nu=0.0) / 0.1
+    moment = float(np.abs(state.crease_moment("crease")).mean())
+    assert math.radians(second.angles[0, column] - 90.0) == pytest.approx(moment / k_f, rel=0.01)
+
+
+def test_two_creases_lag_by_their_curvature() -> None:
+    """Fig. 3.8 (d): the curved crease stays farther from its rest angle than the straighter one."""
+    study = fig3_8.studies()[1]
+    item = fig3_8.reach(study, 25.0, "consistent", study.coarse)
+    off = np.abs(item.angles - np.array(study.rests))
+    assert item.path.outcome == "reached"
+    assert (off[0] > off[1]).all()
