@@ -14,6 +14,7 @@ CASES = {
     "appendix_b": "verification.appendix_b",
     "consistent": "verification.consistent",
     "convergence": "verification.convergence",
+    "fig3_6": "verification.fig3_6",
     "fig3_8": "verification.fig3_8",
     "fig3_10": "verification.fig3_10",
     "derivatives": "verification.derivatives",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from verification import fig3_8, fig3_10
+from verification import cone, fig3_6, fig3_8, fig3_10
 
 
 def test_lifted_annulus_is_softest_on_the_coarse_mesh_of_bars() -> None:
@@ -71,3 +71,28 @@ def test_two_creases_lag_by_their_curvature() -> None:
     off = np.abs(item.angles - np.array(study.rests))
     assert item.path.outcome == "reached"
     assert (off[0] > off[1]).all()
+
+
+def test_free_ends_lack_energy_with_rows_only() -> None:
+    """Fig. 3.6: the ends of the converged sheet are flatter over more than ten millimetres; one row cannot show it."""
+    angle = cone.ANGLES[0]
+    rows = fig3_6.fold(angle, fig3_6.Mesh("consistent", "alternating", 2.0, 4))
+    bars = fig3_6.fold(angle, fig3_6.Mesh("bars-and-hinges", "staggered", 12.0))
+    assert rows.density is not None
+    assert bars.density is not None
+    assert 0.85 < rows.ratio < 0.92 < bars.ratio < 1.0
+    assert fig3_6.lost_length(rows.density) > 5.0 * fig3_6.lost_length(bars.density)
+    assert fig3_6.reach_of_end(rows.density) > 10.0
+    assert fig3_6.reach_of_end(bars.density) == fig3_6.BIN
+    # both ends alike, and nothing is lost between the bins
+    assert rows.density == pytest.approx(rows.density[::-1], rel=0.02)
+    assert rows.density.mean() == pytest.approx(rows.ratio, rel=0.01)
+
+
+def test_lost_length_and_reach_of_a_made_profile() -> None:
+    density = np.full(40, 2.0)
+    density[:3] = density[-3:] = [0.0, 1.0, 1.0]  # two thirds of three bins at each end
+    assert fig3_6.lost_length(density) == pytest.approx(2.0 * fig3_6.BIN)
+    assert fig3_6.reach_of_end(density) == 3.0 * fig3_6.BIN
+    assert fig3_6.lost_length(np.ones(40)) == 0.0
+    assert fig3_6.reach_of_end(np.ones(40)) == 0.0
