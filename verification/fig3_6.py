@@ -273,6 +273,6 @@ def _notes(result: CaseResult, sectors: dict[float, Found]) -> None:
         f"Each free end lacks the energy of {means[2]:.1f} mm of cone, in every sector alike, over a reach of "
         f"{min(reach):.0f} to {max(reach):.0f} mm. One row of bars and hinges lacks {means[0]:.2f} mm at alpha = 8 and "
         f"{means[1]:.2f} mm at 12 (staggered), nearly all of it in the last {BIN:g} mm: that is an "
-        "effect of the cells, and goes to nothing with finer ones. The source reads the dip below the cone as some of the end effect; most of "
-        "the end effect needs rows."
+        "effect of the cells, and goes to nothing with finer ones. The source reads the dip below the cone as some of "
+        "the end effect; most of the end effect needs rows."
     )
