@@ -46,7 +46,9 @@ def test_reached_angles_by_rest_angle_and_length_scale(formulation: str) -> None
     off = angles - np.array(study.rests)
     assert (np.diff(off[1:], axis=1) > 0.0).all()
     # the states in between belong to rest angles in between
-    assert items[1].all_rests[-1] == 0.0
+    assert (items[1].all_rests[0], items[1].all_rests[-1]) == (180.0, 0.0)
+    at = int(np.argmin(np.abs(items[1].all_rests - 90.0)))
+    assert items[1].all_angles[0, at] == angles[1, study.rests.index(90)]
     assert (items[1].all_angles[0] > items[1].all_rests)[1:].all()  # the first is flat
 
 
