@@ -81,7 +81,7 @@ def studies() -> tuple[Study, ...]:
     both = ("crease-1", "crease-2")
     return (
         Study("annulus", meshes.annulus_sector(100.0, 10.0, math.pi / 4), 0.127, ("crease",),
-              (150, 120, 90, 60, 30, 0), (16, 1), (64, 1), (64, 4), (32, 16)),
+              (150, 120, 90, 60, 30, 0), (16, 1), (64, 1), (64, 4), (64, 16)),
         Study("two creases of opposite senses", rectangle(("mountain", "valley")), 0.274, both,
               (150, 120, 90, 60, 30), (10, 1), (40, 1), (40, 4), (32, 16)),
         # the sheet between creases that fight is crumpled by the deep folds: four rows are not yet enough
