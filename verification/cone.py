@@ -23,17 +23,25 @@ QUICK_ALPHAS = (2.0, 4.0, 8.0, 12.0)
 SOURCE = "Eq. 3.13 integrated: U = 1/2 D theta_a ln(r_o/r_i) cot^2(phi/2)"
 
 
-def cone_model(angle: float, alpha: float, kind: Kind) -> Model:
+def cone_model(
+    angle: float,
+    alpha: float,
+    kind: Kind,
+    rows: int = 1,
+    formulation: str = "bars-and-hinges",
+    sheet: Sheet = SHEET,
+) -> Model:
     """The sector with its crease kept in its plane, else free, folded exactly to a right angle."""
     pattern = meshes.annulus_sector(RADIUS, WIDTH, angle)
-    mesh = meshes.structured(pattern, aspect_ratio=alpha, kind=kind)
-    model = Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
+    mesh = meshes.structured(pattern, aspect_ratio=alpha, rows=rows, kind=kind)
+    model = Model(mesh, sheet, formulation=formulation)
+    model = model.support("crease:crease", "z").support("rigid-body")
     return model.fold("crease", to=DIHEDRAL)
 
 
-def energy(angle: float) -> float:
+def energy(angle: float, sheet: Sheet = SHEET) -> float:
     """Bending energy of the two cones, N mm."""
-    D = SHEET.bending_stiffness(nu=0.0)
+    D = sheet.bending_stiffness(nu=0.0)
     return cone.bending_energy(D, angle, RADIUS - WIDTH, RADIUS + WIDTH, DIHEDRAL)
 
 
