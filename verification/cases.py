@@ -7,7 +7,7 @@ from importlib import import_module
 from meshes.errors import InputError
 from verification.checks import Case
 
-CASES = {
+ALL_CASES = {
     "strips": "verification.strips",
     "shear_calibration": "verification.shear_calibration",
     "cone": "verification.cone",
@@ -21,9 +21,15 @@ CASES = {
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
     "shell_benchmarks": "verification.shell_benchmarks",
+    "campaign": "verification.campaign",
 }
-LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds
-ALL_CASES = {**CASES, **LONG_CASES}
+LONG = {
+    "campaign",
+    "fig3_8",
+    "fig3_10",
+}  # run only when named: minutes, not seconds; `records` keeps a run of each
+LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
+CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
 
 
 def case(name: str) -> Case:

@@ -9,7 +9,9 @@ import typer
 
 
 def verify(
-    cases: Annotated[list[str] | None, typer.Argument(help="cases to run; all if none is named")] = None,
+    cases: Annotated[
+        list[str] | None, typer.Argument(help="cases to run; all but the long ones if none is named")
+    ] = None,
     json: Annotated[Path | None, typer.Option("--json", help="write the records to this file")] = None,
     results: Annotated[Path, typer.Option("--results", help="folder for records and pictures")] = Path(
         "results"
@@ -22,12 +24,14 @@ def verify(
     What is found replaces what the results folder has of the cases that are run; the other cases stay. Exit code 1 if
     a check fails.
     """
-    from verification.cases import CASES
+    from verification.cases import CASES, LONG_CASES
     from verification.run import run, write_json
 
     if listing:
         for name in CASES:
             typer.echo(name)
+        for name in LONG_CASES:
+            typer.echo(f"{name} (minutes; runs only when it is named)")
         return
     data = run(cases or None, results, quick, lambda text: typer.echo(text, err=True))
     if json is not None:
