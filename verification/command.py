@@ -10,7 +10,7 @@ import typer
 
 def verify(
     cases: Annotated[
-        list[str] | None, typer.Argument(help="cases to run; all but the long ones if none is named")
+        list[str] | None, typer.Argument(help="cases to run; all but long ones if none is named")
     ] = None,
     json: Annotated[Path | None, typer.Option("--json", help="write the records to this file")] = None,
     results: Annotated[Path, typer.Option("--results", help="folder for records and pictures")] = Path(
@@ -31,7 +31,7 @@ def verify(
         for name in CASES:
             typer.echo(name)
         for name in LONG_CASES:
-            typer.echo(f"{name} (minutes; runs only when it is named)")
+            typer.echo(f"{name}: takes minutes, runs only when named")
         return
     data = run(cases or None, results, quick, lambda text: typer.echo(text, err=True))
     if json is not None:
