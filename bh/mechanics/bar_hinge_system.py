@@ -104,6 +104,18 @@ class BarsAndHingesSystem:
         local.ravel()[self.free] = q[: self.primal]
         return self.reference + self.to_global(local)
 
+    def vectors(self, dq: Array) -> Array:
+        """(n, 3) changes of positions, mm, for changes dq (size,) of the unknowns."""
+        local = np.zeros_like(self.reference)
+        local.ravel()[self.free] = dq[: self.primal]
+        return self.to_global(local)
+
+    def loads(self, forces: Array) -> Array:
+        """(size,) what nodal forces (n, 3), N, are to the unknowns; their part along supports is left out."""
+        out = np.zeros(self.size)
+        out[: self.primal] = self.to_local(forces).ravel()[self.free]
+        return out
+
     def to_global(self, local: Array) -> Array:
         if len(self.turned) == 0:
             return local
@@ -211,12 +223,10 @@ class BarsAndHingesSystem:
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         e = self.elements
         bars = len(e.bars)
-        local = np.zeros_like(self.reference)
-        local.ravel()[self.free] = dq[: self.primal]
         out = np.empty_like(forces)
         predicted_forces(
             e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, self._k_hinge, forces[bars:],
-            self._g_hinge, self.to_global(local), out[:bars], out[bars:],
+            self._g_hinge, self.vectors(dq), out[:bars], out[bars:],
         )  # fmt: skip
         if e.held:
             out[-e.held :] = forces[-e.held :] + dq[self.primal :]
@@ -307,9 +317,7 @@ class BarsAndHingesSystem:
         return float(np.abs(Z.T @ local).max(initial=0.0)) / max(float(np.abs(local).sum()), 1e-300)
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
-        local = np.zeros_like(self.reference)
-        local.ravel()[self.free] = motion[: self.primal]
-        return describe_motion(self.mesh, self.positions(q, lam), self.to_global(local))
+        return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))
 
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Which panels passed through each other at a hinge between two states, or an empty string.
