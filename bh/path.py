@@ -175,7 +175,7 @@ class Path:
         return (self[i] for i in range(len(self)))
 
     def solved(self, index: int = -1) -> tuple[Any, Record]:
-        """The system of the step that a state belongs to, and its record (unknowns, lambda): what analyses begin with."""
+        """The system of the step that a state belongs to, and its record: what analyses of a state begin with."""
         record = self.records[range(len(self))[index]]
         return self._system(record.step), record
 

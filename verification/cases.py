@@ -15,6 +15,8 @@ CASES = {
     "consistent": "verification.consistent",
     "convergence": "verification.convergence",
     "derivatives": "verification.derivatives",
+    "fig3_9": "verification.fig3_9",
+    "fig3_11": "verification.fig3_11",
     "hard_cases": "verification.hard_cases",
 }
 LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds

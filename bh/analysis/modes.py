@@ -1,8 +1,8 @@
-"""Lowest modes K u = eigenvalue M u of a factorised tangent, with free motions, held directions and unknowns without mass.
+"""Lowest modes K u = eigenvalue M u of a factorised tangent, with free motions, held directions, unknowns without mass.
 
-The eigenvalues are those of W R W, inverted, where R is the response to loads and W the root of the mass: unknowns without
-mass (rotations, multipliers) follow statically, and the spectral transformation is at zero (Ericsson and Ruhe 1980), so
-that the lowest modes come out first whatever their sign.
+The eigenvalues are those of W R W, inverted, where R is the response to loads and W the root of the mass: unknowns
+without mass (rotations, multipliers) follow statically, and the spectral transformation is at zero (Ericsson and Ruhe
+1980), so that the lowest modes come out first whatever their sign.
 """
 
 from __future__ import annotations

@@ -5,11 +5,12 @@ components (the compliance C), so a whole sphere of directions costs three solve
 held creases follow (static condensation); supports and prescribed displacements stay as they are. What is probed may be
 a body that is free to move: its rigid motions cost nothing, exactly.
 
-Two stiffnesses in a direction n belong to the 3 x 3 matrix K of a place (source 3.5.1: K = F / Delta, the force along the
-displacement over the displacement):
+Two stiffnesses in a direction n belong to the 3 x 3 matrix K of a place (source 3.5.1: K = F / Delta, the force along
+the displacement over the displacement):
 
 - `Stiffness.guided(n)` = n.K.n: the place moves along n and not across it; F is the component along n.
-- `Stiffness.loaded(n)` = 1 / (n.K^-1.n): a force along n, and the place moves across as it likes (never more than the other).
+- `Stiffness.loaded(n)` = 1 / (n.K^-1.n): a force along n, and the place moves across as it likes; in a stable state
+  never more than the other.
 
 Lengths mm, forces N, stiffness N/mm.
 """
@@ -106,7 +107,9 @@ class Probe:
 
     def __init__(self, path: Path, index: int = -1, hold: Place | Sequence[Place] = ()) -> None:
         if not isinstance(path, Path):
-            raise ModelError(f"a probe takes a solved path, not a {type(path).__name__}; give bh.trace(model)")
+            raise ModelError(
+                f"a probe takes a solved path, not a {type(path).__name__}; give bh.trace(model)"
+            )
         if not -len(path) <= index < len(path):
             raise ModelError(f"the path has {len(path)} states, none of index {index}; give one that it has")
         self.system, record = path.solved(index)
@@ -152,7 +155,8 @@ class Probe:
             cross = np.cross(np.eye(3)[None, :, :], arm[:, None, :])  # of the unit rotations
             turns = cross.transpose(0, 2, 1).reshape(-1, 3) / max(float(np.abs(arm).max()), 1e-300)
             left, sizes, _ = np.linalg.svd(turns, full_matrices=False)
-            turns = left[:, sizes > RANK * sizes.max(initial=0.0)]  # nodes on a line do not feel a turn about it
+            # nodes on a line do not feel a turn about it
+            turns = left[:, sizes > RANK * sizes.max(initial=0.0)]
             mixed = shift.T @ block @ turns
             K = K - mixed @ np.linalg.pinv(turns.T @ block @ turns, rcond=1e-12, hermitian=True) @ mixed.T
         return Stiffness(0.5 * (K + K.T), np.zeros((3, 0)))
@@ -161,14 +165,16 @@ class Probe:
         """(m, m) stiffness condensed to components of nodes, N/mm; all other unknowns follow.
 
         Args:
-            parts: pairs of a place and directions (letters out of "xyz", or vectors). Components are in the order of the
-                parts, in each node by node, for each node in the order of the directions.
+            parts: pairs of a place and directions (letters out of "xyz", or vectors). Components are in the order of
+                the parts, in each node by node, for each node in the order of the directions.
 
         Raises:
             ModelError: a component is held, or named twice.
         """
         if not parts:
-            raise ModelError("reduced stiffness of nothing; give places and directions, such as ('node:3', 'xz')")
+            raise ModelError(
+                "reduced stiffness of nothing; give places and directions, such as ('node:3', 'xz')"
+            )
         return self._condensed(self._components(parts))
 
     # ------------------------------------------------------------------------------- modes
@@ -177,8 +183,8 @@ class Probe:
         """The lowest modes, by the size of their eigenvalues; free motions come first.
 
         Args:
-            density: kg / m^3. Masses are lumped: each node has a third of the triangles around it. None for the modes of
-                the stiffness alone.
+            density: kg / m^3. Masses are lumped: each node has a third of the triangles around it. None for the modes
+                of the stiffness alone.
 
         Raises:
             ModelError: a count or density that cannot be.
@@ -259,11 +265,14 @@ class Probe:
                 for axis in axes:
                     if np.abs(held @ axis).max(initial=0.0) > RANK:
                         raise ModelError(
-                            f"node {node} is held along {_letters(axis)} by a support or a prescribed displacement; leave it out"
+                            f"node {node} is held along {_letters(axis)} by a support or a prescribed displacement; "
+                            "leave it out"
                         )
                     seen.setdefault(node, []).append(axis)
                     if np.linalg.matrix_rank(np.array(seen[node]), tol=RANK) < len(seen[node]):
-                        raise ModelError(f"node {node} is named twice along {_letters(axis)}; give each component once")
+                        raise ModelError(
+                            f"node {node} is named twice along {_letters(axis)}; give each component once"
+                        )
                     found.append((node, axis))
         return found
 
@@ -329,7 +338,7 @@ class Probe:
 
 
 def sphere(theta: ArrayLike, phi: ArrayLike) -> Array:
-    """(..., 3) unit vectors of azimuths theta (to the x axis) and polar angles phi (to the z axis), rad (source 3.5.1)."""
+    """(..., 3) unit vectors of azimuths theta (from the x axis) and polar angles phi (from the z axis), rad (3.5.1)."""
     theta, phi = np.asarray(theta, dtype=float), np.asarray(phi, dtype=float)
     sine = np.sin(phi)
     return np.stack(np.broadcast_arrays(sine * np.cos(theta), sine * np.sin(theta), np.cos(phi)), axis=-1)
