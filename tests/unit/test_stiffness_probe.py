@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -288,3 +289,9 @@ def test_bad_input(what: Any, word: str) -> None:
 
 def test_public() -> None:
     assert bh.stiffness_probe.Probe is Probe
+
+
+def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (FilePath(__file__).resolve().parents[2] / "docs" / "stiffness.md").read_text(encoding="utf-8")
+    exec(page.split("```python\n")[1].split("```")[0], {})
+    assert capsys.readouterr().out.count(" Hz ") == 4
