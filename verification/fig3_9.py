@@ -55,7 +55,7 @@ class Tip:
 
 
 def folded(formulation: str, along: int, rows: int, degrees: float, angle: float = ANGLE) -> Path:
-    """A free sector with a spring crease (L* = 25 mm) whose mean dihedral angle is `degrees`, to a thousandth of that."""
+    """A free sector with a spring crease (L* = 25 mm) whose mean dihedral angle is `degrees`, to a thousandth."""
     mesh = meshes.structured(meshes.annulus_sector(RADIUS, WIDTH, angle), along=along, rows=rows)
     model = Model(mesh, SHEET, formulation=formulation).support("rigid-body")
     goal = rest = math.radians(degrees)
@@ -180,7 +180,9 @@ def _sectors(result: CaseResult, context: Context) -> None:
     found = []
     for sector in degrees:
         angle = math.radians(sector)
-        one = tip(folded("consistent", max(16, round(64 * sector / 45.0)), 2 if context.quick else 4, 180.0, angle))
+        one = tip(
+            folded("consistent", max(16, round(64 * sector / 45.0)), 2 if context.quick else 4, 180.0, angle)
+        )
         exact = math.degrees(arc_azimuth(angle))
         found.append(one.azimuth)
         _add(result, one, "flat: azimuth of the stiffest direction", one.azimuth, "deg", exact,
@@ -204,7 +206,13 @@ def _plots(result: CaseResult, fine: dict[tuple[str, int], Tip]) -> None:
         for degrees in DEGREES:
             found = fine[formulation, degrees]
             name = f"{degrees} degrees"
-            ring.append(line(name, theta.tolist(), found.stiffness.loaded(sphere(np.radians(theta), math.pi / 2)).tolist()))
+            ring.append(
+                line(
+                    name,
+                    theta.tolist(),
+                    found.stiffness.loaded(sphere(np.radians(theta), math.pi / 2)).tolist(),
+                )
+            )
             n = sphere(math.radians(found.azimuth), np.radians(across))
             arch.append(line(name, across.tolist(), found.stiffness.loaded(n).tolist()))
         result.plots.append(
@@ -231,7 +239,9 @@ def _pictures(result: CaseResult, context: Context, fine: dict[tuple[str, int], 
         shown = None
         for k, (degrees, values) in enumerate(zip(DEGREES, maps, strict=True)):
             flat = figure.add_subplot(2, 4, k + 1)
-            shown = flat.pcolormesh(np.degrees(theta), np.degrees(phi), values, vmin=low, vmax=high, rasterized=True)
+            shown = flat.pcolormesh(
+                np.degrees(theta), np.degrees(phi), values, vmin=low, vmax=high, rasterized=True
+            )
             flat.set(title=f"{degrees} degrees", xlabel="azimuth, degrees", xticks=[0, 80, 180, 260, 360])
             flat.set_ylabel("polar angle, degrees")
             ball = figure.add_subplot(2, 4, k + 5, projection="3d")
@@ -258,17 +268,18 @@ def _notes(result: CaseResult, fine: dict[tuple[str, int], Tip]) -> None:
     azimuths = [fine["consistent", d].azimuth for d in DEGREES]
     result.notes.append(
         "The source gives K = F / Delta without saying whether the tip may move across the load. Shown is a point load, "
-        "1 / (n.C.n): stiff in a thin belt round the plane and in ellipses that grow rounder. A tip that is held across, n.K.n, "
-        "has half of the largest stiffness 45 degrees off it, at any fold angle. Both are in the same 3 x 3 matrix."
+        "1 / (n.C.n): stiff in a thin belt round the plane and in ellipses that grow rounder. A tip that is held across, "
+        "n.K.n, has half of the largest stiffness 45 degrees off it, at any fold angle. Both are in the same 3 x 3 matrix."
     )
     result.notes.append(
         f"The stiffest direction lies at {azimuths[0]:.0f} degrees when flat and {min(azimuths[1:]):.0f} to "
-        f"{max(azimuths[1:]):.0f} when folded (and opposite), for a sector of 45 degrees, which is an assumption: the source "
-        "does not print it. A flat cantilever is stiffest along the line through its tip about which its axis has the least second "
-        "moment; that is at 80 degrees for a sector of 27. Not printed either: the crease (here L* = 25 mm, rest angle set so "
-        "that the mean dihedral angle is met) and what 'fixed' means (here all nodes up to the first cell)."
+        f"{max(azimuths[1:]):.0f} when folded (and opposite), for a sector of 45 degrees, which is an assumption: the "
+        "source does not print it. A flat cantilever is stiffest along the line through its tip about which its axis has "
+        "the least second moment; that is at 80 degrees for a sector of 27. Not printed either: the crease (here L* = 25 "
+        "mm, rest angle set so that the mean dihedral angle is met) and what fixed means (here all nodes up to the first "
+        "cell)."
     )
     result.notes.append(
-        f"Out of plane, where a folded sector twists, bars and hinges are {min(over):.1f} to {max(over):.1f} times stiffer than "
-        "the consistent formulation on the same mesh: the torsion of 3.4.1."
+        f"Out of plane, where a folded sector twists, bars and hinges are {min(over):.1f} to {max(over):.1f} times stiffer "
+        "than the consistent formulation on the same mesh: the torsion of 3.4.1."
     )

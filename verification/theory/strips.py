@@ -65,9 +65,9 @@ def uniform_load_work(E: float, L: float, H: float, t: float, pressure: float = 
 def arc_azimuth(angle: float) -> float:
     """Direction in which a flat circular cantilever is stiffest at its tip, rad from the radius (to the centre).
 
-    The arc of radius 1 takes `angle` (rad) and is fixed at its other end. Bending alone: a force along a line through the
-    tip has the moment of the distance from that line, so the stiff line is the principal axis of the least second moment
-    of the arc about the tip, where s runs from the tip, X = 1 - cos s to the centre and Y = sin s along the arc.
+    The arc of radius 1 takes `angle` (rad) and is fixed at its other end. Bending alone: a force along a line through
+    the tip has the moment of the distance from that line, so the stiff line is the principal axis of the least second
+    moment of the arc about the tip, where s runs from the tip, X = 1 - cos s to the centre and Y = sin s along the arc.
     """
     xx = 1.5 * angle - 2.0 * math.sin(angle) + 0.25 * math.sin(2.0 * angle)
     yy = 0.5 * angle - 0.25 * math.sin(2.0 * angle)
