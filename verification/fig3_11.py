@@ -163,14 +163,15 @@ def _notes(result: CaseResult, curves: dict[str, Curve]) -> None:
     one, two = (curves[f] for f in FORMULATIONS)
     result.notes.append(
         f"At the end of the pinch K_r / K_a is {100 * one.ratio[-1]:.2g} % with bars and hinges and "
-        f"{100 * two.ratio[-1]:.2g} % with the consistent formulation, where the source reads 0.2 %. The source prints "
-        "neither the radii, pleats and sheet of its fan nor how far it is pinched. This one has five pleats of 8 mm from "
-        "radius 800 mm, 10 degrees, t = 0.5 mm, L* = 2 mm, its middle line drawn in by 90 % of its folded width. "
-        "K_r / K_a jumps at the beginning of the pinch, as the nodes that pinch are held from then on."
+        f"{100 * two.ratio[-1]:.2g} % with the consistent formulation, where the source reads 0.2 %. The "
+        "source prints neither the radii, pleats and sheet of its fan nor how far it is pinched. This one has "
+        "five pleats of 8 mm from radius 800 mm, 10 degrees, t = 0.5 mm, L* = 2 mm, its middle line drawn in "
+        "by 90 % of its folded width. K_r / K_a jumps at the beginning of the pinch, as the nodes that pinch "
+        "are held from then on."
     )
     result.notes.append(
-        "The sector angle sets what the ratio comes to: two rigid arcs on a hinge have K_r / K_a = tan^2(angle / 4), as the "
-        "force along the end of a curved crease misses the hinge. That is 0.19 % for 10 degrees and 4 % for the fan of 45 "
-        "degrees of the hard cases. So a fan whose ratio ends at 0.2 % has creases that hardly turn, or its axial force "
-        "does not follow the end of the crease."
+        "The sector angle sets what the ratio comes to: two rigid arcs on a hinge have K_r / K_a = "
+        "tan^2(angle / 4), as the force along the end of a curved crease misses the hinge. That is 0.19 % for "
+        "10 degrees and 4 % for the fan of 45 degrees of the hard cases. So a fan whose ratio ends at 0.2 % "
+        "has creases that hardly turn, or its axial force does not follow the end of the crease."
     )

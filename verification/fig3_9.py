@@ -144,8 +144,10 @@ def _against(result: CaseResult, found: Tip, best: Tip, params: dict[str, object
     for name, value, exact in zip(
         names, found.stiffness.principal[0], best.stiffness.principal[0], strict=True
     ):
+        # the stiffest one hangs on the stretching under the load, whose point is singular
+        judged = params["formulation"] == "consistent" and int(str(params["rows"])) > 1 and name != "stiffest"
         _add(result, found, f"{name} principal stiffness", float(value), "N/mm", float(exact),
-             "consistent formulation, finest mesh of this case", None, params)  # fmt: skip
+             "consistent formulation, finest mesh of this case", 0.05 if judged else None, params)  # fmt: skip
 
 
 def _trends(
@@ -170,8 +172,8 @@ def _trends(
             _add(result, series[-1], "folded is stiffer out of plane than flat", float(min(up[1:]) > up[0]), "", 1.0,
                  SOURCE, 0.0, params)  # fmt: skip
             shapes = np.array([each.eccentricity for each in series])
-            _add(result, series[-1], "ellipses of equal stiffness grow rounder with every fold angle",
-                 float((np.diff(shapes) < 0.0).all()), "", 1.0, SOURCE + ": lower eccentricity", 0.0, params)  # fmt: skip
+            _add(result, series[-1], "ellipses of equal stiffness grow rounder at every fold angle",
+                 float((np.diff(shapes) < 0.0).all()), "", 1.0, SOURCE + ": less eccentric", 0.0, params)  # fmt: skip
 
 
 def _sectors(result: CaseResult, context: Context) -> None:
@@ -221,8 +223,8 @@ def _plots(result: CaseResult, fine: dict[tuple[str, int], Tip]) -> None:
                  log="y")
         )  # fmt: skip
         result.plots.append(
-            plot(f"fig3-9-polar-{formulation}", f"Over the pole, {formulation}", "polar angle, degrees", "K, N/mm", arch,
-                 "At the azimuth of the stiffest direction.", log="y")
+            plot(f"fig3-9-polar-{formulation}", f"Over the pole, {formulation}", "polar angle, degrees", "K, N/mm",
+                 arch, "At the azimuth of the stiffest direction.", log="y")
         )  # fmt: skip
 
 
@@ -246,8 +248,9 @@ def _pictures(result: CaseResult, context: Context, fine: dict[tuple[str, int], 
             flat.set_ylabel("polar angle, degrees")
             ball = figure.add_subplot(2, 4, k + 5, projection="3d")
             colours = shown.cmap((values - low) / (high - low))
-            ball.plot_surface(*np.moveaxis(n, -1, 0), facecolors=colours, rcount=91, ccount=91, shade=False)  # type: ignore[attr-defined]
-            ball.set_box_aspect((1, 1, 1))  # type: ignore[arg-type]
+            ball.plot_surface(*np.moveaxis(n, -1, 0), facecolors=colours, rcount=60, ccount=60, shade=False)
+            ball.set_box_aspect((1, 1, 1), zoom=1.5)
+            ball.view_init(elev=15.0, azim=50.0)
             ball.set_axis_off()
         assert shown is not None
         figure.colorbar(shown, ax=figure.axes, label="log10 of K, N/mm", shrink=0.7)
@@ -267,19 +270,20 @@ def _notes(result: CaseResult, fine: dict[tuple[str, int], Tip]) -> None:
     over = [up["bars-and-hinges", d] / up["consistent", d] for d in DEGREES[1:]]
     azimuths = [fine["consistent", d].azimuth for d in DEGREES]
     result.notes.append(
-        "The source gives K = F / Delta without saying whether the tip may move across the load. Shown is a point load, "
-        "1 / (n.C.n): stiff in a thin belt round the plane and in ellipses that grow rounder. A tip that is held across, "
-        "n.K.n, has half of the largest stiffness 45 degrees off it, at any fold angle. Both are in the same 3 x 3 matrix."
+        "The source gives K = F / Delta without saying whether the tip may move across the load. Shown is a "
+        "point load, 1 / (n.C.n): stiff in a thin belt round the plane and in ellipses that grow rounder. A "
+        "tip that is held across, n.K.n, has half of the largest stiffness 45 degrees off it, at any fold "
+        "angle. Both are in the same 3 x 3 matrix."
     )
     result.notes.append(
         f"The stiffest direction lies at {azimuths[0]:.0f} degrees when flat and {min(azimuths[1:]):.0f} to "
-        f"{max(azimuths[1:]):.0f} when folded (and opposite), for a sector of 45 degrees, which is an assumption: the "
-        "source does not print it. A flat cantilever is stiffest along the line through its tip about which its axis has "
-        "the least second moment; that is at 80 degrees for a sector of 27. Not printed either: the crease (here L* = 25 "
-        "mm, rest angle set so that the mean dihedral angle is met) and what fixed means (here all nodes up to the first "
-        "cell)."
+        f"{max(azimuths[1:]):.0f} when folded (and opposite), for a sector of 45 degrees, which is an "
+        "assumption: the source does not print it. A flat cantilever is stiffest along the line through its "
+        "tip about which its axis has the least second moment; that is at 80 degrees for a sector of 27. Not "
+        "printed either: the crease (here L* = 25 mm, rest angle set so that the mean dihedral angle is met) "
+        "and what fixed means (here all nodes up to the first cell)."
     )
     result.notes.append(
-        f"Out of plane, where a folded sector twists, bars and hinges are {min(over):.1f} to {max(over):.1f} times stiffer "
-        "than the consistent formulation on the same mesh: the torsion of 3.4.1."
+        f"Out of plane, where a folded sector twists, bars and hinges are {min(over):.1f} to {max(over):.1f} "
+        "times stiffer than the consistent formulation on the same mesh: the torsion of 3.4.1."
     )
