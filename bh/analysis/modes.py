@@ -74,11 +74,16 @@ class Response:
 
 
 def lowest(
-    response: Response, weigh: Callable[[Array], Array], count: int, typical: float
+    response: Response,
+    stiffness: Callable[[Array], Array],
+    weigh: Callable[[Array], Array],
+    count: int,
+    typical: float,
 ) -> list[tuple[float, Array, bool]]:
     """(eigenvalue, motion (size,), free) of the `count` lowest modes by size, free motions first, of unit mass.
 
     Args:
+        stiffness: K u, the tangent times a motion.
         weigh: W u, the root of the (lumped) mass times a motion.
         typical: size of an eigenvalue of the tangent; rounding is measured in it.
     """
@@ -97,8 +102,15 @@ def lowest(
     wanted = count - len(found)
     if wanted > 0:
         mu, Y = _largest(lambda y: weigh(motion(y)), free.shape[0], wanted, weigh)
-        flexible = [(1.0 / m, motion(y) / m) for m, y in zip(mu.tolist(), Y.T, strict=True)]
-        flexible.sort(key=lambda mode: abs(mode[0]))
+        U = np.column_stack([motion(y) / m for m, y in zip(mu, Y.T, strict=True)])
+        # Rayleigh and Ritz: what rounding and iteration left in them is of second order in the eigenvalues
+        masses = np.column_stack([weigh(u) for u in U.T])
+        stiff = U.T @ np.column_stack([stiffness(u) for u in U.T])
+        triangular = np.linalg.cholesky(masses.T @ masses)
+        half = np.linalg.solve(triangular, 0.5 * (stiff + stiff.T))
+        values, turn = np.linalg.eigh(np.linalg.solve(triangular, half.T))
+        U = U @ np.linalg.solve(triangular.T, turn)
+        flexible = sorted(zip(values.tolist(), U.T, strict=True), key=lambda mode: abs(mode[0]))
         found += [(value, u, abs(value) <= FREE * typical) for value, u in flexible]
     return found
 

@@ -31,7 +31,6 @@ from bh.errors import ModelError
 from bh.path import Path
 from bh.solvers.factor import Factor, IndefiniteError, Matrix
 from bh.solvers.matrices import FreeBodyMatrix
-from bh.solvers.modes import lowest_mode
 from bh.solvers.saddle import MultiplierMatrix
 from bh.supports import directions, select
 from bh.threads import one_blas_thread
@@ -39,6 +38,11 @@ from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 Place = str | Sequence[int]
+FREE = 1e-13  # stiffness of a motion, in parts of a typical one, that is rounding
+SHIFT = 1e-12  # in parts of the diagonal, where a pivot vanishes
+MECHANISMS = 8  # most that are looked for besides rigid motions
+REFINED = 2
+NONE = 1e-12  # principal stiffnesses below this part of the largest are none
 RANK = 1e-9  # singular values below this part of the largest are zero
 TONNE = 1e-12  # kg / m^3 in t / mm^3, which goes with N, mm and s
 
@@ -71,7 +75,7 @@ class Stiffness:
         along = (n @ vectors) ** 2
         kept = 1.0 - np.einsum("ik,ik->k", self.held.T @ vectors, self.held.T @ vectors) > 0.5
         largest = np.abs(values).max()
-        zero = kept & (np.abs(values) <= RANK * largest)
+        zero = kept & (np.abs(values) <= NONE * largest)
         firm = kept & ~zero
         compliance = (along[..., firm] / values[firm]).sum(axis=-1)
         with np.errstate(divide="ignore"):
@@ -102,7 +106,7 @@ class Probe:
         hold: places whose nodes are held in all directions while probing, besides the supports.
 
     Raises:
-        ModelError: there is no such state, or it has a motion without stiffness that no support takes out.
+        ModelError: there is no such state, or it has more motions without stiffness than can be told apart.
     """
 
     def __init__(self, path: Path, index: int = -1, hold: Place | Sequence[Place] = ()) -> None:
@@ -124,10 +128,18 @@ class Probe:
             try:
                 self._factor: Factor = self.matrix.factorise_any()[0]
             except IndefiniteError:
-                raise ModelError(
-                    f"this state has a motion without stiffness: {self._softest()}; add supports, "
-                    "or a support at 'rigid-body'"
-                ) from None
+                # a pivot vanished: a mechanism; what the shift changes is taken out by refinement
+                self._factor = self._shifted()
+            self._rigid = self._rigid_body()
+            self._rigid = np.column_stack((self._rigid, self._mechanisms()))
+
+    def _shifted(self) -> Factor:
+        try:
+            return self.matrix.factorise(SHIFT)
+        except IndefiniteError:
+            raise ModelError(
+                "the tangent of this state is singular and cannot be factorised; probe a state beside it"
+            ) from None
 
     # ------------------------------------------------------------------------------- stiffness
 
@@ -210,7 +222,7 @@ class Probe:
 
         with one_blas_thread():
             response = Response(self._solve, H, self._rigid)
-            found = lowest(response, weigh, count, self._typical(weigh))
+            found = lowest(response, lambda u: self.matrix @ u, weigh, count, self._typical(weigh))
         return tuple(
             Mode(value, self.system.vectors(u), describe(u), free, _frequency(value, free, density))
             for value, u, free in found
@@ -297,27 +309,55 @@ class Probe:
         return out
 
     def _solve(self, B: Array) -> Array:
-        """Responses (size, m) to loads, refined once: multipliers are found by iteration."""
+        """Responses (size, m) to loads in equilibrium, refined: multipliers are found by iteration."""
         out = np.empty_like(B)
         for k in range(B.shape[1]):
-            x = self._factor.solve(B[:, k])
-            out[:, k] = x + self._factor.solve(self._balanced(B[:, k]) - self.matrix @ x)
+            load = self._balanced(B[:, k])
+            x = self._balanced(self._factor.solve(load))
+            for _ in range(REFINED):
+                x = x + self._balanced(self._factor.solve(self._balanced(load - self.matrix @ x)))
+            out[:, k] = x
         return out
 
     def _balanced(self, b: Array) -> Array:
+        """Without the part along motions that cost nothing."""
         return np.asarray(b - self._rigid @ (self._rigid.T @ b))
 
     @cached_property
     def _held_columns(self) -> Array:
         return self._columns([(int(n), axis) for n in self._held for axis in self._axes(int(n))[0]])
 
-    @cached_property
-    def _rigid(self) -> Array:
-        """(size, r) orthonormal rigid motions that cost nothing."""
+    def _rigid_body(self) -> Array:
+        """(size, r) orthonormal rigid motions that the supports leave."""
         inner = self.matrix.augmented if isinstance(self.matrix, MultiplierMatrix) else self.matrix
         if not isinstance(inner, FreeBodyMatrix):
             return np.zeros((len(self.q), 0))
         return np.vstack((inner.Z, np.zeros((len(self.q) - len(inner.Z), inner.Z.shape[1]))))
+
+    def _mechanisms(self) -> Array:
+        """(size, k) further orthonormal motions whose stiffness is rounding, by inverse iteration on a few vectors."""
+        primal = self.system.primal
+        rng = np.random.default_rng(20)
+        rough = np.concatenate((rng.normal(size=primal), np.zeros(len(self.q) - primal)))
+        limit = FREE * float(np.linalg.norm((self.matrix @ rough)[:primal]) / np.linalg.norm(rough))
+        for block in (1, MECHANISMS):
+            X = np.zeros((len(self.q), min(block, primal)))
+            X[:primal] = rng.normal(size=(primal, X.shape[1]))
+            for _ in range(4):
+                X = np.column_stack([self._factor.solve(x) for x in X.T])
+                X[primal:] = 0.0
+                X = np.linalg.qr(X)[0]
+            ritz = X.T @ np.column_stack([self.matrix @ x for x in X.T])
+            values, turn = np.linalg.eigh(0.5 * (ritz + ritz.T))
+            free = np.abs(values) <= limit
+            if not free.any():
+                return np.zeros((len(self.q), 0))
+        if free.all():
+            named = self.system.describe(self.q, self.lam, X @ turn[:, 0])
+            raise ModelError(
+                f"this state has too many motions without stiffness, such as: {named}; add supports"
+            )
+        return np.asarray(X @ turn[:, free])
 
     def _places(self, hold: Place | Sequence[Place]) -> Ints:
         if isinstance(hold, str):
@@ -327,14 +367,6 @@ class Probe:
         if all(isinstance(item, (int, np.integer)) for item in hold):
             return select(self.mesh, hold)  # type: ignore[arg-type]
         return np.unique(np.concatenate([select(self.mesh, item) for item in hold]))  # type: ignore[arg-type]
-
-    def _softest(self) -> str:
-        try:
-            mode = lowest_mode(self.matrix, self.system.size, self.system.primal)[1]
-        except IndefiniteError:
-            return "one that cannot be named"
-        named: str = self.system.describe(self.q, self.lam, mode)
-        return named
 
 
 def sphere(theta: ArrayLike, phi: ArrayLike) -> Array:

@@ -135,6 +135,56 @@ def test_free_bodies_resist_only_forces_in_equilibrium() -> None:
     assert apart @ K @ apart == pytest.approx(values[5], rel=1e-9)
 
 
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_mechanisms_are_named_and_cost_nothing(formulation: str) -> None:
+    """A flat strip whose crease has no stiffness, held on one side: the other turns freely; no mode suffers."""
+    mesh = meshes.structured(meshes.strip(20.0, 10.0, [5.0]), along=6, rows=2)
+    low = np.flatnonzero(mesh.points[:, 1] < 4.0).tolist()
+    model = Model(mesh, Sheet(E=1000.0, t=0.2), formulation=formulation).support(low, "xyz")
+    modes, stiff = {}, {}
+    for stiffness in (0.0, 1e-7):
+        path = trace(model.crease("crease", stiffness=stiffness).force("edge:outer", total=(0.0, 1e-9, 0.0)))
+        probe = Probe(path, 0)
+        modes[stiffness], stiff[stiffness] = probe.modes(3), probe.at("corner:outer-end")
+    assert float(stiff[0.0].loaded([0.0, 0.0, 1.0])) == 0.0
+    assert 0.0 < float(stiff[1e-7].loaded([0.0, 0.0, 1.0])) < 1e-6
+    assert float(stiff[0.0].guided([1.0, 1.0, 0.0])) == pytest.approx(
+        float(stiff[1e-7].guided([1.0, 1.0, 0.0])), rel=1e-6
+    )
+    assert [mode.free for mode in modes[0.0]] == [True, False, False]
+    assert modes[0.0][0].name == "crease 'crease' turns"
+    for one, two in zip(modes[0.0][1:], modes[1e-7][1:], strict=True):
+        assert one.eigenvalue == pytest.approx(two.eigenvalue, rel=1e-5)
+
+
+def test_unstable_states_have_negative_stiffness() -> None:
+    """A strip pressed beyond its buckling load, kept straight by symmetry: a negative eigenvalue, no frequency."""
+    mesh = meshes.structured(meshes.strip(40.0, 4.0), along=20)
+    model = Model(mesh, Sheet(E=1000.0, t=0.2), formulation="consistent")
+    model = model.support("edge:start", "xyz", clamp=True).support("edge:end", "yz")
+    load = (
+        4.0 * math.pi**2 * 1000.0 * (4.0 * 0.2**3 / 12.0) / 40.0**2
+    )  # clamped at one end: 2.05 of pi^2 E I / L^2
+    path = trace(
+        model.force("edge:end", total=(-load, 0.0, 0.0)), strategy=bh.Automatic(at_bifurcation="primary")
+    )
+    assert path[-1].stable is False
+    first = Probe(path).modes(2, density=1000.0)
+    assert min(mode.eigenvalue for mode in first) < 0.0
+    assert any(math.isnan(mode.frequency) for mode in first)
+    before = Probe(path, 0).modes(2, density=1000.0)
+    assert min(mode.eigenvalue for mode in before) > 0.0
+
+
+def test_a_loaded_path_gives_the_same(tmp_path: FilePath) -> None:
+    path = folded("consistent", "spring")
+    path.save(tmp_path / "path.db")
+    again = Path.load(tmp_path / "path.db")
+    for index in (0, 2, -1):
+        one, two = (Probe(p, index, hold="edge:start").at("edge:end").matrix for p in (path, again))
+        assert (one == two).all()
+
+
 # --------------------------------------------------------------------------------------- closed forms
 
 
@@ -217,7 +267,7 @@ def test_modes_against_a_dense_pencil(formulation: str, support: str) -> None:
         found = np.array([mode.eigenvalue for mode in modes])
         assert found[free:] == pytest.approx(exact[free:9], rel=1e-5)
         shapes = np.array([mode.shape.ravel() for mode in modes])
-        assert np.abs(shapes @ shapes.T - np.eye(9)).max() < 1e-6
+        assert np.abs(shapes @ shapes.T - np.eye(9)).max() < 1e-10
 
 
 # --------------------------------------------------------------------------------------- invariance
