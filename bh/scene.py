@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from bh.scene_schema import (
     LIBRARY,
     CreaseTable,
     FilePattern,
+    GmshTable,
     MeshTable,
     ModelTable,
     OutputsTable,
@@ -43,7 +44,6 @@ from bh.scene_schema import (
 )
 from bh.supports import RigidBody, Support, directions, select
 from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip, structured
-from meshes.structured import Kind
 
 SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
@@ -184,18 +184,23 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
         )
     how = _mesh_table(as_table(mesh, "mesh"))
     flat = _pattern(drawn)
+    if isinstance(how, GmshTable):
+        from meshes.unstructured import sheet_area, unstructured
+
+        _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
+        with within("mesh"):
+            return unstructured(flat, size=how.size, seed=how.seed)
     _check_size(flat, how)
     with within("mesh"):
         return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
 
 
-def _mesh_table(table: dict[str, Any]) -> MeshTable:
+def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable:
     if table.get("kind") == "gmsh":
-        listed = ", ".join(get_args(Kind))
-        raise SceneError(f'mesh.kind = "gmsh": this version does not mesh with gmsh yet; use one of {listed}')
+        return read_table(GmshTable, table, "mesh")
     if "size" in table:
         raise SceneError(
-            f"mesh.size = {shown(table['size'])} is for gmsh, not there yet; use along or aspect_ratio"
+            f'mesh.size = {shown(table["size"])} is for kind = "gmsh"; use along or aspect_ratio, or add that kind'
         )
     return read_table(MeshTable, table, "mesh")
 
@@ -230,7 +235,10 @@ def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
         inner, outer = (rail.point(np.zeros(1))[0] for rail in (pattern.rails[0], pattern.rails[-1]))
         height = math.dist(inner, outer) / panels
         along = how.aspect_ratio * length / height * how.rows
-    triangles = 2.0 * along * how.rows * panels
+    _check_triangles(2.0 * along * how.rows * panels)
+
+
+def _check_triangles(triangles: float) -> None:
     if triangles > LARGEST_MESH:
         raise SceneError(f"mesh: this is some {triangles:.2g} triangles; ask for fewer than {LARGEST_MESH:,}")
 

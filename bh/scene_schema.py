@@ -110,6 +110,14 @@ class SheetTable(Table):
     t: Length = Field(description="the thickness in mm, a positive number")
 
 
+class GmshTable(Table):
+    """An unstructured mesh that conforms to the creases."""
+
+    kind: Literal["gmsh"] = Field(description='"gmsh"')
+    size: Annotated[float, Field(gt=0.0)] = Field(description="the length of an edge in mm, positive")
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
+
+
 class MeshTable(Table):
     kind: Kind = Field("staggered", description='"staggered", "alternating", "one-way" or "mirrored"')
     along: Count | None = Field(None, description="a whole number of cells along the crease, from 1")

@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import meshes
 from bh.analysis.contact import candidates
 from bh.analysis.triangles import intersecting
+from bh.formulations import names
 from bh.model import Model, Sheet
 from bh.path import Path, trace
 from bh.solvers.linear import linear_response
 
 
 def warm_up() -> None:
-    """Fold a tiny sheet in every way that has kernels of its own."""
+    """Fold a tiny sheet in every way that has kernels of its own, in every formulation that is installed."""
     mesh = meshes.structured(meshes.annulus_sector(10.0, 1.0, 0.3), along=2)
-    sheet = Model(mesh, Sheet(E=1.0, t=0.1))
+    for formulation in names():
+        path = _fold(Model(mesh, Sheet(E=1.0, t=0.1), formulation=formulation))
+    clamped = Model(mesh, Sheet(E=1.0, t=0.1), formulation="consistent").support(
+        "edge:start", "xyz", clamp=True
+    )
+    trace(clamped.fold("crease", rest=3.0, Lstar=1.0))
+    intersecting(path[-1].points, mesh.triangles, candidates(path[-1].points, mesh.triangles), 1e-9)
+    wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
+    system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0))._system(0)
+    now = system.evaluate(system.start(), 0.0)
+    matrix = system.tangent(system.start(), 0.0, now.forces)
+    matrix @ matrix.factorise().solve(now.residual)
+
+
+def _fold(sheet: Model) -> Path:
     path = trace(sheet.fold("crease", to=math.pi - 0.1))
-    triangles = mesh.triangles
-    intersecting(path[-1].points, triangles, candidates(path[-1].points, triangles), 1e-9)
     trace(
         sheet.support("edge:start", "xyz")
         .support("edge:end", [[0.0, 1.0, 1.0]])
         .fold("crease", rest=3.0, Lstar=1.0)
     )
-    consistent = replace(sheet, formulation="consistent")
-    trace(consistent.fold("crease", to=math.pi - 0.1))
-    trace(consistent.support("edge:start", "xyz", clamp=True).fold("crease", rest=3.0, Lstar=1.0))
     system = path._system(0)
     linear_response(system, path.records[0].q)
     displaced = (
@@ -35,11 +44,7 @@ def warm_up() -> None:
     )
     system = trace(displaced)._system(0)
     system.control_rate(system.start(), 0.0)
-    wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
-    system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0))._system(0)
-    now = system.evaluate(system.start(), 0.0)
-    matrix = system.tangent(system.start(), 0.0, now.forces)
-    matrix @ matrix.factorise().solve(now.residual)
+    return path
 
 
 if __name__ == "__main__":

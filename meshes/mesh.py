@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
 
@@ -95,6 +95,11 @@ class SheetMesh:
         if self.aspect_ratio == self.aspect_ratio:
             words.append(f"aspect ratio {self.aspect_ratio:.3g}")
         return f"SheetMesh({', '.join(words)})"
+
+    def __reduce__(self) -> tuple[type[SheetMesh], tuple[object, ...]]:
+        """Pickled as what it was made of: other processes check it anew and find its topology again."""
+        values = (getattr(self, item.name) for item in fields(self))
+        return SheetMesh, tuple(dict(v) if isinstance(v, MappingProxyType) else v for v in values)
 
     def _check_names(self, topology: Topology) -> None:
         """Named sets, corners, folds and angles belong to the mesh and to each other."""

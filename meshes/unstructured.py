@@ -40,7 +40,7 @@ def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> Sheet
         )
     if not math.isfinite(size) or size <= 0.0:
         raise MeshError(f"size = {size} cannot be; use a positive edge length in mm")
-    area = _area(pattern)
+    area = sheet_area(pattern)
     if area / (0.43 * size**2) > 1e6:
         raise MeshError(
             f"size = {size} would make some {area / (0.43 * size**2):.1g} triangles; use a larger size"
@@ -63,7 +63,8 @@ def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> Sheet
     )
 
 
-def _area(pattern: CreasePattern) -> float:
+def sheet_area(pattern: CreasePattern) -> float:
+    """Area of the flat sheet inside its outline, mm^2."""
     import shapely
 
     return float(shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).area)

@@ -150,7 +150,7 @@ def test_imports(name: str) -> None:
         ("bh.solvers.newton", "from bh.model import Model", "bh.model"),
         ("bh.solvers.newton", "from bh.program import StepProgram", "bh.program"),
         ("bh.path", "from bh.mechanics.bars_and_hinges import X", "bh.mechanics.bars_and_hinges"),
-        ("bh.cli", "from fem import shell", "fem"),
+        ("bh.cli", "from fem import shell", "fem.shell"),
         ("bh.analysis.observables", "import bh.cli", "bh.cli"),
         ("fem.shell", "from bh.mechanics.kinematics import dihedral_angles", "bh.mechanics.kinematics"),
         ("fem.shell", "import verification", "verification"),

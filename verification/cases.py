@@ -18,6 +18,8 @@ CASES = {
     "fig3_9": "verification.fig3_9",
     "fig3_11": "verification.fig3_11",
     "hard_cases": "verification.hard_cases",
+    "appendix_b_shell": "verification.appendix_b_shell",
+    "shell_benchmarks": "verification.shell_benchmarks",
 }
 LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds
 ALL_CASES = {**CASES, **LONG_CASES}

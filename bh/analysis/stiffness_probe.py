@@ -101,7 +101,7 @@ class Probe:
     """The tangent of one state of a path, factorised once.
 
     Args:
-        path: a solved path, of any formulation.
+        path: a solved path, of any formulation whose system has `vectors` and `loads`.
         index: of the state; the last one by default.
         hold: places whose nodes are held in all directions while probing, besides the supports.
 
@@ -117,6 +117,10 @@ class Probe:
         if not -len(path) <= index < len(path):
             raise ModelError(f"the path has {len(path)} states, none of index {index}; give one that it has")
         self.system, record = path.solved(index)
+        if not hasattr(self.system, "loads"):
+            raise ModelError(
+                f"formulation '{path.model.formulation}' has no nodal loads to probe with; solve with another one"
+            )
         self.mesh = path.model.mesh
         self.thickness = path.model.sheet.t
         self.q, self.lam = record.q, record.lam

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.mechanics import closing
 from bh.mechanics.assembly import (
     Pattern,
     build_pattern,
@@ -17,21 +17,19 @@ from bh.mechanics.assembly import (
     tangent_times,
     tangent_values,
 )
+from bh.mechanics.displacements import Displacements, turning_forces
 from bh.mechanics.elements import sheet_elements
-from bh.mechanics.hinge_lock import ZONE, until_closed
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.motions import describe_motion
 from bh.model import Model
-from bh.program import StepProgram, hinge_name
-from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
+from bh.program import HELD, StepProgram
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import State
-from bh.supports import Constraints, free_motions, rigid_motions
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
-LARGEST_TURN = 1.3  # rad that any hinge may turn in one increment before the driver mistrusts it
 COMPLIANCE = 1e-9  # of a held crease, in parts of 1 / gamma
 ROUNDING = 8.0 * np.finfo(float).eps
 
@@ -53,32 +51,19 @@ class BarsAndHingesSystem:
         moments = np.zeros(len(held_start)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
         self.elements = sheet_elements(model, program, held_start, moments)
-        self.turned = np.flatnonzero(program.constraints.frame_of >= 0)
-        self.turned_axes = program.constraints.frames[program.constraints.frame_of[self.turned]]
-        self._displacement_start = self.to_local(start_points - mesh.points)
-        # a displacement whose start is not given begins with what the node has
-        given = program.constraints.start
-        begin = np.where(np.isnan(given), self._displacement_start, given)
-        self.constraints: Constraints = replace(program.constraints, start=begin)
+        self.displacements = Displacements(mesh, program.constraints, start_points)
+        self.constraints = self.displacements.constraints
         self.force = program.force
         self.program = program
-
-        free = ~self.constraints.fixed
-        self.number = np.full(free.shape, -1, dtype=np.int64)
-        self.number[free] = np.arange(free.sum())
-        self.free = np.flatnonzero(free.ravel())
-        self.primal = len(self.free)
-        if self.primal == 0:
-            raise ModelError("the supports hold every node; nothing can move, so remove some of them")
+        self.primal = len(self.displacements.free)
         self.size = self.primal + self.elements.held
-        self.prescribed_rate = (self.constraints.end - self.constraints.start) * self.constraints.fixed
         self._bar_scale = model.sheet.E * model.sheet.t
         self._moments_start = moments
         self._d_bar = np.empty((len(self.elements.bars), 3))
         self._g_hinge = np.empty((len(self.elements.hinges), 12))
         self._k_hinge = np.empty(len(self.elements.hinges))  # with the locks, as of the last tangent
         if self.constraints.rigid_body:
-            self._check_balance()
+            self.displacements.check_balance(self.force)
 
     # ------------------------------------------------------------------------------- unknowns and positions
 
@@ -93,41 +78,23 @@ class BarsAndHingesSystem:
     def start(self) -> Array:
         """Unknowns of the state that the step begins with."""
         q = np.zeros(self.size)
-        q[: self.primal] = self._displacement_start.ravel()[self.free]
+        q[: self.primal] = self.displacements.start()
         if self.elements.held:
             q[self.primal :] = self._moments_start[self.elements.source[-self.elements.held :]]
         return q
 
     def positions(self, q: Array, lam: float) -> Array:
         """(n, 3) node positions, mm."""
-        local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
-        local.ravel()[self.free] = q[: self.primal]
-        return self.reference + self.to_global(local)
+        return self.displacements.positions(q[: self.primal], lam)
 
     def vectors(self, dq: Array) -> Array:
         """(n, 3) changes of positions, mm, for changes dq (size,) of the unknowns."""
-        local = np.zeros_like(self.reference)
-        local.ravel()[self.free] = dq[: self.primal]
-        return self.to_global(local)
+        return self.displacements.vectors(dq[: self.primal])
 
     def loads(self, forces: Array) -> Array:
         """(size,) what nodal forces (n, 3), N, are to the unknowns; their part along supports is left out."""
         out = np.zeros(self.size)
-        out[: self.primal] = self.to_local(forces).ravel()[self.free]
-        return out
-
-    def to_global(self, local: Array) -> Array:
-        if len(self.turned) == 0:
-            return local
-        out = local.copy()
-        out[self.turned] = np.einsum("nij,ni->nj", self.turned_axes, local[self.turned])
-        return out
-
-    def to_local(self, vectors: Array) -> Array:
-        if len(self.turned) == 0:
-            return vectors
-        out = vectors.copy()
-        out[self.turned] = np.einsum("nij,nj->ni", self.turned_axes, vectors[self.turned])
+        out[: self.primal] = self.displacements.components(forces)
         return out
 
     @cached_property
@@ -144,7 +111,7 @@ class BarsAndHingesSystem:
         energy -= float(np.vdot(load, x - self.reference))
         f -= load
         residual = np.empty(self.size)
-        residual[: self.primal] = self.to_local(f).ravel()[self.free]
+        residual[: self.primal] = self.displacements.components(f)
         gap = penalty = 0.0
         if self.elements.held:
             missed = turn[-self.elements.held :]
@@ -211,7 +178,7 @@ class BarsAndHingesSystem:
         )  # fmt: skip
         matrix: Matrix
         if self.constraints.rigid_body:
-            Z = self._rigid(x)
+            Z = self.displacements.rigid(x)
             ground = self._ground(Z, data)
             matrix = FreeBodyMatrix(pattern.matrix(data), Z, *ground)
         else:
@@ -226,7 +193,7 @@ class BarsAndHingesSystem:
         out = np.empty_like(forces)
         predicted_forces(
             e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, self._k_hinge, forces[bars:],
-            self._g_hinge, self.vectors(dq), out[:bars], out[bars:],
+            self._g_hinge, self.displacements.vectors(dq[: self.primal]), out[:bars], out[bars:],
         )  # fmt: skip
         if e.held:
             out[-e.held :] = forces[-e.held :] + dq[self.primal :]
@@ -240,11 +207,11 @@ class BarsAndHingesSystem:
         moment_rate = e.couple.rate - e.hinge_stiffness * e.rest.rate
         out = -self.force.rate.copy()
         np.add.at(out, e.hinges, (moment_rate[:, None] * g).reshape(-1, 4, 3))
-        moving = self.to_global(self.prescribed_rate)
+        moving = self.displacements.prescribed_motion
         if moving.any():
             out += self._tangent_times(x, moving, forces)
         rate = np.empty(self.size)
-        rate[: self.primal] = self.to_local(out).ravel()[self.free]
+        rate[: self.primal] = self.displacements.components(out)
         if e.held:
             turn = np.einsum("hpc,hpc->h", g.reshape(-1, 4, 3), moving[e.hinges]) - e.rest.rate
             rate[self.primal :] = turn[-e.held :]
@@ -257,15 +224,14 @@ class BarsAndHingesSystem:
         moment = e.hinge_stiffness * turn + self.couple(q, lam)  # without the lock, which knows no rest angle
         total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.reference))
-        unbalanced = self.to_local(f - self.force.at(lam))
-        return total + float(np.vdot(unbalanced, self.prescribed_rate))
+        return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
         """d^2 energy / d lambda^2 at fixed q, N mm."""
         e = self.elements
         x = self.positions(q, lam)
         total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
-        moving = self.to_global(self.prescribed_rate)
+        moving = self.displacements.prescribed_motion
         if moving.any():
             _, _, _, forces, _ = self.internal_forces(x, q, lam)
             out = self._tangent_times(x, moving, forces)
@@ -285,72 +251,35 @@ class BarsAndHingesSystem:
         )  # fmt: skip
         return out
 
+    # ------------------------------------------------------------------------------- what to say of a state
+
+    def angles(self, q: Array, lam: float) -> Array:
+        """(m,) dihedral angles at every hinge of the mesh, rad."""
+        return dihedral_angles(self.positions(q, lam), self.mesh.topology.hinges)
+
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        through = self.crossing(q, lam, q_new, lam_new)
-        if through:
-            return through
-        turn = float(np.abs(self._angles(q_new, lam_new) - self._angles(q, lam)).max(initial=0.0))
-        return f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
+        return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
+
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        return closing.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
+
+    def contact(self, q: Array, lam: float) -> str:
+        """Which panels have met at a hinge that is not held, or an empty string."""
+        reference = dihedral_angles(self.reference, self.mesh.topology.hinges)
+        return closing.touching(self.mesh, self.angles(q, lam), reference, self.program.law != HELD)
 
     def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
         touching = self.contact(q, lam)
-        if touching:
-            return "contact", touching
-        if not self.constraints.rigid_body or not (self.force.start.any() or self.force.end.any()):
-            return "", ""
-        # an accepted state is in equilibrium; do the forces stay so a little further along the path?
-        try:
-            factor = self.tangent(q, lam, self.evaluate(q, lam).forces).factorise(1e-9)
-        except IndefiniteError:
-            return "", ""
-        ahead = 1e-3 * max(lam, 0.01)
-        moved = q - ahead * factor.solve(self.control_rate(q, lam))
-        lost = self._unbalanced(moved, lam + ahead) - self._unbalanced(q, lam)
-        if lost <= 1e-6 * ahead:
-            return "", ""
-        return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
-
-    def _unbalanced(self, q: Array, lam: float) -> float:
-        """Part of the dead forces that works on rigid motions."""
-        local = self.to_local(self.force.at(lam)).ravel()[self.free]
-        Z = self._rigid(self.positions(q, lam))
-        return float(np.abs(Z.T @ local).max(initial=0.0)) / max(float(np.abs(local).sum()), 1e-300)
+        return (
+            ("contact", touching)
+            if touching
+            else turning_forces(self, self.displacements, self.force, q, lam)
+        )
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
-        return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))
-
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Which panels passed through each other at a hinge between two states, or an empty string.
-
-        Angles are known modulo a turn, so a hinge that passes 0 or 2 pi is seen to jump by nearly a turn; it counts as
-        passed where the way through closed is the shorter one (a jump by more than pi).
-        """
-        jump = np.abs(self._angles(q_new, lam_new) - self._angles(q, lam))
-        if jump.max(initial=0.0) <= np.pi:
-            return ""
-        return f"{self._panels(int(np.argmax(jump)))} would pass through each other"
-
-    def contact(self, q: Array, lam: float) -> str:
-        """Which panels have met at a hinge (within `hinge_lock.ZONE` of closed), or an empty string.
-
-        Names the hinge that is nearest to 0 or 2 pi. Held creases are not asked, they follow their angle; nor are
-        hinges that are made closed. Where a path cannot go on, this tells whether contact is the reason, with the lock
-        or without.
-        """
-        e = self.elements
-        left = until_closed(self._angles(q, lam))
-        left[until_closed(dihedral_angles(self.reference, e.hinges)) < ZONE] = np.inf
-        left = left[: e.bending + e.spring]
-        if len(left) == 0 or left.min() >= ZONE:
-            return ""
-        nearest = int(np.argmin(left))
-        return f"{self._panels(nearest)} touch ({np.degrees(left[nearest]):.2g} degrees from closed)"
-
-    def _angles(self, q: Array, lam: float) -> Array:
-        return dihedral_angles(self.positions(q, lam), self.elements.hinges)
-
-    def _panels(self, hinge: int) -> str:
-        return f"the panels at {hinge_name(self.mesh, int(self.elements.source[hinge]))}"
+        return describe_motion(
+            self.mesh, self.positions(q, lam), self.displacements.vectors(motion[: self.primal])
+        )
 
     # ------------------------------------------------------------------------------- pattern, grounding, constraints
 
@@ -358,8 +287,8 @@ class BarsAndHingesSystem:
     def _pattern(self) -> Pattern:
         groups: tuple[Ints, ...] = (self.elements.bars, self.elements.hinges)
         if self.constraints.rigid_body:
-            groups += (self.mesh.triangles[self._ground_triangle][None, :],)
-        return build_pattern(self.number, groups, self.reference)
+            groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
+        return build_pattern(self.displacements.number, groups, self.reference)
 
     @cached_property
     def _compliance(self) -> Array:
@@ -377,49 +306,23 @@ class BarsAndHingesSystem:
 
     @cached_property
     def _held_columns(self) -> Ints:
-        return self.number[self.elements.hinges[-self.elements.held :]].reshape(-1, 12)
+        return self.displacements.number[self.elements.hinges[-self.elements.held :]].reshape(-1, 12)
 
     def _constraint_rows(self) -> ConstraintRows:
         g = self._g_hinge[-self.elements.held :]
-        if len(self.turned):
+        if len(self.displacements.turned):
             index = self.constraints.frame_of[self.elements.hinges[-self.elements.held :]]
             axes = np.where((index >= 0)[..., None, None], self.constraints.frames[index], np.eye(3))
             g = np.einsum("hpij,hpj->hpi", axes, g.reshape(-1, 4, 3)).reshape(-1, 12)
         return ConstraintRows(g.copy(), self._held_columns, self.primal)
 
-    def _rigid(self, x: Array) -> Array:
-        """Orthonormal rigid motions (primal, r) that the supports leave free at positions x."""
-        motions = rigid_motions(x) @ free_motions(x, self.constraints)
-        for column in range(motions.shape[1]):
-            motions[:, column] = self.to_local(motions[:, column].reshape(-1, 3)).ravel()
-        return np.linalg.qr(motions[self.free])[0]
-
-    @cached_property
-    def _ground_triangle(self) -> int:
-        """The triangle that carries the stiffness against rigid motions: in the middle, without supports of its own."""
-        centres = self.reference[self.mesh.triangles].mean(axis=1)
-        distance = np.linalg.norm(centres - self.reference.mean(axis=0), axis=1)
-        held = (self.number[self.mesh.triangles] < 0).sum(axis=(1, 2))
-        return int(np.lexsort((distance, held))[0])
-
     def _ground(self, Z: Array, data: Array) -> tuple[Ints, Array]:
         """Add a stiffness against the rigid motions of one triangle; returns its unknowns and its matrix."""
-        number = self.number[self.mesh.triangles[self._ground_triangle]].ravel()
-        rows = np.where(number[:, None] >= 0, Z[np.maximum(number, 0)], 0.0)
-        Q = np.linalg.qr(rows)[0] if Z.shape[1] else rows
-        block = self._bar_scale * (Q @ Q.T)
+        number = self.displacements.ground_numbers
+        block = self.displacements.grounding(Z, self._bar_scale)
         slots = self._pattern.slots[2][0]
         values = block[np.tril_indices(9)]
         keep = slots >= 0
         np.add.at(data, slots[keep], values[keep])
         inside = number >= 0
         return number[inside], block[np.ix_(inside, inside)]
-
-    def _check_balance(self) -> None:
-        Z = self._rigid(self.reference)
-        for load in (self.force.start, self.force.end):
-            local = self.to_local(load).ravel()[self.free]
-            if np.abs(Z.T @ local).max(initial=0.0) > 1e-9 * max(float(np.abs(local).sum()), 1e-300):
-                raise ModelError(
-                    "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
-                )

@@ -61,15 +61,13 @@ class BarsAndHinges:
         elastic = s_hinge.copy()  # of springs the spring's own moment, without the couple applied to it
         elastic[spring] -= e.couple.at(lam)[spring]
         moments[e.source[crease]] = elastic[crease] / system.hinge_lengths[crease]
-        reactions = np.zeros_like(x)
-        local = system.to_local(f - system.force.at(lam))
-        reactions[system.constraints.fixed] = local[system.constraints.fixed]
+        reactions = system.displacements.reactions(f - system.force.at(lam))
         return State(
             mesh=mesh, step=step, lam=lam, points=x,
             energy=Energy(
                 float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum()), float(by_lock)
             ),
-            dihedral_angles=angles, energy_density=density, reactions=system.to_global(reactions),
+            dihedral_angles=angles, energy_density=density, reactions=reactions,
             crease_moments=moments, stable=stable,
         )  # fmt: skip
 

@@ -16,6 +16,7 @@ from bh.program import hinge_name
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
+LARGEST_TURN = 1.3  # rad that any hinge may turn in one increment before the driver mistrusts it
 
 
 @njit(**OPTIONS)
@@ -93,6 +94,13 @@ def crossing(mesh: SheetMesh, before: Array, after: Array) -> str:
     if jump.max(initial=0.0) <= np.pi:
         return ""
     return f"the panels at {hinge_name(mesh, int(np.argmax(jump)))} would pass through each other"
+
+
+def objection(mesh: SheetMesh, before: Array, after: Array) -> str:
+    """Why an increment between dihedral angles (m,) of two states is not to be trusted, or an empty string."""
+    turn = float(np.abs(after - before).max(initial=0.0))
+    far = f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
+    return crossing(mesh, before, after) or far
 
 
 def touching(mesh: SheetMesh, angles: Array, reference: Array, asked: NDArray[np.bool_]) -> str:

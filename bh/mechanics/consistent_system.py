@@ -14,20 +14,19 @@ from bh.mechanics import consistent_kernels as kernels
 from bh.mechanics import consistent_setup as setup
 from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent_pattern import rotation_pattern
-from bh.mechanics.displacements import Displacements
+from bh.mechanics.displacements import Displacements, turning_forces
 from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.motions import describe_motion
 from bh.mechanics.pattern import Pattern
 from bh.model import Model
 from bh.program import HELD, StepProgram
-from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation
 from bh.state import State
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
-LARGEST_TURN = 1.3  # rad that any hinge may turn in one increment before the driver mistrusts it
 ROUNDING = 8.0 * np.finfo(float).eps
 
 
@@ -312,7 +311,7 @@ class ConsistentSystem:
         e = self.elements
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
-        v = self.displacements.to_global(self.displacements.prescribed_rate)
+        v = self.displacements.prescribed_motion
         rates, turns = self._force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
@@ -345,7 +344,7 @@ class ConsistentSystem:
 
     def control_stiffness(self, q: Array, lam: float) -> float:
         """d^2 energy / d lambda^2 at fixed q, N mm."""
-        v = self.displacements.to_global(self.displacements.prescribed_rate)
+        v = self.displacements.prescribed_motion
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v))
 
     # ------------------------------------------------------------------------------- what to say of a state
@@ -355,10 +354,7 @@ class ConsistentSystem:
         return dihedral_angles(self.positions(q, lam), self.hinges)
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        before, after = self.angles(q, lam), self.angles(q_new, lam_new)
-        through = closings.crossing(self.mesh, before, after)
-        turn = float(np.abs(after - before).max(initial=0.0))
-        return through or (f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else "")
+        return closings.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Which panels passed through each other at a hinge between two states, or an empty string."""
@@ -373,19 +369,7 @@ class ConsistentSystem:
         touching = self.contact(q, lam)
         if touching:
             return "contact", touching
-        if not self.constraints.rigid_body or not (self.force.start.any() or self.force.end.any()):
-            return "", ""
-        # an accepted state is in equilibrium; do the forces stay so a little further along the path?
-        try:
-            factor = self.tangent(q, lam, self.evaluate(q, lam).forces).factorise(1e-9)
-        except IndefiniteError:
-            return "", ""
-        ahead = 1e-3 * max(lam, 0.01)
-        moved = q - ahead * factor.solve(self.control_rate(q, lam))
-        after = self.displacements.unbalanced(self.positions(moved, lam + ahead), self.force.at(lam + ahead))
-        if after - self.displacements.unbalanced(self.positions(q, lam), self.force.at(lam)) <= 1e-6 * ahead:
-            return "", ""
-        return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
+        return turning_forces(self, self.displacements, self.force, q, lam)
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from bh.actuation import Ramp
 from bh.errors import ModelError
+from bh.solvers.matrices import IndefiniteError
+from bh.solvers.system import System
 from bh.supports import Constraints, free_motions, rigid_motions
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -24,6 +26,8 @@ class Displacements:
         constraints: with every start given.
         number: (n, 3) unknown of each local component, -1 where it is prescribed.
         free: (k,) flat indices (3 node + component) of the unknowns.
+        prescribed_rate, prescribed_motion: (n, 3) change of the prescribed displacements with lambda, mm, in local
+            and in global axes.
     """
 
     def __init__(self, mesh: SheetMesh, constraints: Constraints, start_points: Array) -> None:
@@ -42,6 +46,7 @@ class Displacements:
         if len(self.free) == 0:
             raise ModelError("the supports hold every node; nothing can move, so remove some of them")
         self.prescribed_rate = (self.constraints.end - self.constraints.start) * self.constraints.fixed
+        self.prescribed_motion = self.to_global(self.prescribed_rate)
 
     def start(self) -> Array:
         """(k,) unknowns of the positions that the step begins with."""
@@ -123,3 +128,24 @@ class Displacements:
                 raise ModelError(
                     "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
                 )
+
+
+def turning_forces(
+    system: System, displacements: Displacements, force: Ramp, q: Array, lam: float
+) -> tuple[str, str]:
+    """Outcome "mechanism" and its reason where dead forces do not stay in equilibrium on a free sheet, else empty."""
+    if not displacements.constraints.rigid_body or not (force.start.any() or force.end.any()):
+        return "", ""
+    # an accepted state is in equilibrium; do the forces stay so a little further along the path?
+    try:
+        factor = system.tangent(q, lam, system.evaluate(q, lam).forces).factorise(1e-9)
+    except IndefiniteError:
+        return "", ""
+    ahead = 1e-3 * max(lam, 0.01)
+    moved = q - ahead * factor.solve(system.control_rate(q, lam))
+    k = len(displacements.free)
+    there = displacements.unbalanced(displacements.positions(moved[:k], lam + ahead), force.at(lam + ahead))
+    here = displacements.unbalanced(displacements.positions(q[:k], lam), force.at(lam))
+    if there - here <= 1e-6 * ahead:
+        return "", ""
+    return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"

@@ -77,8 +77,8 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
     def ramp(bend: Array, spring: Array, held: Array) -> Array:
         return np.where(law == SHEET, bend[source], np.where(law == SPRING, spring[source], held[source]))
 
-    # a released crease begins with the moment that it has; what its lock takes of it is not the spring's
-    of_spring = moment_start - lock_terms(held_start, lock)[:, 1]
+    # a released crease begins with the moment that it has; what its lock and its couple take of it is not the spring's
+    of_spring = moment_start - lock_terms(held_start, lock)[:, 1] - program.moment.start * hinge_length
     rest_from = np.where(
         np.isnan(program.rest.start), held_start - of_spring / _nonzero(k_fold), program.rest.start
     )

@@ -54,7 +54,10 @@ class Automatic:
                 failure = yield from self._run(bold.follow(system, points[-3:], increment), points)
                 if failure is None:
                     return
-                if (failure.outcome == "bifurcation" and self.at_bifurcation == "stop") or len(points) < 2:
+                if failure.outcome == "bifurcation" and self.at_bifurcation == "stop":
+                    yield failure
+                    return
+                if len(points) < 2:
                     break
                 increment = max(points[-1].lam - points[-2].lam, self.patience)
             passed = yield from self._pass(

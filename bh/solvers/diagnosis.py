@@ -11,7 +11,8 @@ from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import lowest_mode
 from bh.solvers.system import System
 
-FREE = 1e-14  # stiffness of a motion, in parts of the largest, that is rounding
+# stiffness of a motion, in parts of the typical one, that is rounding; next to a critical point it is merely small
+FREE = 1e-15
 
 
 def diagnose(system: System, failure: Increment) -> Increment:

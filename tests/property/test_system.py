@@ -137,7 +137,10 @@ def dense(matrix: Any, n: int) -> Array:
 
 def control_is_quadratic(system: BarsAndHingesSystem) -> bool:
     """Dead loads alone give a power that does not depend on lambda."""
-    return bool(np.abs(system.elements.rest.rate).max() > 0.0 or np.abs(system.prescribed_rate).max() > 0.0)
+    return bool(
+        np.abs(system.elements.rest.rate).max() > 0.0
+        or np.abs(system.displacements.prescribed_rate).max() > 0.0
+    )
 
 
 @pytest.mark.parametrize("name", KINDS)

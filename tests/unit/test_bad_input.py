@@ -99,7 +99,10 @@ CASES = [
     ("nu too small", {"sheet": BASE["sheet"].replace("0.3", "-1")}, ["sheet.nu = -1", "(-1, 0.5]"]),
     # --- mesh, model
     ("mesh kind", {"mesh": '[mesh]\nkind = "stagered"\nalong = 4\n'}, ['mesh.kind = "stagered"', "staggered"]),
-    ("gmsh", {"mesh": '[mesh]\nkind = "gmsh"\nsize = 2.5\n'}, ["gmsh", "not mesh with gmsh yet", "staggered"]),
+    ("gmsh without size", {"mesh": '[mesh]\nkind = "gmsh"\n'}, ["mesh.size", "missing"]),
+    ("gmsh with cells", {"mesh": '[mesh]\nkind = "gmsh"\nsize = 2.5\nalong = 4\n'}, ["mesh.along"]),
+    ("gmsh, no size", {"mesh": '[mesh]\nkind = "gmsh"\nsize = 0\n'}, ["mesh.size = 0"]),
+    ("gmsh, huge mesh", {"mesh": '[mesh]\nkind = "gmsh"\nsize = 1e-4\n'}, ["mesh", "triangles", "fewer"]),
     ("gmsh size", {"mesh": "[mesh]\nsize = 2.5\n"}, ["mesh.size = 2.5", "along"]),
     ("two densities", {"mesh": "[mesh]\nalong = 4\naspect_ratio = 8\n"}, ["mesh", "either along", "both"]),
     ("no density", {"mesh": "[mesh]\nrows = 1\n"}, ["mesh", "either along", "neither"]),

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import bh
@@ -69,3 +70,23 @@ def test_objects_show_what_they_hold_in_one_line() -> None:
     assert shown.startswith("State(step 0, lambda 1, energy ")
     assert "N mm" in shown
     assert repr(bh.Path(model)) == "Path(unfinished, 0 states, 0 iterations, 0 of 1 step)"
+
+
+def test_models_and_paths_can_be_pickled() -> None:
+    """Other processes get meshes, models, states and paths as they are; frozen ones stay frozen."""
+    import pickle
+
+    mesh = meshes.structured(meshes.annulus_sector(50.0, 8.0, 0.7), along=8)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.2)).fold("crease", to=2.4)
+    path = bh.trace(model)
+    again = pickle.loads(pickle.dumps(path))
+    assert repr(again) == repr(path)
+    assert np.array_equal(again[-1].points, path[-1].points)
+    assert pickle.loads(pickle.dumps(path[-1])).energy == path[-1].energy
+    other = pickle.loads(pickle.dumps(model))
+    assert bh.trace(other)[-1].energy == path[-1].energy
+    assert other.mesh.creases == mesh.creases
+    assert other.mesh.aspect_ratio == mesh.aspect_ratio
+    with pytest.raises(TypeError):
+        other.mesh.corners["corner:inner-start"] = 3  # type: ignore[index]
+    assert not other.mesh.points.flags.writeable

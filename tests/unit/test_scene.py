@@ -128,6 +128,34 @@ def test_patterns():
     assert "edge:start" not in full.model.mesh.edge_sets
 
 
+def test_mesh_by_gmsh(tmp_path: Path) -> None:
+    """An unstructured mesh of the library's pattern, solved by the formulation that converges on any mesh."""
+    text = """
+[pattern]
+kind = "annulus_sector"
+radius = 100
+width = 10
+angle = 0.5
+[sheet]
+E = 4000
+nu = 0.3
+t = 0.2
+[mesh]
+kind = "gmsh"
+size = 4
+[model]
+formulation = "consistent"
+[[steps]]
+fold = { crease = "crease", by = 0.8 }
+"""
+    file = tmp_path / "scene.toml"
+    file.write_text(text)
+    model = bh.load_scene(file).model
+    assert model.mesh.kind == "gmsh"
+    assert 60 < len(model.mesh.triangles) < 300
+    assert bh.trace(model).outcome == "reached"
+
+
 @pytest.mark.parametrize("kind", ["staggered", "alternating", "one-way", "mirrored"])
 def test_mesh_kinds_and_density(kind):
     mesh = scene(mesh=f'[mesh]\nkind = "{kind}"\naspect_ratio = 3.0\nrows = 2\n').model.mesh

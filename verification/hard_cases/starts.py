@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 import meshes
-from bh import Model, ModelError, Sheet, trace
+from bh import Automatic, Model, ModelError, Path, Sheet, trace
 from verification.checks import CaseResult
 from verification.hard_cases.common import Found, annulus, check
 
@@ -28,15 +28,33 @@ def ring(result: CaseResult) -> Found:
     """A full annulus buckles out of its plane; both mirror images have one energy."""
     mesh = meshes.structured(meshes.full_annulus(100.0, 10.0), along=64)
     energies = []
+    sheet = Sheet(E=4000.0, t=0.127)
     for to in (2.2, 2.0 * math.pi - 2.2):
-        path = trace(Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=to))
-        crease = path[-1].crease_points("crease")
-        plane = np.linalg.svd(crease - crease.mean(axis=0), compute_uv=False)[2] / math.sqrt(len(crease))
+        path = trace(Model(mesh, sheet).fold("crease", to=to))
+        plane = _out_of_plane(path)
         energies.append(path[-1].energy.total)
-        yield check("ring: rms distance of the crease from its plane", float(plane), "mm", None,
+        yield check("ring: rms distance of the crease from its plane", plane, "mm", None,
                      "planar before it buckles", None, path, dihedral=round(to, 4))  # fmt: skip
         yield check("ring: out of plane", float(plane > 1.0), "", 1.0, "must buckle", 0.0, path)
     yield check("ring: energy of the mirror image", energies[1], "N mm", energies[0], "mirror symmetry", 1e-6)
+    planar = trace(Model(mesh, sheet).fold("crease", to=2.2), strategy=Automatic(at_bifurcation="primary"))
+    yield check("ring, planar branch: rms distance of the crease from its plane", _out_of_plane(planar), "mm", 0.0,
+                 "symmetry", 1e-9, planar)  # fmt: skip
+    yield check(
+        "ring, planar branch: found unstable", float(planar.stable is False), "", 1.0, "inertia", 0.0, planar
+    )
+    yield check("ring, planar branch: energy over the buckled one", planar[-1].energy.total / energies[0], "", None,
+                 "above 1", None, planar)  # fmt: skip
+    _, first = planar.critical_points[0]
+    fold = math.degrees(first.lam * (math.pi - 2.2))
+    yield check("ring, planar branch: fold angle where it loses its stability", fold, "degrees", None,
+                 "bisection", None, planar, modes=first.negative[1])  # fmt: skip
+
+
+def _out_of_plane(path: Path) -> float:
+    crease = path[-1].crease_points("crease")
+    spread = np.linalg.svd(crease - crease.mean(axis=0), compute_uv=False)
+    return float(spread[2]) / math.sqrt(len(crease))
 
 
 def back_to_flat(result: CaseResult) -> Found:

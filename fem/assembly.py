@@ -1,0 +1,174 @@
+"""The fixed pattern that element matrices of the shell are added into; see `fem.components` for their 30 components."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bh.solvers.matrices import BandMatrix, reverse_cuthill_mckee
+from bh.solvers.sparse import SparseMatrix, SparsePattern, band_is_cheaper
+from fem.points import OPTIONS
+from meshes.curved import QuadraticMesh
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+LOWER = np.tril_indices(30)
+
+
+@njit(**OPTIONS)
+def turn_blocks(K, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
+    """Rows and columns of nodes with local axes into those axes; K (t, 24, 24)."""
+    row = np.empty(3)
+    for e in range(len(nodes)):
+        for i in range(6):
+            f = frame_of[nodes[e, i]]
+            if f < 0:
+                continue
+            for j in range(24):
+                for a in range(3):
+                    row[a] = 0.0
+                    for b in range(3):
+                        row[a] += frames[f, a, b] * K[e, 3 * i + b, j]
+                for a in range(3):
+                    K[e, 3 * i + a, j] = row[a]
+            for j in range(24):
+                for a in range(3):
+                    row[a] = 0.0
+                    for b in range(3):
+                        row[a] += frames[f, a, b] * K[e, j, 3 * i + b]
+                for a in range(3):
+                    K[e, j, 3 * i + a] = row[a]
+
+
+@njit(**OPTIONS)
+def scatter(K, sides, slots, data):  # type: ignore[no-untyped-def]
+    """Add element matrices (t, 24, 24) by positions and gamma = +-alpha + beta / 2 to the values `data`."""
+    source = np.empty(30, dtype=np.int64)
+    factor = np.ones(30)
+    for i in range(30):
+        source[i] = i if i < 24 else i - 6
+    for e in range(len(K)):
+        for i in range(6):
+            factor[18 + i] = sides[e, i // 2]
+            factor[24 + i] = 0.5
+        at = 0
+        for i in range(30):
+            for j in range(i + 1):
+                slot = slots[e, at]
+                if slot >= 0:
+                    data[slot] += factor[i] * factor[j] * K[e, source[i], source[j]]
+                at += 1
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Where the lower entries of all element matrices (t, 465) go; -1 where a component is prescribed.
+
+    Attributes:
+        order: (n,) permutation of the unknowns, order[k] is the unknown in row k.
+        size: number of values.
+        bandwidth: of the banded matrix; unused where there is a `sparse` pattern.
+    """
+
+    order: Ints
+    slots: Ints
+    size: int
+    bandwidth: int
+    sparse: SparsePattern | None
+
+    @property
+    def banded(self) -> bool:
+        return self.sparse is None
+
+    def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
+        if self.sparse is None:
+            return BandMatrix(data.reshape((self.bandwidth + 1, len(self.order)), order="F"), self.order)
+        return SparseMatrix(data, self.sparse)
+
+
+def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
+    """Pattern of the unknowns `number` (all components, -1 if prescribed); unknowns of a node and of its edge stay
+    together.
+
+    A band or a sparse matrix, whichever is factorised faster, unless `banded` says which.
+    """
+    owner = _owners(mesh, components, number)
+    free = np.flatnonzero(number >= 0)
+    sizes = np.bincount(owner[free], minlength=len(mesh.nodes))
+    used = np.flatnonzero(sizes)  # nodes with unknowns
+    vertex = np.full(len(sizes), -1, dtype=np.int64)
+    vertex[used] = np.arange(len(used))
+    by_node = free[np.argsort(owner[free], kind="stable")]  # components node by node
+    starts = np.concatenate(([0], np.cumsum(sizes[used])))
+
+    def unknowns(nodes: Ints) -> Ints:
+        """Unknowns in the order of their nodes (rows of `used`)."""
+        length = sizes[used][nodes]
+        inside = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
+        return number[by_node[np.repeat(starts[nodes], length) + inside]]
+
+    high, low = _pairs(vertex[mesh.triangles], len(used))
+    order = unknowns(reverse_cuthill_mckee(high, low, len(used))[0])
+    rows = _rows(components, number, order)
+    reach = rows.max(axis=1) - np.where(rows >= 0, rows, len(order)).min(axis=1)
+    bandwidth = int(reach.max(initial=0))
+    if band_is_cheaper(len(order), bandwidth) if banded is None else banded:
+        a, b = rows[:, LOWER[0]], rows[:, LOWER[1]]
+        column = np.minimum(a, b)
+        slots = np.where(column >= 0, np.abs(a - b) + column * (bandwidth + 1), -1)
+        return Pattern(order, slots, (bandwidth + 1) * len(order), bandwidth, None)
+    sparse, _ = SparsePattern.dissected(high, low, sizes[used], mesh.nodes[used, :2], unknowns)
+    slots = _sparse_slots(_rows(components, number, sparse.order), sparse.indptr, sparse.indices)
+    return Pattern(sparse.order, slots, len(sparse.indices), bandwidth, sparse)
+
+
+def _owners(mesh: QuadraticMesh, components: Ints, number: Ints) -> Ints:
+    """Node that each component belongs to: rotations go with the middle node of their edge."""
+    owner = np.zeros(len(number), dtype=np.int64)
+    local = np.concatenate((np.repeat(np.arange(6), 3), np.tile(np.repeat([3, 4, 5], 2), 2)))
+    used = components >= 0
+    owner[components[used]] = mesh.triangles[:, local][used]
+    return owner
+
+
+def _pairs(triangles: Ints, count: int) -> tuple[Ints, Ints]:
+    """Every pair of nodes with unknowns that share a triangle, once, as (high, low); -1 are nodes without."""
+    i, j = np.tril_indices(6, -1)
+    a, b = triangles[:, i].ravel(), triangles[:, j].ravel()
+    both = (a >= 0) & (b >= 0)
+    keys = np.unique(np.maximum(a, b)[both] * count + np.minimum(a, b)[both])
+    return keys // count, keys % count
+
+
+def _rows(components: Ints, number: Ints, order: Ints) -> Ints:
+    """(t, 30) row of every component of an element, -1 if it is prescribed or missing."""
+    position = np.empty(len(order) + 1, dtype=np.int64)
+    position[order], position[-1] = np.arange(len(order)), -1
+    return position[np.where(components >= 0, number[components], -1)]
+
+
+@njit(**OPTIONS)
+def _sparse_slots(rows, indptr, indices):  # type: ignore[no-untyped-def]
+    """Slots of the lower entries of all elements in compressed columns, by bisection."""
+    width = rows.shape[1]
+    slots = np.full((len(rows), width * (width + 1) // 2), -1, dtype=np.int64)
+    for e in range(len(rows)):
+        at = -1
+        for i in range(width):
+            for j in range(i + 1):
+                at += 1
+                row, column = max(rows[e, i], rows[e, j]), min(rows[e, i], rows[e, j])
+                if column < 0:
+                    continue
+                low, high = indptr[column], indptr[column + 1]
+                while high - low > 1:
+                    middle = (low + high) // 2
+                    if indices[middle] <= row:
+                        low = middle
+                    else:
+                        high = middle
+                slots[e, at] = low
+    return slots

@@ -1,0 +1,182 @@
+"""All components of the shell in one vector, prescribed ones included, and what an element sees of them.
+
+Displacements of all nodes in local axes (mm), two rotations alpha an edge and two fold angles beta a creased edge
+(rad; at the lower and the higher node). An element sees 30 of them: 18 displacements, 6 alpha, 6 beta (-1 where its
+edge is not creased), and works with 24: its positions and the rotations gamma = +-alpha + beta / 2 of its side of its
+edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.actuation import Ramp
+from bh.errors import ModelError
+from bh.supports import Constraints
+from fem.connectors import Connectors
+from fem.shell import ShellElements
+from meshes import SheetMesh
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """Numbering of one step; k components of which n are free.
+
+    Attributes:
+        begin: (k,) their values in the state that the step begins with; prescribed: their values at lambda, where they
+            are prescribed.
+        free: (n,) components that are unknowns; number: (k,) unknown of each component, -1 if prescribed.
+        of_element: (t, 30) see the module.
+        sides: (t, 6) +-1 of alpha in gamma.
+        first_alpha, first_beta: where rotations and fold angles begin.
+    """
+
+    reference: Array
+    nodes: Ints
+    constraints: Constraints
+    begin: Array
+    prescribed: Ramp
+    free: Ints
+    number: Ints
+    of_element: Ints
+    sides: Array
+    first_alpha: int
+    first_beta: int
+
+    @property
+    def rate(self) -> Array:
+        """(k,) rates of prescribed components by lambda, zero elsewhere."""
+        out = self.prescribed.rate
+        out[self.free] = 0.0
+        return out
+
+    def whole(self, q: Array, lam: float) -> Array:
+        """(k,) all components from the unknowns (n,)."""
+        out = self.prescribed.at(lam)
+        out[self.free] = q
+        return out
+
+    def alpha(self, components: Array) -> Array:
+        """(e, 2) rotations of edges relative to the frames of the step."""
+        return components[self.first_alpha : self.first_beta].reshape(-1, 2)
+
+    def beta(self, components: Array) -> Array:
+        """(c, 2) fold angles of creased edges."""
+        return components[self.first_beta :].reshape(-1, 2)
+
+    def moves(self, components: Array) -> Array:
+        """(n, 3) displacements in global axes, mm."""
+        return self.to_global(components[: self.first_alpha].reshape(-1, 3))
+
+    def to_global(self, local: Array) -> Array:
+        turned = np.flatnonzero(self.constraints.frame_of >= 0)
+        if len(turned) == 0:
+            return local
+        axes = self.constraints.frames[self.constraints.frame_of[turned]]
+        out = local.copy()
+        out[turned] = np.einsum("nij,ni->nj", axes, local[turned])
+        return out
+
+    def to_local(self, vectors: Array) -> Array:
+        return local_axes(self.constraints, vectors)
+
+    def gather(self, components: Array) -> Array:
+        """(t, 24) displacements in global axes and side rotations of every element."""
+        moves = self.moves(components)[self.nodes].reshape(-1, 18)
+        alpha, beta = self.of_element[:, 18:24], self.of_element[:, 24:]
+        gamma = components[alpha] * self.sides + 0.5 * np.where(beta >= 0, components[beta], 0.0)
+        return np.hstack((moves, gamma))
+
+    def spread(self, element: Array) -> Array:
+        """(k,) element vectors (t, 24) added up: the transposed of `gather`."""
+        x = np.empty_like(self.reference)
+        for axis in range(3):
+            pull = element[:, axis:18:3].ravel()
+            x[:, axis] = np.bincount(self.nodes.ravel(), pull, minlength=len(x))
+        alpha, beta = self.of_element[:, 18:24], self.of_element[:, 24:]
+        used = beta >= 0
+        rows = np.concatenate((alpha.ravel(), beta[used]))
+        values = np.concatenate(((element[:, 18:] * self.sides).ravel(), 0.5 * element[:, 18:][used]))
+        out: Array = np.bincount(rows, values, minlength=len(self.number)).astype(float)
+        out[: self.first_alpha] = self.to_local(x).ravel()
+        return out
+
+
+def local_axes(constraints: Constraints, vectors: Array) -> Array:
+    """Nodal vectors (n, 3) in the local axes of oblique supports."""
+    turned = np.flatnonzero(constraints.frame_of >= 0)
+    if len(turned) == 0:
+        return vectors
+    out = vectors.copy()
+    axes = constraints.frames[constraints.frame_of[turned]]
+    out[turned] = np.einsum("nij,nj->ni", axes, vectors[turned])
+    return out
+
+
+def lay_out(
+    elements: ShellElements,
+    constraints: Constraints,
+    creases: Connectors,
+    positions: Array,
+    beta: Array,
+    clamped: Ints,
+) -> Components:
+    """Number the components of a step that begins at `positions` (n, 3) and fold angles `beta` (m, 2) of all hinges.
+
+    Raises:
+        ModelError: nothing is free.
+    """
+    mesh = elements.mesh
+    nodes, edges = len(mesh.nodes), len(elements.lengths)
+    still = np.zeros((edges, 2), dtype=bool)
+    still[clamped] = True
+    fixed = np.concatenate((constraints.fixed.ravel(), still.ravel(), np.repeat(creases.held, 2)))
+    none = np.zeros(2 * edges)
+    displacement = local_axes(constraints, positions - mesh.nodes).ravel()
+    begin = np.concatenate((displacement, none, beta[creases.hinges].ravel()))
+    given = np.concatenate((constraints.start.ravel(), none, creases.angle.start.ravel()))
+    end = np.concatenate((constraints.end.ravel(), none, creases.angle.end.ravel()))
+    free = np.flatnonzero(~fixed)
+    if not (free < 3 * nodes).any():
+        raise ModelError("the supports hold every node; nothing can move, so remove some of them")
+    number = np.full(len(fixed), -1, dtype=np.int64)
+    number[free] = np.arange(len(free))
+    return Components(
+        reference=mesh.nodes,
+        nodes=mesh.triangles,
+        constraints=constraints,
+        begin=begin,
+        # a displacement whose start is not given begins with what the node has
+        prescribed=Ramp(np.where(np.isnan(given), begin, given), end),
+        free=free,
+        number=number,
+        of_element=_of_element(elements, creases),
+        sides=np.repeat(elements.loops.sides, 2, axis=1),
+        first_alpha=3 * nodes,
+        first_beta=3 * nodes + 2 * edges,
+    )
+
+
+def _of_element(elements: ShellElements, creases: Connectors) -> Ints:
+    """(t, 30) components of every element; the two ends of edge j are corners j + 1 and j + 2."""
+    nodes, edges, sides = elements.mesh.triangles, elements.loops.edges, elements.loops.sides
+    x = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 18)
+    first = 3 * len(elements.mesh.nodes)
+    high = np.stack((sides < 0, sides > 0), axis=-1)  # is this end the higher node of the edge
+    alpha = first + 2 * edges[:, :, None] + high
+    crease = creases.of_edge[edges][:, :, None]
+    beta = np.where(crease >= 0, first + 2 * len(creases.of_edge) + 2 * crease + high, -1)
+    return np.hstack((x, alpha.reshape(-1, 6), beta.reshape(-1, 6))).astype(np.int64)
+
+
+def edge_set(mesh: SheetMesh, name: str) -> Ints:
+    """Edges of a named set; the error lists the sets there are."""
+    if name not in mesh.edge_sets:
+        raise ModelError(f"the sheet has no edge set '{name}'; use one of {', '.join(mesh.edge_sets)}")
+    return mesh.topology.find_edges(mesh.edge_sets[name])

@@ -1,0 +1,106 @@
+"""Formulation "shell": the nonlinear Kirchhoff-Love shell as `bh` finds it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from bh.model import Model, Sheet
+from bh.program import StepProgram, program
+from bh.solvers.continuation import LoadControl
+from bh.solvers.increments import Increment, point
+from bh.solvers.trace import Strategy, Walk, walk
+from bh.state import State
+from bh.threads import one_blas_thread
+from fem.loads import EdgeMoments
+from fem.observables import ShellState, observe
+from fem.shell import ShellElements, shell_elements
+from fem.system import ShellSystem
+from meshes import SheetMesh
+from meshes.curved import lift
+
+Array = NDArray[np.float64]
+FREE = EdgeMoments()
+
+
+class Shell:
+    """Formulation "shell": quadratic displacements, linear moments (HHJ) and membrane strains (Regge)."""
+
+    name = "shell"
+    takes_nu = True
+
+    def system(
+        self, model: Model, program: StepProgram, start: State | None, moments: EdgeMoments = FREE
+    ) -> ShellSystem:
+        """The system of one step that begins at `start` (None: the stress-free sheet).
+
+        Raises:
+            ModelError, MeshError: the model is not one that a shell can take.
+        """
+        if start is not None and not isinstance(start, ShellState):
+            raise ModelError(
+                f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
+            )
+        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet), moments)
+
+    def observe(
+        self,
+        model: Model,
+        system: ShellSystem,
+        q: Array,
+        lam: float,
+        step: int = 0,
+        stable: bool | None = None,
+    ) -> ShellState:
+        """Everything that can be read from the unknowns `q` at `lam`."""
+        return observe(model, system, q, lam, step, stable)
+
+
+@lru_cache(maxsize=4)
+def _elements(mesh: SheetMesh, sheet: Sheet) -> ShellElements:
+    """Elements are those of the sheet, whatever the step."""
+    return shell_elements(lift(mesh), sheet)
+
+
+def follow(
+    model: Model,
+    moments: Sequence[EdgeMoments] = (),
+    strategy: Strategy | None = None,
+) -> tuple[list[ShellState], list[Increment]]:
+    """Follow a model whose boundary edges are loaded by couples, which `bh.trace` cannot be told.
+
+    Args:
+        moments: one a step, or none.
+
+    Returns:
+        the state at the beginning and after every accepted increment, and all increments. The last increment's
+        outcome is "reached" only if every step was.
+    """
+    with one_blas_thread():
+        return _follow(model, moments, strategy or LoadControl())
+
+
+def _follow(
+    model: Model, moments: Sequence[EdgeMoments], strategy: Strategy
+) -> tuple[list[ShellState], list[Increment]]:
+    shell = Shell()
+    states: list[ShellState] = []
+    increments: list[Increment] = []
+    programs = program(model)
+    for step, ramps in enumerate(programs):
+        now = moments[step] if moments else FREE
+        system = shell.system(model, ramps, states[-1] if states else None, now)
+        begin = point(system, system.start(), 0.0)
+        if not states:
+            states.append(shell.observe(model, system, begin.q, 0.0))
+        for increment in walk(Walk(system, strategy, (begin,))):
+            increments.append(increment)
+            if increment.outcome != "reached":
+                return states, increments
+            at = increment.point
+            states.append(shell.observe(model, system, at.q, at.lam, step, increment.stable))
+    return states, increments

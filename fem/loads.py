@@ -1,0 +1,105 @@
+"""Supports and dead forces of a model on the nodes of a second-order mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.actuation import Actuation, Fold, Force, Ramp
+from bh.errors import ModelError
+from bh.model import Model
+from bh.program import program
+from bh.supports import Constraints, select
+from fem.components import edge_set
+from fem.shell import ShellElements
+from meshes.curved import QuadraticMesh
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EdgeMoments:
+    """Couples on boundary edges, which a model of bars and hinges cannot say.
+
+    Attributes:
+        at: edge set and couple a length, N, at the start and at the end of the step; positive raises the outside of the
+            boundary edge toward the sheet's normal.
+    """
+
+    at: tuple[tuple[str, float, float], ...] = ()
+
+
+def constraints(mesh: QuadraticMesh, model: Model, step: int) -> Constraints:
+    """Supports and prescribed displacements in step `step` on all nodes, middle nodes of named edges included.
+
+    A support of listed nodes holds just these corners.
+    """
+    steps = tuple(tuple(_plain(item) for item in actuations) for actuations in model.steps[: step + 1])
+    return program(replace(model, mesh=mesh.linear, steps=steps))[step].constraints
+
+
+def _plain(item: Actuation) -> Actuation:
+    """Fold angles an edge do not fit the halved edges, and do not matter here."""
+    if not isinstance(item, Fold):
+        return item
+    if item.to is not None and not isinstance(item.to, float):
+        return replace(item, to=float(np.mean(item.to)))
+    if item.by is not None and not isinstance(item.by, float | str):
+        return replace(item, by=float(np.mean(item.by)))
+    if item.rest is not None and not isinstance(item.rest, float):
+        return replace(item, rest=float(np.mean(item.rest)))
+    return item
+
+
+def forces(mesh: QuadraticMesh, model: Model, step: int, lengths: Array) -> Ramp:
+    """Dead forces (n, 3) on all nodes, N, at the start and the end of step `step`.
+
+    A `total` on a named set of edges is a uniform line load a length of edge; everything else acts on the corners
+    named. A force stays until another one acts on the same place, as in `bh.program`.
+    """
+    acting: dict[object, Array] = {}
+    before: dict[object, Array] = {}
+    for actuations in model.steps[: step + 1]:
+        before = dict(acting)
+        for item in actuations:
+            if isinstance(item, Force):
+                key = item.at if isinstance(item.at, str) else tuple(item.at)
+                acting[key] = _force(mesh, item, lengths)
+    none = np.zeros_like(mesh.nodes)
+    return Ramp(sum(before.values(), none), sum(acting.values(), none.copy()))
+
+
+def _force(mesh: QuadraticMesh, item: Force, lengths: Array) -> Array:
+    out = np.zeros_like(mesh.nodes)
+    if item.total is not None and isinstance(item.at, str) and item.at in mesh.sheet.edge_sets:
+        total = np.asarray(item.total, dtype=float)
+        edges = mesh.sheet.topology.find_edges(mesh.sheet.edge_sets[item.at])
+        share = lengths[edges] / lengths[edges].sum()
+        ends = mesh.sheet.topology.edges[edges]
+        middle = len(mesh.sheet.points) + edges
+        for rows, part in ((ends[:, 0], 1.0), (ends[:, 1], 1.0), (middle, 4.0)):
+            np.add.at(out, rows, part / 6.0 * share[:, None] * total)  # Simpson's rule
+        return out
+    nodes: Ints = select(mesh.sheet, item.at)
+    if item.each is not None:
+        out[nodes] = np.asarray(item.each, dtype=float)
+    else:
+        out[nodes] = np.asarray(item.total, dtype=float) / len(nodes)
+    return out
+
+
+def edge_moments(elements: ShellElements, moments: EdgeMoments) -> Ramp:
+    """(e, 2) couples on the rotations alpha of edges, N mm / rad."""
+    sheet = elements.mesh.sheet
+    out = np.zeros((2, len(elements.lengths), 2))
+    side = np.zeros(len(elements.lengths))
+    side[elements.loops.edges] = elements.loops.sides
+    for name, *couple in moments.at:
+        chosen = edge_set(sheet, name)
+        if (sheet.topology.edge_triangles[chosen, 1] >= 0).any():
+            raise ModelError(f"edge moments act on boundary edges; '{name}' lies inside")
+        out[:, chosen] += 0.5 * np.reshape(couple, (2, 1, 1)) * (side * elements.lengths)[chosen, None]
+    return Ramp(out[0], out[1])

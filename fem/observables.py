@@ -1,0 +1,166 @@
+"""What can be read from a state of the shell, under the names that every formulation uses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.model import Model, Sheet
+from bh.program import crease_hinges
+from bh.state import Energy, State
+from fem.kernels import Frames
+from fem.shell import ShellElements
+from fem.spaces import MOMENTS, STRAINS, gradients, local_order
+
+if TYPE_CHECKING:
+    from fem.system import Here, ShellSystem
+
+Array = NDArray[np.float64]
+MIDDLE = np.array([[1.0 / 3.0, 1.0 / 3.0]])
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ShellState(State):
+    """A state of the shell.
+
+    Dihedral angles of creases are the connector's, averaged along the edge; of other hinges they are pi minus the
+    jump of the normal at the middle of the edge, which vanishes under refinement.
+
+    Attributes:
+        nodes: (n + e, 3) positions of corners and middle nodes, mm.
+        frames: frames of all edges, turned with them; the next step begins from here.
+        fold_angles: (m, 2) beta at the lower and the higher node of each hinge's edge, rad; zero off creases.
+        crease_couples: (m, 2) couples that the crease takes there, conjugate to fold_angles, N mm / rad.
+        membrane_forces, moments: (t, 3) components xx, yy, xy in the flat sheet's axes at the middle of each triangle
+            (second Piola-Kirchhoff), N/mm and N; a moment is positive where it bends the sheet's edges up.
+    """
+
+    nodes: Array
+    frames: Frames
+    fold_angles: Array
+    crease_couples: Array
+    membrane_forces: Array
+    moments: Array
+
+    def fold_angles_along(self, crease: str) -> Array:
+        """(k, 2) fold angles at both ends of every edge along a crease, in its order, rad; mountain positive."""
+        hinges = crease_hinges(self.mesh, crease)
+        pairs = self.mesh.crease_edges(crease)
+        beta = self.fold_angles[hinges]
+        turned = pairs[:, 0] > pairs[:, 1]
+        out: Array = np.where(turned[:, None], beta[:, ::-1], beta)
+        return out
+
+    def crease_curve(self, crease: str, points: int = 5) -> Array:
+        """(k, 3) points on the deformed crease: `points` on every quadratic edge, in order, mm."""
+        pairs = self.mesh.crease_edges(crease)
+        middle = len(self.mesh.points) + self.mesh.topology.find_edges(pairs)
+        s = np.linspace(0.0, 1.0, points)
+        shape = np.stack(((1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)))
+        ends = np.stack((self.nodes[pairs[:, 0]], self.nodes[middle], self.nodes[pairs[:, 1]]))
+        curve = np.einsum("kp,kec->epc", shape, ends)
+        return np.vstack((curve[:, :-1].reshape(-1, 3), curve[-1, -1:]))
+
+
+def observe(
+    model: Model, system: ShellSystem, q: Array, lam: float, step: int, stable: bool | None
+) -> ShellState:
+    """Everything that can be read from the unknowns `q` at `lam`."""
+    here = system.at(q, lam)
+    e, mesh, creases = system.elements, model.mesh, system.creases
+    strain, curvature = e.measures(
+        here.x, system.components.gather(here.components)[:, 18:].reshape(-1, 3, 2), system.frames
+    )
+    stretching = 0.5 * np.einsum("tk,tk->t", here.forces[:, :9], strain)
+    bending = 0.5 * np.einsum("tk,tk->t", here.forces[:, 9:], curvature)
+    beta = system.components.beta(here.components)
+    folding = creases.energy(beta, lam)
+    sides = mesh.topology.edge_triangles[creases.edges]
+    by_triangle = np.zeros(len(mesh.triangles))
+    share = folding / e.areas[sides].sum(axis=1)
+    for side in range(2):
+        np.add.at(by_triangle, sides[:, side], share)
+    fold_angles, couples = np.zeros((2, len(mesh.topology.hinges), 2))
+    fold_angles[creases.hinges] = beta
+    couples[creases.hinges] = _couples(system, here)
+    angles = np.mod(math.pi - _jumps(system, here), 2.0 * math.pi)
+    angles[creases.hinges] = math.pi - beta.mean(axis=1)
+    reactions = np.zeros_like(here.x)
+    local = system.gradient(here)[: system.components.first_alpha].reshape(-1, 3)
+    reactions[system.constraints.fixed] = local[system.constraints.fixed]
+    membrane, moments = stresses(e, model.sheet, here.forces, strain)
+    return ShellState(
+        mesh=mesh, step=step, lam=lam, points=here.x[: len(mesh.points)],
+        energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum())),
+        dihedral_angles=angles,
+        energy_density={"stretching": stretching / e.areas, "bending": bending / e.areas, "folding": by_triangle},
+        reactions=_to_corners(system, system.components.to_global(reactions)),
+        crease_moments=_crease_moments(system, couples), stable=stable, nodes=here.x,
+        frames=system.carried_frames(here.components), fold_angles=fold_angles, crease_couples=couples,
+        membrane_forces=membrane, moments=moments,
+    )  # fmt: skip
+
+
+def _to_corners(system: ShellSystem, nodal: Array) -> Array:
+    """Reactions of middle nodes halved to the ends of their edges, so that resultants are kept."""
+    corners = len(system.mesh.sheet.points)
+    out = nodal[:corners].copy()
+    for end in range(2):
+        np.add.at(out, system.mesh.sheet.topology.edges[:, end], 0.5 * nodal[corners:])
+    return out
+
+
+def _couples(system: ShellSystem, here: Here) -> Array:
+    """(c, 2) couples on the fold angles: a spring's own, and what an imposed angle takes, N mm / rad."""
+    creases = system.creases
+    sheet = system.components.beta(system.components.spread(here.pull))
+    turn = creases.rest.at(here.lam) - system.components.beta(here.components)
+    spring = creases.stiffness[:, None] * np.einsum("cij,cj->ci", creases.mass, turn)
+    out: Array = np.where(creases.held[:, None], sheet, spring)
+    return out
+
+
+def _crease_moments(system: ShellSystem, couples: Array) -> Array:
+    """(m,) mean moment a length of crease, nan elsewhere."""
+    creases = system.creases
+    out = np.full(len(couples), np.nan)
+    out[creases.hinges] = couples[creases.hinges].sum(axis=1) / creases.mass.sum(axis=(1, 2))
+    return out
+
+
+def _jumps(system: ShellSystem, here: Here) -> Array:
+    """(m,) angle between the normals on both sides at the middle of every hinge's edge, rad, mountain positive."""
+    e, t = system.elements, system.elements.tables
+    middle = len(t.s) // 2  # Gauss points are odd in number
+    xe = here.x[system.mesh.triangles]
+    tau = np.einsum("jn,tnc->tjc", t.along[:, middle], xe)
+    across = np.einsum("jn,tnc->tjc", t.across[:, middle], xe)
+    normal = np.cross(tau, across)
+    topology = system.mesh.sheet.topology
+    left, right = topology.edge_triangles[topology.hinge_edges].T
+    one = np.argmax(e.loops.edges[left] == topology.hinge_edges[:, None], axis=1)
+    two = np.argmax(e.loops.edges[right] == topology.hinge_edges[:, None], axis=1)
+    a, b, edge = normal[left, one], normal[right, two], tau[left, one]
+    triple = np.einsum("mc,mc->m", edge, np.cross(a, b)) / np.linalg.norm(edge, axis=1)
+    out: Array = np.arctan2(triple, np.einsum("mc,mc->m", a, b))
+    return out
+
+
+def stresses(elements: ShellElements, sheet: Sheet, forces: Array, strain: Array) -> tuple[Array, Array]:
+    """Membrane forces and moments (t, 3) at the middle of each triangle, components xx, yy, xy of the flat sheet."""
+    X = elements.mesh.nodes[elements.mesh.triangles, :2]
+    F = np.einsum("tnc,nd->tcd", X, gradients(MIDDLE)[0])
+    order = local_order()
+    eps = np.einsum("tk,kab->tab", strain, STRAINS[order[:, 1]]) / 3.0
+    inverse = np.linalg.inv(F)
+    eps = np.einsum("tac,tab,tbd->tcd", inverse, eps, inverse)
+    trace = np.einsum("taa->t", eps)[:, None, None] * np.eye(2)
+    N = sheet.E * sheet.t / (1.0 - sheet.nu**2) * ((1.0 - sheet.nu) * eps + sheet.nu * trace)
+    m = np.einsum("tk,kab->tab", forces[:, 9:], MOMENTS[order[:, 1]]) / 3.0
+    m = np.einsum("tca,tab,tdb->tcd", F, m, F) / np.linalg.det(F)[:, None, None] ** 2
+    pick = ([0, 1, 0], [0, 1, 1])
+    return N[:, pick[0], pick[1]], m[:, pick[0], pick[1]]

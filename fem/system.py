@@ -1,0 +1,353 @@
+"""The shell's system for one step: energy, residual and tangent as functions of the unknowns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.actuation import Ramp
+from bh.errors import ModelError
+from bh.model import Model
+from bh.program import StepProgram
+from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
+from bh.solvers.system import Evaluation
+from fem import loads
+from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
+from fem.components import lay_out
+from fem.connectors import connectors
+from fem.kernels import Frames
+from fem.loads import EdgeMoments
+from fem.observables import ShellState
+from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
+from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, unit
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+LARGEST_TURN = 1.3  # rad that any edge may turn in one increment before the driver mistrusts it
+LARGEST_ANGLE = 2.6  # rad between an edge's sides or tangent and its frame, which begins anew with every step
+ROUNDING = 8.0 * np.finfo(float).eps
+
+
+@dataclass(frozen=True, eq=False)
+class Here:
+    """What has been computed at one (q, lambda)."""
+
+    q: Array
+    lam: float
+    components: Array
+    x: Array
+    forces: Array
+    energy: float
+    B: Array
+    pull: Array  # (t, 24) element forces by positions and side rotations
+
+
+def root_mean_square(values: Array) -> float:
+    """Also of values whose squares overflow, which a wild trial step may have."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if not 0.0 < largest < np.inf:
+        return largest
+    return largest * float(np.sqrt(np.mean((values / largest) ** 2)))
+
+
+class ShellSystem:
+    """`bh.solvers.System` of one step.
+
+    Unknowns: free displacements of all nodes in local axes (mm), rotations alpha of edges and fold angles beta of
+    elastic creases (rad). All of them minimise the energy; imposed angles are prescribed, not constrained. `start`
+    None is the flat sheet.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        program: StepProgram,
+        start: ShellState | None,
+        elements: ShellElements,
+        moments: EdgeMoments,
+    ) -> None:
+        if model.stiffness is not None:
+            raise ModelError(
+                "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
+            )
+        self.program, self.elements = program, elements
+        mesh = self.mesh = elements.mesh
+        step = 0 if start is None else start.step + 1
+        x = mesh.nodes if start is None else start.nodes
+        self.frames = flat_frames(mesh) if start is None else start.frames
+        flat = np.zeros((len(model.mesh.topology.hinges), 2))
+        beta = flat if start is None else start.fold_angles
+        couple = flat if start is None else start.crease_couples
+        self.creases = connectors(mesh, model, program, beta, couple)
+        self.constraints = loads.constraints(mesh, model, step)
+        clamped = mesh.sheet.topology.find_edges(program.constraints.clamped)
+        self.components = lay_out(elements, self.constraints, self.creases, x, beta, clamped)
+        self.load = self._loads(model, step, moments)
+        self._here: Here | None = None
+        if self.constraints.rigid_body:
+            self._check_balance()
+
+    def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
+        """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
+        force = loads.forces(self.mesh, model, step, self.elements.lengths)
+        couple = loads.edge_moments(self.elements, moments)
+        none = np.zeros(2 * len(self.creases))
+        ends = [
+            np.concatenate((self.components.to_local(f).ravel(), m.ravel(), none))
+            for f, m in ((force.start, couple.start), (force.end, couple.end))
+        ]
+        return Ramp(ends[0], ends[1])
+
+    # ------------------------------------------------------------------------------- unknowns and positions
+
+    @property
+    def size(self) -> int:
+        return len(self.components.free)
+
+    @property
+    def primal(self) -> int:
+        return self.size
+
+    @property
+    def rotation(self) -> float:
+        return self.program.rotation
+
+    @cached_property
+    def energy_scale(self) -> float:
+        """Moments against the rotations of all edges by one radian, N mm."""
+        B = self.elements.gradients(self.mesh.nodes, flat_frames(self.mesh))[:, 9:, 18:]
+        return 0.5 * float(np.einsum("tki,tkl,tli->", B, self.elements.bending, B, optimize=True))
+
+    def start(self) -> Array:
+        """Unknowns of the state that the step begins with."""
+        return self.components.begin[self.components.free]
+
+    def node_positions(self, components: Array) -> Array:
+        """(n, 3) positions of all nodes, middle nodes included, mm."""
+        return self.mesh.nodes + self.components.moves(components)
+
+    def positions(self, q: Array, lam: float) -> Array:
+        """(n, 3) positions of the corners, mm."""
+        return self.node_positions(self.components.whole(q, lam))[: len(self.mesh.sheet.points)]
+
+    def carried_frames(self, components: Array) -> Frames:
+        """Frames for a step that begins at this state."""
+        x = self.node_positions(components)
+        return carried_frames(self.mesh, self.frames, x, self.components.alpha(components))
+
+    def at(self, q: Array, lam: float) -> Here:
+        """Everything at (q, lam); the last one is remembered."""
+        here = self._here
+        if here is not None and here.lam == lam and np.array_equal(here.q, q):
+            return here
+        e = self.elements
+        components = self.components.whole(q, lam)
+        x = self.node_positions(components)
+        gamma = self.components.gather(components)[:, 18:].reshape(-1, 3, 2)
+        strain, curvature = e.measures(x, gamma, self.frames)
+        forces = e.forces(strain, curvature)
+        energy = 0.5 * float(np.vdot(forces[:, :9], strain) + np.vdot(forces[:, 9:], curvature))
+        B = e.gradients(x, self.frames)
+        pull = np.einsum("tkj,tk->tj", B, forces)
+        self._here = Here(q.copy(), lam, components, x, forces, energy, B, pull)
+        return self._here
+
+    def gradient(self, here: Here) -> Array:
+        """Derivative of the potential by all components; at prescribed ones the reactions."""
+        out = self.components.spread(here.pull) - self.load.at(here.lam)
+        out[self.components.first_beta :] += self.creases.gradient(
+            self.components.beta(here.components), here.lam
+        ).ravel()
+        return out
+
+    # ------------------------------------------------------------------------------- the System protocol
+
+    def evaluate(self, q: Array, lam: float) -> Evaluation:
+        here = self.at(q, lam)
+        beta = self.components.beta(here.components)
+        energy = (
+            here.energy + float(self.creases.energy(beta, lam).sum()) + self.creases.load_energy(beta, lam)
+        )
+        energy -= float(self.load.at(lam) @ here.components)
+        residual = self.gradient(here)[self.components.free]
+        return Evaluation(energy, residual, self._imbalance(residual, here), here.forces.ravel())
+
+    def _imbalance(self, residual: Array, here: Here) -> float:
+        """Largest force over the root mean square of element forces, or the same of moments on edges.
+
+        Positions are rounded to eps |x|, which membrane and bending stiffness turn into forces that nobody can balance.
+        """
+        moves = self.components.free < self.components.first_alpha
+        eps = ROUNDING * float(np.abs(here.x).max())
+        load = self.load.at(here.lam)
+        floors = (eps * self._stiffest[0], eps * self._stiffest[1])
+        couples = self.creases.largest(self.components.beta(here.components), here.lam)
+        first = self.components.first_alpha
+        groups = (
+            (residual[moves], here.pull[:, :18], float(np.abs(load[:first]).max()), floors[0]),
+            (residual[~moves], here.pull[:, 18:], max(couples, float(np.abs(load[first:]).max())), floors[1]),
+        )
+        worst = 0.0
+        for part, inner, outer, floor in groups:
+            largest = float(np.abs(part).max(initial=0.0)) - floor
+            if largest > 0.0:
+                worst = max(worst, largest / max(root_mean_square(inner), outer, 1e-300))
+        return worst
+
+    @cached_property
+    def _stiffest(self) -> tuple[float, float]:
+        """Largest force, N, and moment on an edge, N mm, per mm of displacement of one node."""
+        B = self.elements.gradients(self.mesh.nodes, flat_frames(self.mesh))
+        K = np.zeros((len(B), 24, 24))
+        for part, stiffness in ((B[:, :9], self.elements.membrane), (B[:, 9:], self.elements.bending)):
+            K += np.einsum("tki,tkl,tlj->tij", part, stiffness, part, optimize=True)
+        return float(np.abs(K[:, :18, :18]).max()), float(np.abs(K[:, 18:, :18]).max())
+
+    def element_tangents(self, here: Here, forces: Array) -> Array:
+        return self.elements.tangent(here.x, forces.reshape(-1, 18), here.B, self.frames)
+
+    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+        here = self.at(q, lam)
+        K = self.element_tangents(here, forces)
+        if (self.constraints.frame_of >= 0).any():
+            turn_blocks(K, self.mesh.triangles, self.constraints.frame_of, self.constraints.frames)
+        pattern = self._pattern
+        data = np.zeros(pattern.size)
+        scatter(K, self.elements.loops.sides, pattern.slots, data)
+        slots, values = self._springs
+        np.add.at(data, slots, values)
+        if not self.constraints.rigid_body:
+            return pattern.matrix(data)
+        Z = self._rigid(here)
+        if Z.shape[1] == 0:  # clamped edges hold what the supports do not
+            return pattern.matrix(data)
+        ground = self._ground(Z, data)
+        return FreeBodyMatrix(pattern.matrix(data), Z, *ground)
+
+    def predicted_forces(self, forces: Array, dq: Array) -> Array:
+        assert self._here is not None  # the tangent was made there
+        change = np.zeros(len(self.components.number))
+        change[self.components.free] = dq
+        measure = np.einsum("tkj,tj->tk", self._here.B, self.components.gather(change))
+        return forces + self.elements.forces(measure[:, :9], measure[:, 9:]).ravel()
+
+    def control_rate(self, q: Array, lam: float) -> Array:
+        out = self._times(self.at(q, lam), self.components.rate) - self.load.rate
+        out[self.components.first_beta :] += self.creases.gradient_rate().ravel()
+        return out[self.components.free]
+
+    def power(self, q: Array, lam: float) -> float:
+        here = self.at(q, lam)
+        total = float(self.gradient(here) @ self.components.rate) - float(self.load.rate @ here.components)
+        return total + self.creases.power(self.components.beta(here.components), lam)
+
+    def control_stiffness(self, q: Array, lam: float) -> float:
+        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        c = self.creases
+        total = float(self._times(self.at(q, lam), self.components.rate) @ self.components.rate)
+        total -= 2.0 * float(self.load.rate @ self.components.rate)
+        total += 2.0 * float(np.vdot(c.gradient_rate(), self.components.beta(self.components.rate)))
+        return total + float(np.einsum("c,ci,cij,cj->", c.stiffness, c.rest.rate, c.mass, c.rest.rate))
+
+    def _times(self, here: Here, v: Array) -> Array:
+        """Tangent of sheet and springs times v, all components."""
+        out = np.zeros_like(v)
+        if v.any():
+            K = self.element_tangents(here, here.forces)
+            out = self.components.spread(np.einsum("tij,tj->ti", K, self.components.gather(v)))
+            turn = self.creases.stiffness[:, None] * np.einsum(
+                "cij,cj->ci", self.creases.mass, self.components.beta(v)
+            )
+            out[self.components.first_beta :] += turn.ravel()
+        return out
+
+    def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        before, after = self.components.whole(q, lam), self.components.whole(q_new, lam_new)
+        turn = float(np.abs(self.components.alpha(after) - self.components.alpha(before)).max())
+        if turn > LARGEST_TURN:
+            return f"an edge turned by {np.degrees(turn):.0f} degrees"
+        t = unit(edge_tangents(self.mesh, self.node_positions(after)))
+        swing = float(np.arccos(np.clip(np.einsum("epc,epc->ep", t, self.frames.t0), -1.0, 1.0)).max())
+        angle = max(float(np.abs(self.components.alpha(after)).max()), swing)
+        if angle > LARGEST_ANGLE:
+            return f"an edge turned by {np.degrees(angle):.0f} degrees within the step; split the step in two"
+        return ""
+
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        return ""  # the shell knows no contact: its sides may pass through each other
+
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        if not self.constraints.rigid_body or not (self.load.start.any() or self.load.end.any()):
+            return "", ""
+        # an accepted state is in equilibrium; do the forces stay so a little further along the path?
+        try:
+            factor = self.tangent(q, lam, self.evaluate(q, lam).forces).factorise(1e-9)
+        except IndefiniteError:
+            return "", ""
+        ahead = 1e-3 * max(lam, 0.01)
+        moved = q - ahead * factor.solve(self.control_rate(q, lam))
+        lost = self._unbalanced(moved, lam + ahead) - self._unbalanced(q, lam)
+        if lost <= 1e-6 * ahead:
+            return "", ""
+        return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        c = self.components
+        whole = np.zeros(len(c.number))
+        whole[c.free] = motion
+        return describe_motion(self.mesh, self.creases, self.at(q, lam).x, c.moves(whole), c.beta(whole))
+
+    # ------------------------------------------------------------------------------- pattern, springs, grounding
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        return build_pattern(self.mesh, self.components.of_element, self.components.number)
+
+    @cached_property
+    def _springs(self) -> tuple[Ints, Array]:
+        """Slots and values of the stiffness of elastic creases."""
+        c = self.creases
+        slots, values = [], []
+        triangle = self.mesh.sheet.topology.edge_triangles[c.edges, 0]
+        local = np.argmax(self.elements.loops.edges[triangle] == c.edges[:, None], axis=1)
+        swapped = self.elements.loops.sides[triangle, local] < 0
+        for i, j in ((0, 0), (1, 1), (1, 0)):
+            row, column = 24 + 2 * local + i, 24 + 2 * local + j
+            slot = self._pattern.slots[triangle, row * (row + 1) // 2 + column]
+            end = np.where(swapped, 1 - i, i), np.where(swapped, 1 - j, j)
+            slots.append(slot)
+            values.append(c.stiffness * c.mass[np.arange(len(c)), end[0], end[1]])
+        slot, value = np.concatenate(slots), np.concatenate(values)
+        return slot[slot >= 0], value[slot >= 0]
+
+    def _rigid(self, here: Here) -> Array:
+        return free_rigid_motions(self.components, self.elements, here.x, here.B)
+
+    @cached_property
+    def _ground_triangle(self) -> int:
+        return ground_triangle(self.components, self.elements)
+
+    def _ground(self, Z: Array, data: Array) -> tuple[Ints, Array]:
+        """Add a stiffness against the rigid motions of one triangle; returns its unknowns and its matrix."""
+        number, block = ground_stiffness(self.components, self.elements, self._ground_triangle, Z)
+        lower = np.tril_indices(18)
+        slots = self._pattern.slots[self._ground_triangle, : len(lower[0])]
+        np.add.at(data, slots[slots >= 0], block[lower][slots >= 0])
+        inside = number >= 0
+        return number[inside], block[np.ix_(inside, inside)]
+
+    def _unbalanced(self, q: Array, lam: float) -> float:
+        """Part of the loads that works on free rigid motions."""
+        load = self.load.at(lam)[self.components.free]
+        work = self._rigid(self.at(q, lam)).T @ load
+        return float(np.abs(work).max(initial=0.0)) / max(float(np.abs(load).sum()), 1e-300)
+
+    def _check_balance(self) -> None:
+        for lam in (0.0, 1.0):
+            if self._unbalanced(self.start(), lam) > 1e-9:
+                raise ModelError(
+                    "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
+                )
