@@ -33,7 +33,9 @@ _HOME = {
     "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
 }  # fmt: skip
 
-_SUBMODULES = {"contact": "bh.analysis.contact", "plotting": "bh.plotting"}
+_SUBMODULES = {
+    "contact": "bh.analysis.contact", "plotting": "bh.plotting", "stiffness_probe": "bh.analysis.stiffness_probe",
+}  # fmt: skip
 
 __all__ = [
     "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",

@@ -20,8 +20,9 @@ GROUP = "bh.formulations"
 class Formulation(Protocol):
     """Turns a description into a `bh.solvers.System` for one step, and reads states from its unknowns.
 
-    The system also has `start()`, the unknowns of the state that the step begins with, and
-    `positions(q, lam)`, the (n, 3) node positions.
+    The system also has `start()`, the unknowns of the state that the step begins with,
+    `positions(q, lam)`, the (n, 3) node positions, `vectors(dq)`, the (n, 3) changes of these for changes of the
+    unknowns, and its transpose `loads(forces)`.
     """
 
     name: str

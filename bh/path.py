@@ -174,6 +174,11 @@ class Path:
     def __iter__(self) -> Iterator[State]:
         return (self[i] for i in range(len(self)))
 
+    def solved(self, index: int = -1) -> tuple[Any, Record]:
+        """The system of the step that a state belongs to, and its record: what analyses of a state begin with."""
+        record = self.records[range(len(self))[index]]
+        return self._system(record.step), record
+
     def plot(self, **options: Any) -> Any:
         """Show the last state as a picture; options of `bh.plotting.show`."""
         from bh.plotting import show

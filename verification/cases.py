@@ -18,6 +18,8 @@ ALL_CASES = {
     "fig3_8": "verification.fig3_8",
     "fig3_10": "verification.fig3_10",
     "derivatives": "verification.derivatives",
+    "fig3_9": "verification.fig3_9",
+    "fig3_11": "verification.fig3_11",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
     "shell_benchmarks": "verification.shell_benchmarks",

@@ -87,6 +87,16 @@ class BarsAndHingesSystem:
         """(n, 3) node positions, mm."""
         return self.displacements.positions(q[: self.primal], lam)
 
+    def vectors(self, dq: Array) -> Array:
+        """(n, 3) changes of positions, mm, for changes dq (size,) of the unknowns."""
+        return self.displacements.vectors(dq[: self.primal])
+
+    def loads(self, forces: Array) -> Array:
+        """(size,) what nodal forces (n, 3), N, are to the unknowns; their part along supports is left out."""
+        out = np.zeros(self.size)
+        out[: self.primal] = self.displacements.components(forces)
+        return out
+
     @cached_property
     def hinge_lengths(self) -> Array:
         ends = self.reference[self.elements.hinges[:, 1:3]]

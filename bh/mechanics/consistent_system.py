@@ -129,6 +129,16 @@ class ConsistentSystem:
         """(n, 3) node positions, mm."""
         return self.displacements.positions(q[: self.moving], lam)
 
+    def vectors(self, dq: Array) -> Array:
+        """(n, 3) changes of positions, mm, for changes dq (size,) of the unknowns."""
+        return self.displacements.vectors(dq[: self.moving])
+
+    def loads(self, forces: Array) -> Array:
+        """(size,) what nodal forces (n, 3), N, are to the unknowns; their part along supports is left out."""
+        out = np.zeros(self.size)
+        out[: self.moving] = self.displacements.components(forces)
+        return out
+
     @cached_property
     def _counts(self) -> tuple[int, int, int, int]:
         e = self.elements
@@ -256,7 +266,7 @@ class ConsistentSystem:
         return rotation_pattern(self.mesh, self.elements, self.displacements.number, ground)
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
-        v = self.displacements.vectors(dq[: self.moving])
+        v = self.vectors(dq)
         rates, _ = self._force_rates(self._tangent_at, v, dq[self.moving :], self._closing, controlled=False)
         return forces + rates
 
@@ -362,6 +372,4 @@ class ConsistentSystem:
         return turning_forces(self, self.displacements, self.force, q, lam)
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
-        return describe_motion(
-            self.mesh, self.positions(q, lam), self.displacements.vectors(motion[: self.moving])
-        )
+        return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))

@@ -107,8 +107,15 @@ class Fan:
     support takes out. `line` are the nodes of the middle line from the inner to the outer edge.
     """
 
-    def __init__(self, along: int = 24, angle: float = math.pi / 4.0, t: float = 0.127) -> None:
-        radii = [RADIUS + PLEAT * i for i in range(PLEATS)]
+    def __init__(
+        self,
+        along: int = 24,
+        angle: float = math.pi / 4.0,
+        t: float = 0.127,
+        formulation: str = "bars-and-hinges",
+        radius: float = RADIUS,
+    ) -> None:
+        radii = [radius + PLEAT * i for i in range(PLEATS)]
         folds = ["mountain" if i % 2 == 0 else "valley" for i in range(PLEATS)]
         pattern = meshes.annulus_sector(radii, PLEAT, angle, folds)  # type: ignore[arg-type]
         self.mesh = meshes.structured(pattern, along=along, rows=2)
@@ -117,7 +124,8 @@ class Fan:
         places = ["edge:inner", *(f"crease:{name}" for name in self.mesh.creases), "edge:outer"]
         across = np.abs(self.mesh.points @ self.et)
         self.line = [int(nodes[np.argmin(across[nodes])]) for nodes in map(self.mesh.nodes, places)]
-        model = Model(self.mesh, Sheet(E=4000.0, t=t)).support(self.line, [self.et.tolist()])
+        model = Model(self.mesh, Sheet(E=4000.0, t=t), formulation=formulation)
+        model = model.support(self.line, [self.et.tolist()])
         model = model.support(self.line[0::2], "z").support(self.line[:1], [self.er.tolist()])
         model = model.support("rigid-body")
         self.folded = model.fold("all", by=0.5 * math.pi, Lstar=2.0)

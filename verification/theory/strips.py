@@ -5,6 +5,8 @@ Poisson's ratio is zero (G = E / 2), as in section 3.4.1 of the source. MPa, mm,
 
 from __future__ import annotations
 
+import math
+
 
 def tension(E: float, L: float, H: float, t: float, elongation: float) -> float:
     """1/2 E H t / L u^2."""
@@ -58,3 +60,16 @@ def bending_ratio_alternating(alpha: float) -> float:
 def uniform_load_work(E: float, L: float, H: float, t: float, pressure: float = 1.0) -> float:
     """1/2 q u integrated over a simply supported beam: (p H)^2 L^5 / (240 E I), I = H t^3 / 12."""
     return (pressure * H) ** 2 * L**5 / (240.0 * E * H * t**3 / 12.0)
+
+
+def arc_azimuth(angle: float) -> float:
+    """Direction in which a flat circular cantilever is stiffest at its tip, rad from the radius (to the centre).
+
+    The arc of radius 1 takes `angle` (rad) and is fixed at its other end. Bending alone: a force along a line through
+    the tip has the moment of the distance from that line, so the stiff line is the principal axis of the least second
+    moment of the arc about the tip, where s runs from the tip, X = 1 - cos s to the centre and Y = sin s along the arc.
+    """
+    xx = 1.5 * angle - 2.0 * math.sin(angle) + 0.25 * math.sin(2.0 * angle)
+    yy = 0.5 * angle - 0.25 * math.sin(2.0 * angle)
+    xy = (1.0 - math.cos(angle)) - 0.5 * math.sin(angle) ** 2
+    return 0.5 * math.atan2(2.0 * xy, xx - yy)
