@@ -1,0 +1,406 @@
+"""A solved sheet against a point cloud, such as a laser scan of a folded paper model (source 3.4.3).
+
+The scan is brought onto the sheet by a rigid motion: three picked points first, then every point of the cloud is drawn
+to the nearest point of the sheet. Points beyond `TRIM` robust standard deviations take no part, so stray points do
+not matter, and holes of the scan do not either, because nothing looks for scan points near the sheet. Lengths in mm.
+
+The steps are Gauss-Newton steps of the squared distances (Chen and Medioni 1992: towards the tangent plane; towards the
+edge line where the sheet ends). The point-to-point iteration of Besl and McKay (1992), as VTK has it, creeps where the
+sheet can slide in itself: see docs/scan.md for the measurement.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bh.errors import InputError
+from bh.state import State
+from meshes.errors import FileFormatError
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+SUFFIXES = (".ply", ".xyz", ".txt", ".csv", ".stl")
+TRIM = 3.0  # robust standard deviations beyond which a scan point is taken for a stray one
+COARSE = 4000  # points of the first rounds
+MOST_ROUNDS = 60
+
+
+class ScanError(InputError):
+    """A scan that cannot be read, registered or compared."""
+
+
+# ------------------------------------------------------------------------------------------------- reading
+
+
+def read_cloud(file: str | os.PathLike[str], unit: float = 1.0, every: int = 1) -> Array:
+    """The points (k, 3) of a scan, mm.
+
+    Args:
+        file: .ply or .stl (their vertices), or text with x y z first in every line (.xyz, .txt, .csv).
+        unit: length of the file's unit, mm: 25.4 for inches.
+        every: keep every so many points; the source keeps every fifth.
+
+    Raises:
+        FileFormatError: no such file, another suffix, not what the suffix says, no points, or numbers that are not finite.
+    """
+    place = FilePath(file)
+    suffix = place.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise FileFormatError(f"scan '{place}': suffix '{suffix}' is not known; use one of {', '.join(SUFFIXES)}")
+    if not (math.isfinite(unit) and unit > 0.0):
+        raise ScanError(f"unit = {unit} cannot be; give the length of the file's unit in mm, such as 25.4 for inches")
+    if int(every) != every or every < 1:
+        raise ScanError(f"every = {every} cannot be; give a whole number from 1")
+    try:
+        if place.stat().st_size == 0:
+            raise FileFormatError(f"scan '{place}' is empty; export it anew")
+        points = _text(place) if suffix in (".xyz", ".txt", ".csv") else _binary(place, suffix)
+    except OSError as error:
+        raise FileFormatError(f"scan '{place}' cannot be read ({error.strerror or error}); name a file") from error
+    return _cloud(points, f"scan '{place}'")[:: int(every)] * unit
+
+
+def _text(place: FilePath) -> Array:
+    rows = []
+    for number, line in enumerate(place.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+        words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
+        if not words:
+            continue
+        try:
+            rows.append([float(word) for word in words[:3]])
+        except ValueError:
+            if not rows:
+                continue  # a heading
+            raise FileFormatError(f"scan '{place}', line {number} is not numbers; give x y z in every line") from None
+        if len(words) < 3:
+            raise FileFormatError(f"scan '{place}', line {number} has {len(words)} numbers; give x y z in every line")
+    return np.array(rows, dtype=float).reshape(-1, 3)
+
+
+def _binary(place: FilePath, suffix: str) -> Array:
+    import meshio
+
+    what = suffix[1:].upper()
+    try:
+        reader = meshio.ply.read if suffix == ".ply" else meshio.stl.read
+        with np.errstate(all="ignore"):
+            points = np.asarray(reader(str(place)).points, dtype=float).reshape(-1, 3)
+    except OSError:
+        raise
+    except Exception as error:  # meshio raises many kinds on broken files
+        raise FileFormatError(f"scan '{place}' is not a whole {what} file; export it anew") from error
+    if suffix == ".ply":
+        with place.open("rb") as file:
+            head = file.read(10_000).split(b"end_header")[0].split(b"element vertex ")[1]
+        promised = int(head.split()[0])
+        if promised != len(points):
+            raise FileFormatError(
+                f"scan '{place}' ends after {len(points)} of {promised} points; export it anew"
+            )
+    return points
+
+
+def _cloud(points: ArrayLike, name: str, least: int = 1) -> Array:
+    """Finite points (k, 3), at least so many."""
+    try:
+        found = np.array(points, dtype=float)
+    except (TypeError, ValueError):
+        raise ScanError(f"{name} is not an array of numbers; give (k, 3) points in mm") from None
+    if found.ndim != 2 or found.shape[1:] != (3,) or len(found) < least:
+        if found.size == 0:
+            raise ScanError(f"{name} holds no points; give at least {least}")
+        raise ScanError(f"{name} has shape {found.shape}; give (k, 3) points in mm, at least {least}")
+    if not np.isfinite(found).all():
+        row = int(np.argmin(np.isfinite(found).all(axis=1)))
+        raise ScanError(f"{name}: point {row} is not finite; remove it")
+    return found
+
+
+# ------------------------------------------------------------------------------------------------- motions
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """x -> rotation x + translation; a proper rotation (3, 3) and a translation (3,), mm."""
+
+    rotation: Array
+    translation: Array
+
+    def apply(self, points: ArrayLike) -> Array:
+        """(k, 3) moved points."""
+        moved: Array = np.asarray(points, dtype=float) @ self.rotation.T + self.translation
+        return moved
+
+    def after(self, first: Motion) -> Motion:
+        """The motion `first`, then this one."""
+        return Motion(self.rotation @ first.rotation, self.apply(first.translation))
+
+    def inverse(self) -> Motion:
+        return Motion(self.rotation.T, -self.rotation.T @ self.translation)
+
+    @property
+    def angle(self) -> float:
+        """Angle of the rotation, rad in [0, pi]."""
+        from scipy.spatial.transform import Rotation
+
+        return float(Rotation.from_matrix(self.rotation).magnitude())
+
+    @classmethod
+    def about(cls, centre: ArrayLike, rotation_vector: ArrayLike, translation: ArrayLike) -> Motion:
+        """Rotation by a vector (rad) about a centre, then a translation."""
+        from scipy.spatial.transform import Rotation
+
+        R = Rotation.from_rotvec(np.asarray(rotation_vector, dtype=float)).as_matrix()
+        c = np.asarray(centre, dtype=float)
+        return cls(R, c - R @ c + np.asarray(translation, dtype=float))
+
+
+IDENTITY = Motion(np.eye(3), np.zeros(3))
+
+
+def align(points: ArrayLike, targets: ArrayLike, names: tuple[str, str] = ("points", "targets")) -> Motion:
+    """The rigid motion of `points` (k, 3) that brings them nearest to `targets` (k, 3), row by row (Kabsch 1976).
+
+    Raises:
+        ScanError: fewer than three, not as many, not finite, or on one line.
+    """
+    from scipy.spatial.transform import Rotation
+
+    a, b = (_cloud(rows, name, 3) for rows, name in zip((points, targets), names, strict=True))
+    if len(a) != len(b):
+        raise ScanError(f"{len(a)} {names[0]} for {len(b)} {names[1]}; give as many")
+    for rows, name in ((a, names[0]), (b, names[1])):
+        extents = np.linalg.svd(rows - rows.mean(axis=0), compute_uv=False)
+        if extents[1] <= 1e-3 * extents[0]:
+            raise ScanError(f"the {name} lie on one line; pick points that span a triangle")
+    R = Rotation.align_vectors(b - b.mean(axis=0), a - a.mean(axis=0))[0].as_matrix()
+    return Motion(R, b.mean(axis=0) - R @ a.mean(axis=0))
+
+
+def picked(on_cloud: ArrayLike, on_sheet: ArrayLike) -> Motion:
+    """First guess from three or more points picked on the scan (k, 3) and the same ones of the sheet (k, 3).
+
+    Corners and ends of creases serve best: `state.points[state.mesh.corners["corner:inner-start"]]`.
+
+    Raises:
+        ScanError: fewer than three, not finite, or on one line.
+    """
+    return align(on_cloud, on_sheet, ("points picked on the scan", "points picked on the sheet"))
+
+
+# ------------------------------------------------------------------------------------------------- nearest points
+
+
+class Surface:
+    """The triangles of a solved sheet, ready to be asked for nearest points (a cell locator of VTK)."""
+
+    def __init__(self, state: State) -> None:
+        import pyvista as pv
+
+        if not (hasattr(state, "points") and hasattr(state, "mesh")):
+            raise ScanError(f"a {type(state).__name__} is not a state; give one of a path, such as path[-1]")
+        mesh = state.mesh
+        self.points: Array = np.asarray(state.points, dtype=float)
+        self.triangles: Ints = mesh.triangles
+        self._data = pv.PolyData.from_regular_faces(self.points, self.triangles)
+        sides = mesh.triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+        alone = mesh.topology.edge_triangles[mesh.topology.find_edges(sides), 1] < 0
+        self._free = alone.reshape(-1, 3)  # is the side opposite to each corner an edge of the sheet?
+
+    def nearest(self, points: Array) -> tuple[Array, Ints]:
+        """(k, 3) nearest points of the sheet, and the triangles (k,) that they lie on."""
+        cells, found = self._data.find_closest_cell(points, return_closest_point=True)
+        return np.asarray(found, dtype=float).reshape(-1, 3), np.asarray(cells, dtype=np.int64).reshape(-1)
+
+    def on_edge(self, found: Array, cells: Ints) -> NDArray[np.bool_]:
+        """(k,) do these points of triangles `cells` lie on an edge of the sheet?"""
+        p = self.points[self.triangles[cells]]
+        height = np.empty((len(found), 3))  # of the point over each side, relative to the triangle's
+        for corner in range(3):
+            a, b, c = p[:, corner], p[:, (corner + 1) % 3], p[:, (corner + 2) % 3]
+            whole = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+            height[:, corner] = np.linalg.norm(np.cross(b - found, c - found), axis=1) / whole
+        on: NDArray[np.bool_] = ((height < 1e-6) & self._free[cells]).any(axis=1)
+        return on
+
+    def enriched(self, spacing: float) -> Array:
+        """Points (k, 3) of the sheet not more than about `spacing` (mm) apart: the triangles halved again and again."""
+        if not (math.isfinite(spacing) and spacing > 0.0):
+            raise ScanError(f"spacing = {spacing} cannot be; give a positive distance in mm")
+        p = self.points[self.triangles]
+        longest = float(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max())
+        times = max(0, math.ceil(math.log2(longest / spacing)))
+        if len(p) * 4**times > 2e7:
+            raise ScanError(f"spacing = {spacing} makes {len(p) * 4**times:.1g} triangles; use a larger one")
+        data = self._data.subdivide(times, "linear") if times else self._data
+        return np.asarray(data.points, dtype=float)
+
+
+# ------------------------------------------------------------------------------------------------- registration
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """How a scan was brought onto a sheet.
+
+    Attributes:
+        motion: of the scan.
+        kept: (k,) points that took part; the others lie beyond `TRIM` robust standard deviations.
+        noise: root mean square distance of the points that took part, normal to the sheet, mm.
+        standard_error: (6,) standard errors of translation (mm) and rotation (rad about x, y, z through `centre`), if the
+            distances are independent: noise times the root of the diagonal of (J^T J)^-1.
+        centre: (3,) mean of the moved points, mm.
+        rounds: number of steps.
+    """
+
+    motion: Motion
+    kept: NDArray[np.bool_]
+    noise: float
+    standard_error: Array
+    centre: Array
+    rounds: int
+
+
+def register(cloud: ArrayLike, state: State | Surface, start: Motion = IDENTITY) -> Registration:
+    """The rigid motion that brings a scan (k, 3) onto a solved sheet, from the first guess `start`; see the module.
+
+    Raises:
+        ScanError: no points, not finite, the sheet can slide in itself (a flat or round one without edges in the scan),
+            or no convergence.
+    """
+    points = _cloud(cloud, "the scan", 6)
+    surface = state if isinstance(state, Surface) else Surface(state)
+    motion, rounds = start, 0
+    step = max(1, len(points) // COARSE)
+    if step > 1:  # spread over the scan, whatever order it has
+        some = points[np.random.default_rng(0).permutation(len(points))[:COARSE]]
+        motion, rounds, *_ = _rounds(some, surface, motion)
+    motion, more, kept, noise, error, centre = _rounds(points, surface, motion)
+    return Registration(motion, kept, noise, error, centre, rounds + more)
+
+
+def _rounds(points: Array, surface: Surface, motion: Motion) -> tuple[Motion, int, Any, float, Array, Array]:
+    size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    kept: Any = None
+    frozen = False
+    for number in range(1, MOST_ROUNDS + 1):
+        x = motion.apply(points)
+        near, cells = surface.nearest(x)
+        gap = x - near
+        distance = np.linalg.norm(gap, axis=1)
+        if not frozen:  # strays are chosen anew until the motion has settled, else they could come and go for ever
+            kept = distance <= TRIM * 1.4826 * float(np.median(distance)) + 1e-9 * size
+        rows, right, centre = _equations(x, near, cells, gap, distance, kept, surface)
+        # a turn is measured as what it moves at the rim, so that all unknowns are lengths
+        arm = 0.5 * size
+        matrix = rows / np.array([1.0, 1.0, 1.0, arm, arm, arm])
+        normal = matrix.T @ matrix
+        values, vectors = np.linalg.eigh(normal)
+        if values[0] <= 1e-9 * values[-1]:
+            raise ScanError("the scan can slide along the sheet without notice; scan its edges or creases too")
+        move = vectors @ ((vectors.T @ (matrix.T @ right)) / values)
+        # far from the solution the tangent planes mean little
+        move *= min(1.0, 0.1 * size / float(np.abs(move).max(initial=1e-300)))
+        motion = Motion.about(centre, move[3:] / arm, move[:3]).after(motion)
+        largest = float(np.abs(move).max())
+        noise = math.sqrt(float(right @ right) / len(right))
+        if frozen and largest < max(1e-4 * noise, 1e-9 * size):
+            covariance = vectors @ np.diag(1.0 / values) @ vectors.T
+            error = noise * np.sqrt(np.diag(covariance)) / np.array([1.0, 1.0, 1.0, arm, arm, arm])
+            return motion, number, kept, noise, error, centre
+        frozen = frozen or largest < max(0.05 * noise, 1e-6 * size) or number == MOST_ROUNDS // 2
+    raise ScanError(f"the scan did not settle on the sheet in {MOST_ROUNDS} rounds; pick the points more exactly")
+
+
+def _equations(
+    x: Array, near: Array, cells: Ints, gap: Array, distance: Array, kept: NDArray[np.bool_], surface: Surface
+) -> tuple[Array, Array, Array]:
+    """Rows (m, 6) of translation and rotation about the centre (3,), and their right-hand side (m,).
+
+    One row a point, along the normal; beyond an edge of the sheet two, both across that edge.
+    """
+    corners = surface.points[surface.triangles[cells]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    # outside a ridge the nearest point has no single normal: the gap itself is the direction
+    apart = distance > 1e-9 * (1.0 + np.abs(x).max(axis=1))
+    direction = np.where(apart[:, None], gap / np.where(apart, distance, 1.0)[:, None], normal)
+    beyond = kept & apart & surface.on_edge(near, cells)
+    beyond &= np.abs((direction * normal).sum(axis=1)) < 1.0 - 1e-9
+    outward = gap - (gap * normal).sum(axis=1)[:, None] * normal
+    outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
+    direction = np.where(beyond[:, None], normal, direction)
+    at = np.vstack((x[kept], x[beyond]))
+    along = np.vstack((direction[kept], outward[beyond]))
+    right = -(np.vstack((gap[kept], gap[beyond])) * along).sum(axis=1)
+    centre = x[kept].mean(axis=0)
+    return np.hstack((along, np.cross(at - centre, along))), right, centre
+
+
+# ------------------------------------------------------------------------------------------------- distances
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Distances `values` (k,) of `points` (k, 3) to the other set, mm."""
+
+    points: Array
+    values: Array
+
+    @property
+    def mean(self) -> float:
+        return float(self.values.mean())
+
+    @property
+    def median(self) -> float:
+        return float(np.median(self.values))
+
+    @property
+    def standard_deviation(self) -> float:
+        """Of the distances about their mean, as the source has it."""
+        return float(self.values.std())
+
+    @property
+    def max(self) -> float:
+        return float(self.values.max())
+
+    def __repr__(self) -> str:
+        """One line: "Distances(mean 0.101, median 0.0857, standard deviation 0.0766, max 0.55 mm; 65343 points)"."""
+        return (
+            f"Distances(mean {self.mean:.3g}, median {self.median:.3g}, standard deviation "
+            f"{self.standard_deviation:.3g}, max {self.max:.3g} mm; {len(self.values)} points)"
+        )
+
+
+def distances(
+    cloud: ArrayLike,
+    state: State | Surface,
+    way: Literal["cloud-to-sheet", "sheet-to-cloud"] = "cloud-to-sheet",
+    spacing: float = 1.0,
+) -> Distances:
+    """Distances between a registered scan (k, 3) and a solved sheet, mm.
+
+    Args:
+        way: "cloud-to-sheet" (the default) is the distance of every scan point to the surface: exact, the same for any
+            density of the scan, blind to holes, and sees stray points. "sheet-to-cloud" is the source's: from every
+            point of the enriched mesh to the nearest scan point. A hole counts there as an error as large as itself,
+            and noise as less than it is, since of many scan points the nearest is taken.
+        spacing: of the enriched mesh, mm.
+    """
+    points = _cloud(cloud, "the scan")
+    surface = state if isinstance(state, Surface) else Surface(state)
+    if way == "cloud-to-sheet":
+        return Distances(points, np.linalg.norm(points - surface.nearest(points)[0], axis=1))
+    if way != "sheet-to-cloud":
+        raise ScanError(f"way '{way}' is not known; use cloud-to-sheet or sheet-to-cloud")
+    from scipy.spatial import cKDTree
+
+    enriched = surface.enriched(spacing)
+    return Distances(enriched, cKDTree(points).query(enriched)[0])
