@@ -33,7 +33,7 @@ _HOME = {
     "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
 }  # fmt: skip
 
-_SUBMODULES = {"contact": "bh.analysis.contact", "plotting": "bh.plotting"}
+_SUBMODULES = {"contact": "bh.analysis.contact", "plotting": "bh.plotting", "scan": "bh.scan"}
 
 __all__ = [
     "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",

@@ -30,6 +30,7 @@ SUFFIXES = (".ply", ".xyz", ".txt", ".csv", ".stl")
 TRIM = 3.0  # robust standard deviations beyond which a scan point is taken for a stray one
 COARSE = 4000  # points of the first rounds
 MOST_ROUNDS = 60
+SETTLED = 0.02  # of the standard error: the motion has settled when a step is shorter
 
 
 class ScanError(InputError):
@@ -306,16 +307,18 @@ def _rounds(points: Array, surface: Surface, motion: Motion) -> tuple[Motion, in
         if values[0] <= 1e-9 * values[-1]:
             raise ScanError("the scan can slide along the sheet without notice; scan its edges or creases too")
         move = vectors @ ((vectors.T @ (matrix.T @ right)) / values)
-        # far from the solution the tangent planes mean little
-        move *= min(1.0, 0.1 * size / float(np.abs(move).max(initial=1e-300)))
+        noise = math.sqrt(float(right @ right) / len(right))
+        # the step in standard errors: where little holds the sheet, little can be known
+        step = math.sqrt(float(move @ normal @ move)) / max(noise, 1e-300)
+        # far from the solution the tangent planes mean little; near it a few points change sides to and fro
+        move *= min(0.5 if frozen else 1.0, 0.1 * size / float(np.abs(move).max(initial=1e-300)))
         motion = Motion.about(centre, move[3:] / arm, move[:3]).after(motion)
         largest = float(np.abs(move).max())
-        noise = math.sqrt(float(right @ right) / len(right))
-        if frozen and largest < max(1e-4 * noise, 1e-9 * size):
+        if frozen and (step < SETTLED or largest < 1e-9 * size):
             covariance = vectors @ np.diag(1.0 / values) @ vectors.T
             error = noise * np.sqrt(np.diag(covariance)) / np.array([1.0, 1.0, 1.0, arm, arm, arm])
             return motion, number, kept, noise, error, centre
-        frozen = frozen or largest < max(0.05 * noise, 1e-6 * size) or number == MOST_ROUNDS // 2
+        frozen = frozen or step < 1.0 or largest < 1e-6 * size or number == MOST_ROUNDS // 2
     raise ScanError(f"the scan did not settle on the sheet in {MOST_ROUNDS} rounds; pick the points more exactly")
 
 
