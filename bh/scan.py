@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bh.analysis.scan import (
     IDENTITY,
+    TRIM,
     Distances,
     Motion,
     Registration,
@@ -43,8 +44,9 @@ class Comparison:
     Attributes:
         state: the sheet.
         registration: how the scan was moved.
-        cloud_to_sheet: distances of the scan points that took part (strays left out) to the surface.
-        sheet_to_cloud: the source's distances, of the enriched mesh to the nearest scan point (strays in).
+        cloud_to_sheet: distances of all scan points to the surface; `.of(registration.kept)` leaves stray points out, but
+            also places where the sheet is really elsewhere.
+        sheet_to_cloud: the source's distances, of the enriched mesh to the nearest scan point.
     """
 
     state: State
@@ -58,23 +60,26 @@ class Comparison:
         return int((~self.registration.kept).sum())
 
 
-def compare(cloud: ArrayLike, state: State, start: Motion = IDENTITY, spacing: float = 1.0) -> Comparison:
+def compare(
+    cloud: ArrayLike, state: State, start: Motion = IDENTITY, spacing: float = 1.0, trim: float = TRIM
+) -> Comparison:
     """Register a scan (k, 3) on a solved sheet from the first guess `start` and measure the distances both ways.
 
     Args:
         start: of `picked`, or of an earlier registration.
         spacing: of the enriched mesh, mm.
+        trim: see `register`.
 
     Raises:
         ScanError: see `register` and `distances`.
     """
     surface = Surface(state)
-    found = register(cloud, surface, start)
+    found = register(cloud, surface, start, trim)
     moved = found.motion.apply(cloud)
     return Comparison(
         state,
         found,
-        distances(moved[found.kept], surface),
+        distances(moved, surface),
         distances(moved, surface, "sheet-to-cloud", spacing),
     )
 

@@ -15,6 +15,7 @@ CASES = {
     "consistent": "verification.consistent",
     "convergence": "verification.convergence",
     "derivatives": "verification.derivatives",
+    "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
 }
 LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds

@@ -232,16 +232,15 @@ class Surface:
         return on
 
     def enriched(self, spacing: float) -> Array:
-        """Points (k, 3) of the sheet not more than about `spacing` (mm) apart: the triangles halved again and again."""
+        """Points (k, 3) of the sheet, its nodes among them: edges longer than `spacing` (mm) are halved again and again."""
         if not (math.isfinite(spacing) and spacing > 0.0):
             raise ScanError(f"spacing = {spacing} cannot be; give a positive distance in mm")
         p = self.points[self.triangles]
-        longest = float(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max())
-        times = max(0, math.ceil(math.log2(longest / spacing)))
-        if len(p) * 4**times > 2e7:
-            raise ScanError(f"spacing = {spacing} makes {len(p) * 4**times:.1g} triangles; use a larger one")
-        data = self._data.subdivide(times, "linear") if times else self._data
-        return np.asarray(data.points, dtype=float)
+        area = 0.5 * float(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum())
+        if area / spacing**2 > 2e6:
+            raise ScanError(f"spacing = {spacing} makes some {4 * area / spacing**2:.1g} points; use a larger one")
+        finer = self._data.subdivide_adaptive(max_edge_len=spacing, max_tri_area=spacing**2, max_n_passes=30)
+        return np.asarray(finer.points, dtype=float)
 
 
 # ------------------------------------------------------------------------------------------------- registration
@@ -253,7 +252,7 @@ class Registration:
 
     Attributes:
         motion: of the scan.
-        kept: (k,) points that took part; the others lie beyond `TRIM` robust standard deviations.
+        kept: (k,) points that took part; the others lie beyond `trim` robust standard deviations.
         noise: root mean square distance of the points that took part, normal to the sheet, mm.
         standard_error: (6,) standard errors of translation (mm) and rotation (rad about x, y, z through `centre`), if the
             distances are independent: noise times the root of the diagonal of (J^T J)^-1.
@@ -269,25 +268,35 @@ class Registration:
     rounds: int
 
 
-def register(cloud: ArrayLike, state: State | Surface, start: Motion = IDENTITY) -> Registration:
+def register(
+    cloud: ArrayLike, state: State | Surface, start: Motion = IDENTITY, trim: float = TRIM
+) -> Registration:
     """The rigid motion that brings a scan (k, 3) onto a solved sheet, from the first guess `start`; see the module.
+
+    Args:
+        trim: robust standard deviations (1.4826 times the median distance) beyond which a point takes no part; infinite
+            for plain least squares, fit for clean clouds that differ from the sheet.
 
     Raises:
         ScanError: no points, not finite, the sheet can slide in itself (a flat or round one without edges in the scan),
             or no convergence.
     """
     points = _cloud(cloud, "the scan", 6)
+    if not trim >= 1.0:
+        raise ScanError(f"trim = {trim} cannot be; give robust standard deviations from 1, such as 3")
     surface = state if isinstance(state, Surface) else Surface(state)
     motion, rounds = start, 0
     step = max(1, len(points) // COARSE)
     if step > 1:  # spread over the scan, whatever order it has
         some = points[np.random.default_rng(0).permutation(len(points))[:COARSE]]
-        motion, rounds, *_ = _rounds(some, surface, motion)
-    motion, more, kept, noise, error, centre = _rounds(points, surface, motion)
+        motion, rounds, *_ = _rounds(some, surface, motion, trim)
+    motion, more, kept, noise, error, centre = _rounds(points, surface, motion, trim)
     return Registration(motion, kept, noise, error, centre, rounds + more)
 
 
-def _rounds(points: Array, surface: Surface, motion: Motion) -> tuple[Motion, int, Any, float, Array, Array]:
+def _rounds(
+    points: Array, surface: Surface, motion: Motion, trim: float
+) -> tuple[Motion, int, Any, float, Array, Array]:
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     kept: Any = None
     frozen = False
@@ -297,7 +306,7 @@ def _rounds(points: Array, surface: Surface, motion: Motion) -> tuple[Motion, in
         gap = x - near
         distance = np.linalg.norm(gap, axis=1)
         if not frozen:  # strays are chosen anew until the motion has settled, else they could come and go for ever
-            kept = distance <= TRIM * 1.4826 * float(np.median(distance)) + 1e-9 * size
+            kept = distance <= trim * 1.4826 * float(np.median(distance)) + 1e-9 * size
         rows, right, centre = _equations(x, near, cells, gap, distance, kept, surface)
         # a turn is measured as what it moves at the rim, so that all unknowns are lengths
         arm = 0.5 * size
@@ -373,6 +382,11 @@ class Distances:
     @property
     def max(self) -> float:
         return float(self.values.max())
+
+    def of(self, which: ArrayLike) -> Distances:
+        """Those of some points only, such as `registration.kept`."""
+        mask = np.asarray(which)
+        return Distances(self.points[mask], self.values[mask])
 
     def __repr__(self) -> str:
         """One line: "Distances(mean 0.101, median 0.0857, standard deviation 0.0766, max 0.55 mm; 65343 points)"."""
