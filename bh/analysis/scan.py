@@ -28,7 +28,7 @@ from meshes.topology import Ints
 Array = NDArray[np.float64]
 SUFFIXES = (".ply", ".xyz", ".txt", ".csv", ".stl")
 TRIM = 3.0  # robust standard deviations beyond which a scan point is taken for a stray one
-COARSE = 4000  # points of the first rounds
+COARSE, COARSE_ROUNDS = 4000, 9  # points and rounds before all points take part
 MOST_ROUNDS = 60
 SETTLED = 0.02  # of the standard error: the motion has settled when a step is shorter
 
@@ -289,55 +289,92 @@ def register(
     step = max(1, len(points) // COARSE)
     if step > 1:  # spread over the scan, whatever order it has
         some = points[np.random.default_rng(0).permutation(len(points))[:COARSE]]
-        motion, rounds, *_ = _rounds(some, surface, motion, trim)
+        motion, rounds, *_ = _rounds(some, surface, motion, trim, coarse=True)
     motion, more, kept, noise, error, centre = _rounds(points, surface, motion, trim)
     return Registration(motion, kept, noise, error, centre, rounds + more)
 
 
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The least-squares problem at one motion: unknowns are lengths (a turn is what it moves the rim by)."""
+
+    motion: Motion
+    cost: float
+    normal: Array
+    right: Array
+    noise: float
+    centre: Array
+
+    def step(self, damping: float) -> Array:
+        """Step (6,) with a share of the diagonal added (Levenberg 1944, Marquardt 1963)."""
+        step: Array = np.linalg.solve(self.normal + damping * np.diag(np.diag(self.normal)), self.right)
+        return step
+
+    def in_errors(self, step: Array) -> float:
+        """Length of a step in standard errors."""
+        return math.sqrt(float(step @ self.normal @ step)) / max(self.noise, 1e-300)
+
+
 def _rounds(
-    points: Array, surface: Surface, motion: Motion, trim: float
+    points: Array, surface: Surface, motion: Motion, trim: float, coarse: bool = False
 ) -> tuple[Motion, int, Any, float, Array, Array]:
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    arm = 0.5 * size
     kept: Any = None
-    frozen = False
-    for number in range(1, MOST_ROUNDS + 1):
+    best: _Fit | None = None
+    frozen, damping = False, 0.0
+    most = COARSE_ROUNDS if coarse else MOST_ROUNDS
+    for number in range(1, most + 1):
         x = motion.apply(points)
         near, cells = surface.nearest(x)
-        gap = x - near
-        distance = np.linalg.norm(gap, axis=1)
+        distance = np.linalg.norm(x - near, axis=1)
         if not frozen:  # strays are chosen anew until the motion has settled, else they could come and go for ever
             kept = distance <= trim * 1.4826 * float(np.median(distance)) + 1e-9 * size
-        rows, right, centre = _equations(x, near, cells, gap, distance, kept, surface)
-        # a turn is measured as what it moves at the rim, so that all unknowns are lengths
-        arm = 0.5 * size
-        matrix = rows / np.array([1.0, 1.0, 1.0, arm, arm, arm])
-        normal = matrix.T @ matrix
-        values, vectors = np.linalg.eigh(normal)
-        if values[0] <= 1e-9 * values[-1]:
-            raise ScanError("the scan can slide along the sheet without notice; scan its edges or creases too")
-        move = vectors @ ((vectors.T @ (matrix.T @ right)) / values)
-        noise = math.sqrt(float(right @ right) / len(right))
-        # the step in standard errors: where little holds the sheet, little can be known
-        step = math.sqrt(float(move @ normal @ move)) / max(noise, 1e-300)
-        # far from the solution the tangent planes mean little; near it a few points change sides to and fro
-        move *= min(0.5 if frozen else 1.0, 0.1 * size / float(np.abs(move).max(initial=1e-300)))
-        motion = Motion.about(centre, move[3:] / arm, move[:3]).after(motion)
-        largest = float(np.abs(move).max())
-        if frozen and (step < SETTLED or largest < 1e-9 * size):
-            covariance = vectors @ np.diag(1.0 / values) @ vectors.T
-            error = noise * np.sqrt(np.diag(covariance)) / np.array([1.0, 1.0, 1.0, arm, arm, arm])
-            return motion, number, kept, noise, error, centre
-        frozen = frozen or step < 1.0 or largest < 1e-6 * size or number == MOST_ROUNDS // 2
-    raise ScanError(f"the scan did not settle on the sheet in {MOST_ROUNDS} rounds; pick the points more exactly")
+        cost = float((distance[kept] ** 2).sum())
+        if frozen and best is not None and cost > best.cost * (1.0 + 1e-12):
+            damping = max(4.0 * damping, 0.25)  # a few points at edges and ridges changed sides: go more slowly
+        else:
+            fit = _fit(motion, cost, x, near, cells, kept, surface, arm)
+            best, damping = fit, 0.25 * damping
+        step = best.step(damping)
+        largest = float(np.abs(step).max())
+        settled = best.in_errors(step) < SETTLED or largest < 1e-9 * size
+        if frozen and settled:
+            break
+        frozen = frozen or best.in_errors(step) < 1.0 or settled or number >= most // 3
+        # far from the solution the tangent planes mean little
+        step *= min(1.0, 0.1 * size / max(largest, 1e-300))
+        motion = Motion.about(best.centre, step[3:] / arm, step[:3]).after(best.motion)
+    else:
+        if not coarse:
+            raise ScanError(f"the scan did not settle on the sheet in {most} rounds; pick the points more exactly")
+    assert best is not None
+    error = best.noise * np.sqrt(np.diag(np.linalg.inv(best.normal))) / np.repeat((1.0, arm), 3)
+    return best.motion, number, kept, best.noise, error, best.centre
+
+
+def _fit(
+    motion: Motion, cost: float, x: Array, near: Array, cells: Ints, kept: Any, surface: Surface, arm: float
+) -> _Fit:
+    rows, right, centre = _equations(x, near, cells, kept, surface)
+    rows = rows / np.repeat((1.0, arm), 3)
+    normal = rows.T @ rows
+    values = np.linalg.eigvalsh(normal)
+    if values[0] <= 1e-9 * values[-1]:
+        raise ScanError("the scan can slide along the sheet without notice; scan its edges or creases too")
+    noise = math.sqrt(float(right @ right) / len(right))
+    return _Fit(motion, cost, normal, rows.T @ right, noise, centre)
 
 
 def _equations(
-    x: Array, near: Array, cells: Ints, gap: Array, distance: Array, kept: NDArray[np.bool_], surface: Surface
+    x: Array, near: Array, cells: Ints, kept: NDArray[np.bool_], surface: Surface
 ) -> tuple[Array, Array, Array]:
     """Rows (m, 6) of translation and rotation about the centre (3,), and their right-hand side (m,).
 
     One row a point, along the normal; beyond an edge of the sheet two, both across that edge.
     """
+    gap = x - near
+    distance = np.linalg.norm(gap, axis=1)
     corners = surface.points[surface.triangles[cells]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
