@@ -49,7 +49,8 @@ def read_cloud(file: str | os.PathLike[str], unit: float = 1.0, every: int = 1) 
         every: keep every so many points; the source keeps every fifth.
 
     Raises:
-        FileFormatError: no such file, another suffix, not what the suffix says, no points, or numbers that are not finite.
+        FileFormatError: no such file, another suffix, or not what the suffix says.
+        ScanError: no points, or some that are not finite.
     """
     place = FilePath(file)
     suffix = place.suffix.lower()
