@@ -44,8 +44,8 @@ class Comparison:
     Attributes:
         state: the sheet.
         registration: how the scan was moved.
-        cloud_to_sheet: distances of all scan points to the surface; `.of(registration.kept)` leaves stray points out, but
-            also places where the sheet is really elsewhere.
+        cloud_to_sheet: distances of all scan points to the surface;
+            `.of(registration.kept)` leaves stray points out, but also places where the sheet is really elsewhere.
         sheet_to_cloud: the source's distances, of the enriched mesh to the nearest scan point.
     """
 

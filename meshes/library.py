@@ -81,7 +81,9 @@ def two_arcs(
     arcs: list[Curve] = []
     for r, y in zip(radii, at, strict=True):
         if 2.0 * r < width:
-            raise PatternError(f"an arc of radius {r:g} mm cannot cross a sheet {width:g} mm wide; give at least half")
+            raise PatternError(
+                f"an arc of radius {r:g} mm cannot cross a sheet {width:g} mm wide; give at least half"
+            )
         half = math.asin(0.5 * width / r)
         arcs.append(Arc((0.5 * width, y - r), r, 0.5 * math.pi + half, -2.0 * half))
     return _rectangle(width, height, arcs, folds)
@@ -105,7 +107,11 @@ def sine_tessellation(
     creases, amplitude = _count("creases", creases), _positive("amplitude", amplitude)
     k = 2.0 * math.pi * _positive("waves", waves) / width
     pitch = height / (creases + 1)
-    curves = [_graph(width, lambda x, y=i * pitch: y + amplitude * np.sin(k * x)) for i in range(1, creases + 1)]
+
+    def sine(middle: float) -> Curve:
+        return _graph(width, lambda x: middle + amplitude * np.sin(k * x))
+
+    curves = [sine(i * pitch) for i in range(1, creases + 1)]
     return _rectangle(width, height, curves, _alternating(creases) if folds is None else folds)
 
 
@@ -156,8 +162,10 @@ def _rectangle(width: float, height: float, curves: Sequence[Curve], folds: Fold
     rails = [Line((0.0, 0.0), (width, 0.0)), *curves, Line((0.0, height), (width, height))]
     for i, curve in enumerate(curves, 1):
         ends = curve.point(np.array([0.0, 1.0]))[:, 1]
-        if not (0.0 < ends.min() and ends.max() < height):
-            raise PatternError(f"crease {i} ends at y = {ends[0]:g} mm, not on a side of the sheet; move it inside")
+        if ends.min() <= 0.0 or ends.max() >= height:
+            raise PatternError(
+                f"crease {i} ends at y = {ends[0]:g} mm, not on a side of the sheet; move it inside"
+            )
     return _between_rails(rails, folds)
 
 

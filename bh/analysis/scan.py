@@ -55,9 +55,13 @@ def read_cloud(file: str | os.PathLike[str], unit: float = 1.0, every: int = 1) 
     place = FilePath(file)
     suffix = place.suffix.lower()
     if suffix not in SUFFIXES:
-        raise FileFormatError(f"scan '{place}': suffix '{suffix}' is not known; use one of {', '.join(SUFFIXES)}")
+        raise FileFormatError(
+            f"scan '{place}': suffix '{suffix}' is not known; use one of {', '.join(SUFFIXES)}"
+        )
     if not (math.isfinite(unit) and unit > 0.0):
-        raise ScanError(f"unit = {unit} cannot be; give the length of the file's unit in mm, such as 25.4 for inches")
+        raise ScanError(
+            f"unit = {unit} cannot be; give the length of the file's unit in mm, such as 25.4 for inches"
+        )
     if int(every) != every or every < 1:
         raise ScanError(f"every = {every} cannot be; give a whole number from 1")
     try:
@@ -65,7 +69,9 @@ def read_cloud(file: str | os.PathLike[str], unit: float = 1.0, every: int = 1) 
             raise FileFormatError(f"scan '{place}' is empty; export it anew")
         points = _text(place) if suffix in (".xyz", ".txt", ".csv") else _binary(place, suffix)
     except OSError as error:
-        raise FileFormatError(f"scan '{place}' cannot be read ({error.strerror or error}); name a file") from error
+        raise FileFormatError(
+            f"scan '{place}' cannot be read ({error.strerror or error}); name a file"
+        ) from error
     return _cloud(points, f"scan '{place}'")[:: int(every)] * unit
 
 
@@ -80,9 +86,13 @@ def _text(place: FilePath) -> Array:
         except ValueError:
             if not rows:
                 continue  # a heading
-            raise FileFormatError(f"scan '{place}', line {number} is not numbers; give x y z in every line") from None
+            raise FileFormatError(
+                f"scan '{place}', line {number} is not numbers; give x y z in every line"
+            ) from None
         if len(words) < 3:
-            raise FileFormatError(f"scan '{place}', line {number} has {len(words)} numbers; give x y z in every line")
+            raise FileFormatError(
+                f"scan '{place}', line {number} has {len(words)} numbers; give x y z in every line"
+            )
     return np.array(rows, dtype=float).reshape(-1, 3)
 
 
@@ -233,13 +243,15 @@ class Surface:
         return on
 
     def enriched(self, spacing: float) -> Array:
-        """Points (k, 3) of the sheet, its nodes among them: edges longer than `spacing` (mm) are halved again and again."""
+        """Points (k, 3) of the sheet, its nodes among them: edges longer than `spacing` (mm) are halved."""
         if not (math.isfinite(spacing) and spacing > 0.0):
             raise ScanError(f"spacing = {spacing} cannot be; give a positive distance in mm")
         p = self.points[self.triangles]
         area = 0.5 * float(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum())
         if area / spacing**2 > 2e6:
-            raise ScanError(f"spacing = {spacing} makes some {4 * area / spacing**2:.1g} points; use a larger one")
+            raise ScanError(
+                f"spacing = {spacing} makes some {4 * area / spacing**2:.1g} points; use a larger one"
+            )
         finer = self._data.subdivide_adaptive(max_edge_len=spacing, max_tri_area=spacing**2, max_n_passes=30)
         return np.asarray(finer.points, dtype=float)
 
@@ -255,8 +267,8 @@ class Registration:
         motion: of the scan.
         kept: (k,) points that took part; the others lie beyond `trim` robust standard deviations.
         noise: root mean square distance of the points that took part, normal to the sheet, mm.
-        standard_error: (6,) standard errors of translation (mm) and rotation (rad about x, y, z through `centre`), if the
-            distances are independent: noise times the root of the diagonal of (J^T J)^-1.
+        standard_error: (6,) standard errors of translation (mm) and rotation (rad about x, y, z through `centre`), if
+            the distances are independent: noise times the root of the diagonal of (J^T J)^-1.
         centre: (3,) mean of the moved points, mm.
         rounds: number of steps.
     """
@@ -329,11 +341,15 @@ def _rounds(
         x = motion.apply(points)
         near, cells = surface.nearest(x)
         distance = np.linalg.norm(x - near, axis=1)
-        if not frozen:  # strays are chosen anew until the motion has settled, else they could come and go for ever
+        if (
+            not frozen
+        ):  # strays are chosen anew until the motion has settled, else they could come and go for ever
             kept = distance <= trim * 1.4826 * float(np.median(distance)) + 1e-9 * size
         cost = float((distance[kept] ** 2).sum())
         if frozen and best is not None and cost > best.cost * (1.0 + 1e-12):
-            damping = max(4.0 * damping, 0.25)  # a few points at edges and ridges changed sides: go more slowly
+            damping = max(
+                4.0 * damping, 0.25
+            )  # a few points at edges and ridges changed sides: go more slowly
         else:
             fit = _fit(motion, cost, x, near, cells, kept, surface, arm)
             best, damping = fit, 0.25 * damping
@@ -348,9 +364,11 @@ def _rounds(
         motion = Motion.about(best.centre, step[3:] / arm, step[:3]).after(best.motion)
     else:
         if not coarse:
-            raise ScanError(f"the scan did not settle on the sheet in {most} rounds; pick the points more exactly")
+            raise ScanError(
+                f"the scan did not settle on the sheet in {most} rounds; pick the points more exactly"
+            )
     assert best is not None
-    error = best.noise * np.sqrt(np.diag(np.linalg.inv(best.normal))) / np.repeat((1.0, arm), 3)
+    error = np.sqrt(np.diag(np.linalg.inv(best.normal))) * (best.noise / np.repeat((1.0, arm), 3))
     return best.motion, number, kept, best.noise, error, best.centre
 
 

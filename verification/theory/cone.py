@@ -26,8 +26,8 @@ def folded_points(
 ) -> NDArray[np.float64]:
     """(k, 3) places of flat polar points after the fold, mm; the crease is the highest line, in z = 0.
 
-    A generator keeps its length: the distance from the apex is the flat radius. The half angle of the cones has the sine
-    R / r_f = sin(phi / 2), and the part outside the crease is mirrored in its plane.
+    A generator keeps its length: the distance from the apex is the flat radius. The half angle of the cones has the
+    sine R / r_f = sin(phi / 2), and the part outside the crease is mirrored in its plane.
     """
     sine = math.sin(0.5 * dihedral)
     turn = azimuth / sine
