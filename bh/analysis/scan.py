@@ -320,7 +320,8 @@ class _Fit:
 
     def step(self, damping: float) -> Array:
         """Step (6,) with a share of the diagonal added (Levenberg 1944, Marquardt 1963)."""
-        step: Array = np.linalg.solve(self.normal + damping * np.diag(np.diag(self.normal)), self.right)
+        matrix = self.normal + damping * np.diag(np.diag(self.normal))
+        step: Array = np.linalg.solve(matrix, self.right).astype(float)
         return step
 
     def in_errors(self, step: Array) -> float:
