@@ -112,7 +112,7 @@ def picture(
         raise PlotError(f"top = {top} cannot be; give a distance in mm")
     foot = 120
     image = _image(measured, top, (size[0], max(size[1] - foot - 60, 60)))
-    title = repr(measured) if caption is True else (caption or "")
+    title = repr(measured)[len("Distances(") : -1] if caption is True else (caption or "")
     figure = _framed(image, size, foot, title, top, bool(measured.values.max() > top))
     with replacing(target) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
@@ -135,13 +135,16 @@ def _image(measured: Distances, top: float, size: tuple[int, int]) -> NDArray[np
     half = 0.54 * max(np.ptp(seen[:, 0]) * size[1] / size[0], np.ptp(seen[:, 1]))
     centre = centre + (0.5 * (seen.min(axis=0) + seen.max(axis=0))) @ np.vstack((across, up))
     depth = float(np.linalg.norm(np.ptp(points, axis=0)))
+    # twice the pixels that a point has for itself (`render` draws at twice the size), so that surfaces look closed
+    own = float(np.prod(np.ptp(seen, axis=0))) / len(points)
+    dot = min(max(2.4 * np.sqrt(own) * 0.5 * size[1] / half, 4.0), 24.0)
 
     def draw(plotter: Any) -> None:
         import pyvista as pv
 
         plotter.add_mesh(
             pv.PolyData(points), scalars=measured.values, clim=(0.0, top), cmap="viridis", lighting=False,
-            point_size=5.0, render_points_as_spheres=False, show_scalar_bar=False,
+            point_size=dot, render_points_as_spheres=False, show_scalar_bar=False,
         )  # fmt: skip
         plotter.set_background("white")
         plotter.enable_parallel_projection()
