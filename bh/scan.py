@@ -1,6 +1,7 @@
 """Compare a solved sheet with a scan: `bh.scan.read_cloud`, `picked`, `register`, `distances`, `compare`, `picture`.
 
-The parts are in `bh.analysis.scan`; here is what puts them together, and the picture. See docs/scan.md.
+The parts are in `bh.analysis.clouds` and `bh.analysis.scan`; here is what puts them together, and the picture.
+See docs/scan.md.
 """
 
 from __future__ import annotations
@@ -13,26 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.analysis.scan import (
-    IDENTITY,
-    TRIM,
-    Distances,
-    Motion,
-    Registration,
-    ScanError,
-    Surface,
-    align,
-    distances,
-    picked,
-    read_cloud,
-    register,
-)
+from bh.analysis.clouds import IDENTITY, Motion, ScanError, align, picked, read_cloud
+from bh.analysis.scan import TRIM, Distances, Registration, Surface, distances, register
 from bh.offscreen import PlotError, render
 from bh.state import State
 from meshes.io.export import replacing
 
 __all__ = [
-    "IDENTITY", "Comparison", "Distances", "Motion", "Registration", "ScanError", "Surface", "align", "compare",
+    "IDENTITY", "TRIM", "Comparison", "Distances", "Motion", "Registration", "ScanError", "Surface", "align", "compare",
     "distances", "picked", "picture", "read_cloud", "register",
 ]  # fmt: skip
 

@@ -267,6 +267,10 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
             for path, Lstar in paths
             if path.outcome == "reached"
         ]
+        if not tried:
+            _add(result, "pattern: lowest mean distance over L*", math.nan, "mm", 0.0, "no path was reached",
+                 sample.claim, pattern=name, mesh=mesh)  # fmt: skip
+            continue
         (there, back), Lstar = min(tried, key=lambda one: one[0][0].mean)
         params = {"pattern": name, "mesh": mesh, "formulation": "bars-and-hinges", "Lstar_mm": Lstar}
         # one row a panel lets bars and hinges bend along its node lines only, which soft springs cannot force: it needs
