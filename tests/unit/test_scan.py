@@ -132,7 +132,9 @@ def test_enriched_mesh_is_as_fine_as_asked() -> None:
     points = scan.Surface(flat()).enriched(0.5)
     x, y = np.meshgrid(np.linspace(0.0, 20.0, 41), np.linspace(0.0, 10.0, 21))
     every = np.column_stack((x.ravel(), y.ravel(), np.zeros(x.size)))
-    assert cKDTree(points).query(every)[0].max() <= 0.5 / math.sqrt(3.0)  # of triangles with edges of 0.5 or less
+    assert cKDTree(points).query(every)[0].max() <= 0.5 / math.sqrt(
+        3.0
+    )  # of triangles with edges of 0.5 or less
     assert len(points) < 10_000
 
 
