@@ -25,6 +25,7 @@ from meshes.topology import Ints
 Array = NDArray[np.float64]
 TRIM = 3.0  # robust standard deviations beyond which a scan point is taken for a stray one
 COARSE, COARSE_ROUNDS = 4000, 9  # points and rounds before all points take part
+COARSE_TRIM = 4.0  # how much wider the trim is then
 MOST_ROUNDS = 60
 SETTLED = 0.02  # of the standard error: the motion has settled when a step is shorter
 
@@ -120,11 +121,10 @@ def register(
     if not trim >= 1.0:
         raise ScanError(f"trim = {trim} cannot be; give robust standard deviations from 1, such as 3")
     surface = state if isinstance(state, Surface) else Surface(state)
-    motion, rounds = start, 0
-    step = max(1, len(points) // COARSE)
-    if step > 1:  # spread over the scan, whatever order it has
-        some = points[np.random.default_rng(0).permutation(len(points))[:COARSE]]
-        motion, rounds, *_ = _rounds(some, surface, motion, trim, coarse=True)
+    # a few points, spread over the scan whatever its order, and those too that overstep the edges by some millimetres:
+    # they alone draw back a sheet that has slid in itself
+    some = points[np.random.default_rng(0).permutation(len(points))[:COARSE]]
+    motion, rounds, *_ = _rounds(some, surface, start, COARSE_TRIM * trim, coarse=True)
     motion, more, kept, noise, error, centre = _rounds(points, surface, motion, trim)
     return Registration(motion, kept, noise, error, centre, rounds + more)
 

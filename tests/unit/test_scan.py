@@ -79,6 +79,17 @@ def test_trimming_is_needed() -> None:
     assert ratio[1] > 20.0
 
 
+def test_slide_of_some_millimetres_is_drawn_back() -> None:
+    """Only the points beyond its ends hold a sheet that slides in itself; they must not be trimmed at the start."""
+    state = folded_sector("bars-and-hinges", 0.5 * math.pi)
+    cloud = MOTION.apply(scanned(sampled(state, 2.0, 22), 22))
+    picks = np.random.default_rng(22).normal(0.0, 1.0, (3, 3))
+    found = scan.register(
+        cloud, state, scan.picked(MOTION.apply(corners(state)[:3]) + picks, corners(state)[:3])
+    )
+    assert (np.abs(left_over(found)) < 4.0 * found.standard_error).all()
+
+
 def test_same_scan_same_answer() -> None:
     cloud = MOTION.apply(scanned(sampled(sheet(), 4.0, 1), 1))
     one, two = (scan.register(cloud, sheet(), start(sheet())) for _ in range(2))
