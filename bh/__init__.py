@@ -34,7 +34,8 @@ _HOME = {
 }  # fmt: skip
 
 _SUBMODULES = {
-    "contact": "bh.analysis.contact", "plotting": "bh.plotting", "stiffness_probe": "bh.analysis.stiffness_probe",
+    "contact": "bh.analysis.contact", "plotting": "bh.plotting", "scan": "bh.scan",
+    "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 
 __all__ = [

@@ -2,7 +2,15 @@
 
 from meshes.curves import Arc, Line, Polyline
 from meshes.errors import FileFormatError, InputError, MeshError, PatternError
-from meshes.library import annulus_sector, full_annulus, strip
+from meshes.library import (
+    annulus_sector,
+    full_annulus,
+    opposite_parabolas,
+    parabolic_canopy,
+    sine_tessellation,
+    strip,
+    two_arcs,
+)
 from meshes.mesh import SheetMesh
 from meshes.pattern import Crease, CreasePattern
 from meshes.structured import structured
@@ -21,7 +29,11 @@ __all__ = [
     "SheetMesh",
     "annulus_sector",
     "full_annulus",
+    "opposite_parabolas",
+    "parabolic_canopy",
+    "sine_tessellation",
     "strip",
     "structured",
+    "two_arcs",
     "unstructured",
 ]

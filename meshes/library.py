@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from meshes.curves import Arc, Array, Curve, Line, sample
+from meshes.curves import Arc, Array, Curve, Line, Polyline, sample
 from meshes.errors import PatternError
 from meshes.pattern import Crease, CreasePattern, FoldKind
 
 Folds = FoldKind | Sequence[FoldKind]
+CHORDS = 2048  # of a graph, so fine that nodes between its vertices are off by less than 1e-5 of the sheet
 
 
 def strip(
@@ -56,6 +57,132 @@ def annulus_sector(
 def full_annulus(radius: float | Sequence[float], width: float, folds: Folds = "mountain") -> CreasePattern:
     """A whole annulus with concentric creases; arguments as for `annulus_sector`."""
     return _between_rails([Arc((0.0, 0.0), r, 0.0, 2.0 * math.pi) for r in _radii(radius, width)], folds)
+
+
+def two_arcs(
+    width: float = 100.0,
+    height: float = 100.0,
+    radii: Sequence[float] = (80.0, 250.0),
+    at: Sequence[float] = (35.0, 70.0),
+    folds: Folds = ("mountain", "valley"),
+) -> CreasePattern:
+    """A rectangle with circular creases across it that bulge the same way, upwards (source Fig. 3.7 c and 3.8 d).
+
+    Args:
+        radii: of the creases from below, mm; each at least half the width.
+        at: heights of their tops in the middle of the sheet, mm, rising.
+
+    The sheet and its edges are those of `strip`.
+    """
+    width = _positive("width", width)
+    radii, at = [_positive("radius", r) for r in radii], [float(y) for y in at]
+    if len(radii) != len(at):
+        raise PatternError(f"{len(radii)} radii for {len(at)} arcs; give one radius an arc")
+    arcs: list[Curve] = []
+    for r, y in zip(radii, at, strict=True):
+        if 2.0 * r < width:
+            raise PatternError(
+                f"an arc of radius {r:g} mm cannot cross a sheet {width:g} mm wide; give at least half"
+            )
+        half = math.asin(0.5 * width / r)
+        arcs.append(Arc((0.5 * width, y - r), r, 0.5 * math.pi + half, -2.0 * half))
+    return _rectangle(width, height, arcs, folds)
+
+
+def sine_tessellation(
+    width: float = 100.0,
+    height: float = 100.0,
+    creases: int = 5,
+    amplitude: float = 4.0,
+    waves: float = 2.0,
+    folds: Folds | None = None,
+) -> CreasePattern:
+    """A rectangle with equally spaced sine creases along x, alternately mountain and valley (source Fig. 3.7 b).
+
+    Args:
+        amplitude: of the sines, mm; waves: how many fit into the width.
+        folds: other than alternating.
+    """
+    width, height = _positive("width", width), _positive("height", height)
+    creases, amplitude = _count("creases", creases), _positive("amplitude", amplitude)
+    k = 2.0 * math.pi * _positive("waves", waves) / width
+    pitch = height / (creases + 1)
+
+    def sine(middle: float) -> Curve:
+        return _graph(width, lambda x: middle + amplitude * np.sin(k * x))
+
+    curves = [sine(i * pitch) for i in range(1, creases + 1)]
+    return _rectangle(width, height, curves, _alternating(creases) if folds is None else folds)
+
+
+def parabolic_canopy(
+    width: float = 100.0,
+    height: float = 100.0,
+    creases: int = 3,
+    sag: float = 15.0,
+    folds: Folds | None = None,
+) -> CreasePattern:
+    """A rectangle with one parabola repeated upwards, alternately mountain and valley (source Fig. 3.7 d).
+
+    Args:
+        sag: how much lower the ends of the parabolas lie than their tops, mm; the tops are equally spaced about the
+            middle of the sheet.
+        folds: other than alternating.
+    """
+    width, height = _positive("width", width), _positive("height", height)
+    creases, sag = _count("creases", creases), _positive("sag", sag)
+    pitch = height / (creases + 1)
+
+    def parabola(top: float) -> Curve:
+        return _graph(width, lambda x: top - sag * (2.0 * x / width - 1.0) ** 2)
+
+    curves = [parabola(i * pitch + 0.5 * sag) for i in range(1, creases + 1)]
+    return _rectangle(width, height, curves, _alternating(creases) if folds is None else folds)
+
+
+def opposite_parabolas(
+    side: float = 100.0, gap: float = 30.0, sag: float = 20.0, folds: Folds = "mountain"
+) -> CreasePattern:
+    """A square with two parabolas across it whose tops face each other in the middle (source Fig. 3.7 e).
+
+    Args:
+        gap: between the tops, mm; sag: from a top to the ends of its parabola, towards the nearer edge, mm.
+    """
+    side, gap, sag = _positive("side", side), _positive("gap", gap), _positive("sag", sag)
+
+    def parabola(sign: float) -> Curve:
+        return _graph(side, lambda x: 0.5 * side + sign * (0.5 * gap + sag * (2.0 * x / side - 1.0) ** 2))
+
+    return _rectangle(side, side, [parabola(-1.0), parabola(1.0)], folds)
+
+
+def _rectangle(width: float, height: float, curves: Sequence[Curve], folds: Folds) -> CreasePattern:
+    """The sheet 0 <= x <= width, 0 <= y <= height with creases from x = 0 to x = width, from below."""
+    height = _positive("height", height)
+    rails = [Line((0.0, 0.0), (width, 0.0)), *curves, Line((0.0, height), (width, height))]
+    for i, curve in enumerate(curves, 1):
+        ends = curve.point(np.array([0.0, 1.0]))[:, 1]
+        if ends.min() <= 0.0 or ends.max() >= height:
+            raise PatternError(
+                f"crease {i} ends at y = {ends[0]:g} mm, not on a side of the sheet; move it inside"
+            )
+    return _between_rails(rails, folds)
+
+
+def _graph(width: float, y: Callable[[Array], Array]) -> Polyline:
+    """The curve y(x) over 0 <= x <= width."""
+    x = np.linspace(0.0, width, CHORDS + 1)
+    return Polyline(np.column_stack((x, y(x))))
+
+
+def _alternating(count: int) -> list[FoldKind]:
+    return ["valley" if i % 2 else "mountain" for i in range(count)]
+
+
+def _count(name: str, value: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise PatternError(f"{name} = {value!r} cannot be; give a whole number from 1")
+    return int(value)
 
 
 def _radii(radius: float | Sequence[float], width: float) -> list[float]:

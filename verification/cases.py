@@ -20,16 +20,14 @@ ALL_CASES = {
     "derivatives": "verification.derivatives",
     "fig3_9": "verification.fig3_9",
     "fig3_11": "verification.fig3_11",
+    "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
     "shell_benchmarks": "verification.shell_benchmarks",
     "campaign": "verification.campaign",
 }
-LONG = {
-    "campaign",
-    "fig3_8",
-    "fig3_10",
-}  # run only when named: minutes, not seconds; `records` keeps a run of each
+# run only when named: minutes, not seconds; `records` keeps a run of each
+LONG = {"campaign", "fig3_8", "fig3_10", "fig3_11"}
 LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
 CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
 

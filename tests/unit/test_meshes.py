@@ -610,3 +610,68 @@ def test_errors_are_value_errors_of_one_family():
     for name in ("PatternError", "MeshError", "FileFormatError"):
         assert issubclass(getattr(meshes, name), InputError)
     assert issubclass(InputError, ValueError)
+
+
+# --------------------------------------------------------------------------------------- patterns of Fig. 3.7
+
+FIG_3_7 = {
+    "sine tessellation": (meshes.sine_tessellation, 5),
+    "two arcs": (meshes.two_arcs, 2),
+    "canopy": (meshes.parabolic_canopy, 3),
+    "opposite parabolas": (meshes.opposite_parabolas, 2),
+}
+
+
+@pytest.mark.parametrize("name", FIG_3_7)
+def test_patterns_of_fig_3_7(name: str) -> None:
+    """Squares of 100 mm whose creases run from side to side; both kinds of mesh cover them, nodes on the curves."""
+    make, count = FIG_3_7[name]
+    pattern = make()  # type: ignore[operator]
+    assert len(pattern.creases) == count
+    for mesh in (meshes.structured(pattern, along=24), meshes.unstructured(pattern, size=6.0)):
+        assert mesh.areas.sum() == pytest.approx(1e4)
+        assert len(mesh.creases) == count
+        assert {f"corner:{a}-{b}" for a in ("inner", "outer") for b in ("start", "end")} <= set(mesh.corners)
+        for crease in pattern.creases:
+            nodes = mesh.points[mesh.nodes(f"crease:{crease.name}")]
+            assert sorted(nodes[[0, -1], 0]) == pytest.approx([0.0, 100.0])
+
+
+def test_curves_of_fig_3_7() -> None:
+    """The equations of the creases, and the senses of the folds."""
+    sine = meshes.structured(meshes.sine_tessellation(creases=3, amplitude=5.0, waves=1.5), along=30)
+    parabola = meshes.structured(meshes.parabolic_canopy(creases=3, sag=12.0), along=30)
+    opposite = meshes.structured(meshes.opposite_parabolas(gap=24.0, sag=10.0), along=30)
+    for k in (1, 2, 3):
+        x, y, _ = sine.points[sine.nodes(f"crease:crease-{k}")].T
+        np.testing.assert_allclose(y, 25.0 * k + 5.0 * np.sin(2.0 * np.pi * 1.5 * x / 100.0), atol=1e-4)
+        x, y, _ = parabola.points[parabola.nodes(f"crease:crease-{k}")].T
+        np.testing.assert_allclose(y, 25.0 * k + 6.0 - 12.0 * (x / 50.0 - 1.0) ** 2, atol=1e-4)
+    for k, sign in ((1, -1.0), (2, 1.0)):
+        x, y, _ = opposite.points[opposite.nodes(f"crease:crease-{k}")].T
+        np.testing.assert_allclose(y, 50.0 + sign * (12.0 + 10.0 * (x / 50.0 - 1.0) ** 2), atol=1e-4)
+    assert list(sine.folds.values()) == ["mountain", "valley", "mountain"]
+    assert list(meshes.two_arcs(folds="valley").folds.values()) == ["valley", "valley"]
+    assert list(meshes.opposite_parabolas().folds.values()) == ["mountain", "mountain"]
+
+
+@pytest.mark.parametrize(
+    ("words", "make"),
+    [
+        ("creases = 0", lambda: meshes.sine_tessellation(creases=0)),
+        ("creases = 2.5", lambda: meshes.parabolic_canopy(creases=2.5)),  # type: ignore[arg-type]
+        ("amplitude = -1", lambda: meshes.sine_tessellation(amplitude=-1.0)),
+        ("leaves the sheet", lambda: meshes.sine_tessellation(amplitude=40.0)),
+        ("not on a side of the sheet", lambda: meshes.parabolic_canopy(sag=200.0)),
+        ("not on a side of the sheet", lambda: meshes.opposite_parabolas(sag=40.0)),
+        ("radius 30 mm cannot cross", lambda: meshes.two_arcs(radii=(30.0, 250.0))),
+        ("1 radii for 2 arcs", lambda: meshes.two_arcs(radii=(80.0,))),
+        ("3 folds for 2 creases", lambda: meshes.two_arcs(folds=["mountain"] * 3)),
+        ("cross", lambda: meshes.two_arcs(radii=(250.0, 60.0), at=(40.0, 45.0))),
+    ],
+)
+def test_bad_patterns_of_fig_3_7(words: str, make: object) -> None:
+    with pytest.raises(PatternError) as caught:
+        make()  # type: ignore[operator]
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)

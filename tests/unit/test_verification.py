@@ -23,7 +23,14 @@ KEYS = {
     "case", "quantity", "params", "value", "unit", "reference", "source", "error", "tolerance", "passed", "unknowns",
     "iterations", "wall_time_s", "outcome",
 }  # fmt: skip
-SLOW = {"appendix_b", "fig3_9", "fig3_8", "fig3_10", "hard_cases", "scan"}  # over some five seconds on a slow machine
+SLOW = {
+    "appendix_b",
+    "fig3_9",
+    "fig3_8",
+    "fig3_10",
+    "hard_cases",
+    "scan",
+}  # over some five seconds on a slow machine
 
 
 def check(**changes: Any) -> Check:

@@ -14,8 +14,7 @@ import numpy as np
 
 import meshes
 from bh import Model, Sheet, trace
-from meshes.curves import Arc, Line
-from meshes.pattern import Crease, CreasePattern, FoldKind
+from meshes.pattern import CreasePattern, FoldKind
 from verification.campaign import FINE
 from verification.checks import CaseResult, line, plot
 from verification.hard_cases.common import Found, check
@@ -27,18 +26,7 @@ SOURCE = "source 3.4.4: the crease of high curvature nears its rest angle only w
 
 def rectangle(folds: tuple[FoldKind, FoldKind]) -> CreasePattern:
     """A square with two arcs that bulge the same way, the more curved one below."""
-    arcs = []
-    for height, radius in zip(HEIGHTS, RADII, strict=True):
-        half = math.asin(0.5 * SIDE / radius)
-        arcs.append(Arc((0.5 * SIDE, height - radius), radius, 0.5 * math.pi + half, -2.0 * half))
-    low, high = Line((0.0, 0.0), (SIDE, 0.0)), Line((0.0, SIDE), (SIDE, SIDE))
-    start, end = Line((0.0, 0.0), (0.0, SIDE)), Line((SIDE, 0.0), (SIDE, SIDE))
-    ring = np.array([(0.0, 0.0), (SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE)])
-    creases = tuple(
-        Crease(f"crease-{i}", arc, fold) for i, (arc, fold) in enumerate(zip(arcs, folds, strict=True), 1)
-    )
-    edges = (("inner", low), ("outer", high), ("start", start), ("end", end))
-    return CreasePattern((ring,), creases, (low, *arcs, high), edges)
+    return meshes.two_arcs(SIDE, SIDE, RADII, HEIGHTS, folds)
 
 
 def folded(folds: tuple[FoldKind, FoldKind], Lstar: float, by: float, along: int = 40) -> Model:
