@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 
 from meshes.errors import InputError
@@ -17,9 +18,11 @@ CASES = {
     "derivatives": "verification.derivatives",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
+    "appendix_b_cross": "verification.appendix_b_cross",
     "shell_benchmarks": "verification.shell_benchmarks",
 }
 LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds
+PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross")}  # run with the case by `bh verify`
 ALL_CASES = {**CASES, **LONG_CASES}
 
 
@@ -33,3 +36,8 @@ def case(name: str) -> Case:
         raise InputError(f"there is no verification case '{name}'; use one of {', '.join(ALL_CASES)}")
     found: Case = import_module(ALL_CASES[name]).run
     return found
+
+
+def with_parts(names: Sequence[str]) -> list[str]:
+    """The names, each followed by the other parts of its study, each case once."""
+    return list(dict.fromkeys(part for name in names for part in (name, *PARTS.get(name, ()))))
