@@ -19,10 +19,11 @@ CASES = {
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
     "appendix_b_cross": "verification.appendix_b_cross",
+    "appendix_b_fields": "verification.appendix_b_fields",
     "shell_benchmarks": "verification.shell_benchmarks",
 }
 LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds
-PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross")}  # run with the case by `bh verify`
+PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields")}  # run with the case by `bh verify`
 ALL_CASES = {**CASES, **LONG_CASES}
 
 
