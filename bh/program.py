@@ -204,8 +204,8 @@ class _Builder:
         for node in select(self.mesh, item.at).tolist():
             if self.now.setdefault((node, key), item.by) != item.by:
                 raise ModelError(
-                    f"node {node} is displaced by {self.now[node, key]:g} and by {item.by:g} mm along the same direction "
-                    "in one step; remove one of them"
+                    f"node {node} is displaced by {self.now[node, key]:g} and by {item.by:g} mm along the same "
+                    "direction in one step; remove one of them"
                 )
             self.displaced[(node, key)] = item.by
 
@@ -259,8 +259,8 @@ def open_ends(mesh: SheetMesh, step: StepProgram) -> list[str]:
     creased[topology.boundary.ravel()] = 0
     held = np.flatnonzero(angle > 0.1 * angle.max(initial=0.0))
     return [
-        f"{hinge_name(mesh, hinge)} ends inside the sheet at node {node} with its angle imposed: the energy there has no "
-        "limit under refinement; let the angle fade out, or give the crease a spring"
+        f"{hinge_name(mesh, hinge)} ends inside the sheet at node {node} with its angle imposed: the energy there "
+        "has no limit under refinement; let the angle fade out, or give the crease a spring"
         for hinge in held.tolist()
         for node in ends[hinge].tolist()
         if creased[node] == 1

@@ -23,9 +23,9 @@ NOTE = (
     "Energies are those of the sheet, without the spring of the crease. In (b) and (c) the load grows until the mean "
     "fold angle has passed a right angle, and is then found by the secant method to 1e-6 rad: it is the load that is "
     "prescribed, no angle is held. A force is a uniform line load on the shell and the same force on every node of the "
-    "crease of the others. Distances of the crease are those after the curve has been moved rigidly onto the shell's; "
+    "crease of the others. Distances of the crease are those after the curve has been moved rigidly to the shell's; "
     "Hausdorff's is between the curves as drawn, with the sag of straight edges: 0.012 mm with 32 cells along. Bars "
-    "and hinges take Poisson's ratio as 0; on one row of cells they have the energy of the cone, with more rows they lock."
+    "and hinges take Poisson's ratio as 0; on one row of cells they have the energy of the cone, with more they lock."
 )
 
 
@@ -93,7 +93,9 @@ def both(solved: Solved, judge: Solved | None) -> str:
     return judge.outcome
 
 
-def _common(actuation: str, along: int, member: Member, solved: Solved) -> tuple[dict[str, Any], dict[str, Any]]:
+def _common(
+    actuation: str, along: int, member: Member, solved: Solved
+) -> tuple[dict[str, Any], dict[str, Any]]:
     params = {
         "actuation": actuation,
         "how": ACTUATIONS[actuation],
@@ -121,20 +123,21 @@ def _energies(
     for kind, value in sheet_energies(solved).items():
         tolerance = member.tolerance if kind == "total" and actuation != "c-spring" else None
         result.checks.append(
-            Check(CASE, f"{kind} energy", params, value, "N mm", reference.get(kind), source, tolerance, **cost)
+            Check(
+                CASE, f"{kind} energy", params, value, "N mm", reference.get(kind), source, tolerance, **cost
+            )
         )
     if math.isnan(solved.load):
         what, unit = "mean moment a length of crease", "N"
-        value, other = (_moment(s) if s else None for s in (solved, judge))
     else:
         what, unit = UNITS.get(actuation, FORCE)
-        value, other = (s.load if s else None for s in (solved, judge))
-    assert value is not None
-    result.checks.append(Check(CASE, what, params, value, unit, other, source, **cost))
+    other = None if judge is None else _load(judge)
+    result.checks.append(Check(CASE, what, params, _load(solved), unit, other, source, **cost))
 
 
-def _moment(solved: Solved) -> float:
-    return float(solved.state.crease_moment("crease").mean())
+def _load(solved: Solved) -> float:
+    """The load a length of crease, or the moment that an imposed angle takes."""
+    return float(solved.state.crease_moment("crease").mean()) if math.isnan(solved.load) else solved.load
 
 
 def compare(

@@ -22,11 +22,12 @@ NEAR = 2.5  # mm, about the width of the strips of in-plane energy, 0.7 sqrt(R t
 BRIGHT = 97.0  # percent of the nodes of all actuations lie within the colours
 FROM_ABOVE = (ARC / 2.0, 1.5)  # azimuth and elevation, rad: both panels are seen alike
 NOTE = (
-    "Profiles are means over the cells of the mesh. In-plane energy lies in strips of some 2.5 mm along the crease and along "
-    "both free edges, with a weak one between; bending in the middle of the arc falls outwards like the cone's 1 / r^2 at "
-    "some 0.9 of its height. At the ends it gathers at the crease and at the corners for (a) to (c), at the crease only for "
-    "(d), whose ends are otherwise flat. A strip of more bending along the crease and the in-plane energy toward the inner "
-    "edge, which the source sees in (c), are there only where the crease's spring resists the force."
+    "Profiles are means over the cells of the mesh. In-plane energy lies in strips of some 2.5 mm along the crease and "
+    "along both free edges, with a weak one between; bending in the middle of the arc falls outwards like the cone's "
+    "1 / r^2 at some 0.9 of its height. At the ends it gathers at the crease and at the corners for (a) to (c), at the "
+    "crease only for (d), whose ends are otherwise flat. A strip of more bending along the crease and the in-plane "
+    "energy toward the inner edge, which the source sees in (c), are there only where the crease's spring resists the "
+    "force."
 )
 
 
@@ -39,14 +40,15 @@ class Grid:
         area: (rows, columns) of the cells, mm^2.
     """
 
-    r: Array
-    theta: Array
-    area: Array
+    r: NDArray[np.floating]
+    theta: NDArray[np.floating]
+    area: NDArray[np.floating]
     density: dict[str, Array]
 
     def along_r(self, kind: str, share: float = 0.1) -> Array:
-        """(rows,) mean density over the columns of the middle `share` of the arc."""
-        middle = np.abs(self.theta / ARC - 0.5) <= 0.5 * share
+        """(rows,) mean density over the columns of the middle `share` of the arc, at least the middle ones."""
+        off = np.abs(self.theta / ARC - 0.5)
+        middle = off <= max(0.5 * share, off.min() + 1e-9)
         out: Array = self.density[kind][:, middle].mean(axis=1)
         return out
 
@@ -55,7 +57,7 @@ class Grid:
         out: Array = self.density[kind][int(np.argmin(np.abs(self.r - r)))]
         return out
 
-    def part(self, kind: str, rows: Array) -> float:
+    def part(self, kind: str, rows: NDArray[np.bool_]) -> float:
         """Part of the energy of a kind that some rows (a mask) hold."""
         energy = self.density[kind] * self.area
         return float(energy[rows].sum() / energy.sum())
@@ -71,13 +73,14 @@ def on_grid(state: State, along: int, rows: int) -> Grid:
     shape = (2 * rows, along)
     cell = np.ravel_multi_index((np.clip(row, 0, shape[0] - 1), np.clip(column, 0, along - 1)), shape)
     weight = np.bincount(cell, mesh.areas, minlength=shape[0] * shape[1])
+    held = {kind: mesh.areas * state.energy_density[kind] for kind in KINDS}
     density = {
-        kind: (np.bincount(cell, mesh.areas * state.energy_density[kind], minlength=len(weight)) / weight).reshape(shape)
-        for kind in KINDS
+        kind: (np.bincount(cell, energy, minlength=len(weight)) / weight).reshape(shape)
+        for kind, energy in held.items()
     }
-    r = INNER + height * (np.arange(shape[0]) + 0.5)
-    area = np.broadcast_to((r * height * width)[:, None], shape)
-    return Grid(r, width * (np.arange(along) + 0.5), area, density)
+    r = INNER + height * (np.arange(shape[0], dtype=float) + 0.5)
+    theta = width * (np.arange(along, dtype=float) + 0.5)
+    return Grid(r, theta, np.broadcast_to((r * height * width)[:, None], shape), density)
 
 
 def _angles(points: Array, at: Array) -> Array:
@@ -146,10 +149,9 @@ def _checks(
     )  # fmt: skip
 
 
-def _cone(r: Array) -> Array:
+def _cone(r: NDArray[np.floating]) -> NDArray[np.floating]:
     """Bending energy an area of the cone, N mm / mm^2."""
-    out: Array = 0.5 * SHEET.bending_stiffness() / (math.tan((math.pi - ANGLE) / 2.0) * r) ** 2
-    return out
+    return 0.5 * SHEET.bending_stiffness() / (math.tan((math.pi - ANGLE) / 2.0) * r) ** 2
 
 
 def _profiles(result: CaseResult, grids: dict[str, Grid]) -> None:
@@ -157,23 +159,25 @@ def _profiles(result: CaseResult, grids: dict[str, Grid]) -> None:
     for kind, name in KINDS.items():
         series = [line(f"({a})", g.r.tolist(), g.along_r(kind).tolist()) for a, g in grids.items()]
         if kind == "bending":
-            r = any_grid.r
-            series.append(line("cone", r.tolist(), _cone(r).tolist(), "reference"))
+            series.append(line("cone", any_grid.r.tolist(), _cone(any_grid.r).tolist(), "reference"))
         result.plots.append(
             plot(f"appendix-b-fields-{kind}-r", f"{name.capitalize()} energy along r", "r, mm",
-                 "energy an area, N mm / mm^2", series, "Mean over the middle tenth of the arc; the crease is at 100 mm.",
-                 log="y")
+                 "energy an area, N mm / mm^2", series,
+                 "Mean over the middle tenth of the arc; the crease is at 100 mm.", log="y")
         )  # fmt: skip
-    for kind, r, where in (
+    for kind, radius, where in (
         ("bending", INNER, "at the inner edge"),
         ("bending", CREASE + 1e-6, "beside the crease"),
         ("stretching", CREASE + 1e-6, "beside the crease"),
     ):
-        series = [line(f"({a})", (g.theta / ARC).tolist(), g.along_theta(kind, r).tolist()) for a, g in grids.items()]
+        series = [
+            line(f"({a})", (g.theta / ARC).tolist(), g.along_theta(kind, radius).tolist())
+            for a, g in grids.items()
+        ]
         result.plots.append(
-            plot(f"appendix-b-fields-{kind}-theta-{r:.0f}", f"{KINDS[kind].capitalize()} energy along theta, {where}",
+            plot(f"appendix-b-fields-{kind}-theta-{radius:.0f}", f"{KINDS[kind].capitalize()} energy along theta, {where}",
                  "theta over the arc", "energy an area, N mm / mm^2", series,
-                 f"The row of cells {where}" + (", on its outer side." if r > CREASE else "."))
+                 f"The row of cells {where}" + (", on its outer side." if radius > CREASE else "."))
         )  # fmt: skip
 
 
@@ -186,7 +190,9 @@ def _pictures(result: CaseResult, context: Context, states: dict[str, State]) ->
             context.tell(f"{CASE}: {file}")
             energy = getattr(state.energy, kind)
             caption = f"({actuation}) {ACTUATIONS[actuation]}: {name} energy {energy:.3g} N mm"
-            picture(state, context.folder / file, kind, (1000, 560), caption=caption, camera=FROM_ABOVE, top=top)
+            picture(
+                state, context.folder / file, kind, (1000, 560), caption=caption, camera=FROM_ABOVE, top=top
+            )
             result.pictures.append(
                 {
                     "file": file,

@@ -23,7 +23,8 @@ CASES = {
     "shell_benchmarks": "verification.shell_benchmarks",
 }
 LONG_CASES = {"campaign": "verification.campaign"}  # only when named: minutes, not seconds
-PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields")}  # run with the case by `bh verify`
+# run with the case by `bh verify`
+PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields")}
 ALL_CASES = {**CASES, **LONG_CASES}
 
 

@@ -106,6 +106,11 @@ class Context:
 Case = Callable[[Context], CaseResult]
 
 
+def reached_energy(path: Path) -> float:
+    """Total energy of the last state, N mm; nan where the path did not reach its end: that is no value of a study."""
+    return path[-1].energy.total if path.outcome == "reached" else math.nan
+
+
 def cost_of(path: Path) -> dict[str, Any]:
     """What a solved path cost, as keyword arguments of `Check`."""
     return {"unknowns": path.unknowns, "iterations": path.iterations, "wall_time_s": path.wall_time_s}

@@ -163,9 +163,7 @@ def _load(model: Model, most: float) -> Solved:
     return Solved(state, here.lam * most, system.size, iterations, spent, outcome)
 
 
-def meet(
-    system: System, points: list[Point], mean_fold: Callable[[Point], float]
-) -> tuple[Point, int]:
+def meet(system: System, points: list[Point], mean_fold: Callable[[Point], float]) -> tuple[Point, int]:
     """The state between the last two points whose mean fold angle is the right one, by the secant method in lambda."""
     path = list(points[-3:])
     (low, high), iterations = path[-2:], 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -285,15 +286,20 @@ def on_the_boundary() -> meshes.SheetMesh:
     [
         (across_triangles, ("'crease:crease'", "not joined by an edge", "mesh along that line")),
         (lambda: sheet(off_its_curve()).fold("crease", by=0.1), ("'crease:crease'", "0.2 mm off its curve")),
-        (lambda: Model(SECTOR, Sheet(E=4000.0, nu=0.38, t=0.0), formulation="shell"), ("t = 0.0", "positive")),
+        (
+            lambda: Model(SECTOR, Sheet(E=4000.0, nu=0.38, t=0.0), formulation="shell"),
+            ("t = 0.0", "positive"),
+        ),
         (
             lambda: sheet().support("edge:inner", "xyz").displace("edge:inner", "z", 1.0),
             ("node 0", "held and displaced along the same direction", "remove"),
         ),
         (
-            lambda: sheet()
-            .support("edge:start", "xyz")
-            .step(Displace("edge:end", "z", 1.0), Displace("corner:inner-end", "z", 2.0)),
+            lambda: (
+                sheet()
+                .support("edge:start", "xyz")
+                .step(Displace("edge:end", "z", 1.0), Displace("corner:inner-end", "z", 2.0))
+            ),
             ("displaced by 1 and by 2 mm", "remove one"),
         ),
         (lambda: sheet().support("edge:inner", "z").fold("crease", by=0.1), ("leave 3 of 6", "add supports")),
@@ -304,11 +310,9 @@ def on_the_boundary() -> meshes.SheetMesh:
         (lambda: sheet(on_the_boundary()).fold("rim", by=0.1), ("'rim'", "along the boundary")),
     ],
 )
-def test_bad_input_is_refused_in_one_line(make: Callable[[], object], words: tuple[str, ...]) -> None:
+def test_bad_input_is_refused_in_one_line(make: Callable[[], Any], words: tuple[str, ...]) -> None:
     with pytest.raises(InputError) as caught:
-        made = make()
-        assert isinstance(made, Model)
-        bh.trace(made)
+        bh.trace(make())
     message = str(caught.value)
     assert "\n" not in message
     for word in words:
