@@ -177,7 +177,8 @@ def _profiles(result: CaseResult, grids: dict[str, Grid]) -> None:
         result.plots.append(
             plot(f"appendix-b-fields-{kind}-theta-{radius:.0f}",
                  f"{KINDS[kind].capitalize()} energy along theta, {where}", "theta over the arc",
-                 "energy an area, N mm / mm^2", series, f"The row of cells {where}" + (", on its outer side." if radius > CREASE else "."))
+                 "energy an area, N mm / mm^2", series,
+                 f"The row of cells {where}" + (", on its outer side." if radius > CREASE else "."))
         )  # fmt: skip
 
 
