@@ -19,7 +19,7 @@ from bh.describe import describe, fingerprint, rebuild
 from bh.errors import ModelError, PathFileError
 from bh.formulations import Formulation, formulation
 from bh.model import Model
-from bh.program import StepProgram, program
+from bh.program import StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
 from bh.solvers.automatic import Automatic
 from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
@@ -120,6 +120,8 @@ class Path:
         if arc:
             found.append(f"{count(len(arc), 'state')} found by arc length")
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
+        ends = [line for step in self._programs for line in open_ends(self.model.mesh, step)]
+        found += dict.fromkeys(ends)
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")

@@ -71,6 +71,7 @@ class _Builder:
         self.released = np.zeros(hinges, dtype=bool)
         self.force = np.zeros((nodes, 3))
         self.displaced: dict[tuple[int, tuple[float, float, float]], float] = {}
+        self.now: dict[tuple[int, tuple[float, float, float]], float] = {}  # of this step
         for name, crease in model.creases.items():
             self._spring(self.hinges(name), crease)
             self.made[self.hinges(name)] = crease.rest
@@ -129,6 +130,7 @@ class _Builder:
             self.rest = self.made.copy()
         self.released = np.zeros(len(self.rest), dtype=bool)
         displaced = dict(self.displaced)
+        self.now = {}
         for item in actuations:
             if isinstance(item, Fold):
                 self._fold(item)
@@ -200,6 +202,11 @@ class _Builder:
         unit = np.asarray(raw, dtype=float) / np.linalg.norm(raw)
         key = (float(unit[0]), float(unit[1]), float(unit[2]))
         for node in select(self.mesh, item.at).tolist():
+            if self.now.setdefault((node, key), item.by) != item.by:
+                raise ModelError(
+                    f"node {node} is displaced by {self.now[node, key]:g} and by {item.by:g} mm along the same "
+                    "direction in one step; remove one of them"
+                )
             self.displaced[(node, key)] = item.by
 
     def _prescribed(self, before: dict[tuple[int, tuple[float, float, float]], float]) -> list[Prescribed]:
@@ -237,6 +244,27 @@ def hinge_name(mesh: SheetMesh, hinge: int) -> str:
     if not on:
         return f"edge {a}-{b}"
     return f"crease '{min(on, key=lambda name: len(mesh.crease_edges(name)))}' (edge {a}-{b})"
+
+
+def open_ends(mesh: SheetMesh, step: StepProgram) -> list[str]:
+    """Where an imposed fold ends inside the sheet, one line each: no sheet can follow it there without a limit.
+
+    The slopes have a dislocation at such a node and the curvature goes with 1 / r (docs/fem.md). An end that is faded
+    out to a tenth of the largest angle, or that another crease goes on from, is none.
+    """
+    topology = mesh.topology
+    angle = np.where(step.law == HELD, np.abs(math.pi - step.held.end), 0.0)
+    ends = topology.hinges[:, 1:3]
+    creased = np.bincount(ends[step.law != SHEET].ravel(), minlength=len(mesh.points))
+    creased[topology.boundary.ravel()] = 0
+    held = np.flatnonzero(angle > 0.1 * angle.max(initial=0.0))
+    return [
+        f"{hinge_name(mesh, hinge)} ends inside the sheet at node {node} with its angle imposed: the energy there "
+        "has no limit under refinement; let the angle fade out, or give the crease a spring"
+        for hinge in held.tolist()
+        for node in ends[hinge].tolist()
+        if creased[node] == 1
+    ]
 
 
 def _edge_hinges(mesh: SheetMesh, crease: str) -> Ints:

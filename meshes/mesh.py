@@ -106,7 +106,10 @@ class SheetMesh:
         for name, pairs in self.edge_sets.items():
             if pairs.ndim != 2 or pairs.shape[1] != 2:
                 raise MeshError(f"edge set '{name}' must be an array (k, 2) of node pairs")
-            topology.find_edges(pairs)
+            try:
+                topology.find_edges(pairs)
+            except MeshError as error:
+                raise MeshError(f"'{name}' is not along the mesh: {error}") from None
         for name, node in self.corners.items():
             if not 0 <= node < len(self.points):
                 raise MeshError(f"corner '{name}' names node {node} of {len(self.points)}; mend its index")

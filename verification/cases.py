@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 
 from meshes.errors import InputError
@@ -23,6 +24,8 @@ ALL_CASES = {
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
+    "appendix_b_cross": "verification.appendix_b_cross",
+    "appendix_b_fields": "verification.appendix_b_fields",
     "shell_benchmarks": "verification.shell_benchmarks",
     "campaign": "verification.campaign",
 }
@@ -30,6 +33,8 @@ ALL_CASES = {
 LONG = {"campaign", "fig3_8", "fig3_10", "fig3_11"}
 LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
 CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
+# run with the case by `bh verify`
+PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields")}
 
 
 def case(name: str) -> Case:
@@ -42,3 +47,8 @@ def case(name: str) -> Case:
         raise InputError(f"there is no verification case '{name}'; use one of {', '.join(ALL_CASES)}")
     found: Case = import_module(ALL_CASES[name]).run
     return found
+
+
+def with_parts(names: Sequence[str]) -> list[str]:
+    """The names, each followed by the other parts of its study, each case once."""
+    return list(dict.fromkeys(part for name in names for part in (name, *PARTS.get(name, ()))))

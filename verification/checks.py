@@ -48,9 +48,14 @@ class Check:
         return bool(math.isfinite(self.error) and self.error <= self.tolerance)
 
     def record(self) -> dict[str, Any]:
-        """The record of DESIGN.md, section 2, as plain JSON data."""
+        """The record of DESIGN.md, section 2, as plain JSON data.
+
+        What did not reach its target has an outcome and no value: nothing of it can enter a table as a figure.
+        """
         data = asdict(self)
         data["error"], data["passed"] = self.error, self.passed
+        if self.outcome != "reached":
+            data["value"] = data["error"] = None
         if not math.isfinite(self.value):
             data["value"] = None
         return data
@@ -99,6 +104,11 @@ class Context:
 
 
 Case = Callable[[Context], CaseResult]
+
+
+def reached_energy(path: Path) -> float:
+    """Total energy of the last state, N mm; nan where the path did not reach its end: that is no value of a study."""
+    return path[-1].energy.total if path.outcome == "reached" else math.nan
 
 
 def cost_of(path: Path) -> dict[str, Any]:

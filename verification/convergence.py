@@ -14,7 +14,7 @@ from bh import Model, Path, Sheet, trace
 from meshes import SheetMesh
 from meshes.structured import Kind
 from verification import appendix_b
-from verification.checks import CaseResult, Check, Context, cost_of, line, plot
+from verification.checks import CaseResult, Check, Context, cost_of, line, plot, reached_energy
 
 KINDS: tuple[str, ...] = (*get_args(Kind), "gmsh")
 # cells along the crease and rows a side: halved again and again
@@ -68,9 +68,9 @@ def _sector(result: CaseResult, context: Context, actuation: str, nu: float) -> 
         for along, rows in levels:
             context.tell(f"convergence: ({actuation}), nu = {nu}, {kind}, {along} x {rows}")
             paths[kind] = folded(sector(along, rows, kind), actuation, nu)
-            totals.setdefault(kind, []).append(paths[kind][-1].energy.total)
+            totals.setdefault(kind, []).append(reached_energy(paths[kind]))
     limits = {kind: extrapolated(values) for kind, values in totals.items()}
-    converged = float(np.median(list(limits.values())))
+    converged = float(np.nanmedian(list(limits.values())))
     here = {"actuation": actuation, "nu": nu, "formulation": "consistent"}
     along, rows = levels[-1]
     for kind in KINDS:
@@ -148,7 +148,7 @@ def _ring(result: CaseResult, context: Context) -> None:
         for along in counts:
             context.tell(f"convergence: full annulus, {name}, {along}")
             path = ring(along, 1, name)
-            energy = path[-1].energy.total
+            energy = reached_energy(path)
             found.setdefault(name, []).append(energy)
             judged = name == "consistent" and along > counts[0]
             result.checks.append(

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import bh
 import meshes
-from bh.errors import ModelError
+from bh.actuation import Displace
+from bh.errors import InputError, ModelError
 from bh.model import Model, Sheet
 from bh.path import Path
 from bh.program import program
@@ -242,3 +245,75 @@ def test_a_clamp_that_slides_is_a_plane_of_symmetry() -> None:
     assert 2.0 * solve(model)[-1].energy.total == pytest.approx(energy, rel=2e-4)
     loose = sheet(half).support("edge:end", normal).support("rigid-body").fold("crease", by=1.0)
     assert 2.0 * solve(loose)[-1].energy.total < 0.99 * energy
+
+
+def test_a_crease_that_ends_inside_says_so() -> None:
+    """The imposed angle is allowed, with a remark; one that fades out, or a spring, needs none."""
+    mesh = meshes.structured(meshes.strip(40.0, 20.0, [10.0]), along=8, rows=2, kind="alternating")
+    pairs = mesh.crease_edges("crease")
+    short = replace(mesh, edge_sets={**mesh.edge_sets, "crease:crease": pairs[:4]})
+    end = int(pairs[3, 1])
+    (remark,) = solve(sheet(short).fold("crease", by=0.01)).remarks
+    assert remark.startswith("crease 'crease' (edge ")
+    assert f"ends inside the sheet at node {end} " in remark
+    assert "\n" not in remark
+    assert solve(sheet(short).fold("crease", by=(0.01, 0.01, 0.005, 0.0005))).remarks == []
+    assert solve(sheet(short).crease("crease", stiffness=1e-3).moment("crease", to=1e-5)).remarks == []
+    assert solve(sheet(mesh).fold("crease", by=0.01)).remarks == []
+
+
+# --------------------------------------------------------------------------------------- bad input, in one line
+
+
+def off_its_curve() -> meshes.SheetMesh:
+    points = SECTOR.points.copy()
+    points[SECTOR.crease_edges("crease")[2, 0], :2] *= 1.002
+    return replace(SECTOR, points=points)
+
+
+def across_triangles() -> meshes.SheetMesh:
+    pairs = SECTOR.crease_edges("crease")
+    across = np.array([[pairs[0, 0], pairs[2, 0]]])
+    return replace(SECTOR, edge_sets={**SECTOR.edge_sets, "crease:crease": across})
+
+
+def on_the_boundary() -> meshes.SheetMesh:
+    return replace(SECTOR, edge_sets={**SECTOR.edge_sets, "crease:rim": SECTOR.edge_sets["edge:inner"]})
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (across_triangles, ("'crease:crease'", "not joined by an edge", "mesh along that line")),
+        (lambda: sheet(off_its_curve()).fold("crease", by=0.1), ("'crease:crease'", "0.2 mm off its curve")),
+        (
+            lambda: Model(SECTOR, Sheet(E=4000.0, nu=0.38, t=0.0), formulation="shell"),
+            ("t = 0.0", "positive"),
+        ),
+        (
+            lambda: sheet().support("edge:inner", "xyz").displace("edge:inner", "z", 1.0),
+            ("node 0", "held and displaced along the same direction", "remove"),
+        ),
+        (
+            lambda: (
+                sheet()
+                .support("edge:start", "xyz")
+                .step(Displace("edge:end", "z", 1.0), Displace("corner:inner-end", "z", 2.0))
+            ),
+            ("displaced by 1 and by 2 mm", "remove one"),
+        ),
+        (lambda: sheet().support("edge:inner", "z").fold("crease", by=0.1), ("leave 3 of 6", "add supports")),
+        (lambda: sheet().fold("fold", by=0.1), ("no crease 'fold'", "its creases: crease")),
+        (lambda: sheet().moment("fold", to=0.1), ("no crease 'fold'", "its creases: crease")),
+        (lambda: sheet().crease("fold", stiffness=0.1).fold("crease", by=0.1), ("no crease 'fold'",)),
+        (lambda: sheet().force("crease:fold", total=(0.0, 0.0, 1.0)), ("no place 'crease:fold'",)),
+        (lambda: sheet(on_the_boundary()).fold("rim", by=0.1), ("'rim'", "along the boundary")),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(make: Callable[[], Any], words: tuple[str, ...]) -> None:
+    with pytest.raises(InputError) as caught:
+        bh.trace(make())
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message
