@@ -100,6 +100,8 @@ def run(context: Context) -> CaseResult:
         context.tell(f"fig3_11: {formulation}")
         curves[formulation] = found = curve(formulation, increments, along)
         _judge(result, found, {"formulation": formulation, "increments": increments, "along": along})
+    context.tell("fig3_11: the folded fan, refined")
+    _against_refined(result, curves, 32 if context.quick else 64, 4 if context.quick else 6)
     _plots(result, curves)
     _notes(result, curves)
     return result
@@ -136,6 +138,23 @@ def _judge(result: CaseResult, found: Curve, params: dict[str, object]) -> None:
     add("K_r / K_a of a hinge between rigid arcs", hinge_bound(ANGLE), "", None, "tan^2(angle / 4)", None)
     add("states in both regimes", float(len(path)), "", None, SOURCE + ": 100 increments each", None)
     add("states that are not stable", float((~found.stable).sum()), "", None, "inertia of the tangent", None)
+
+
+def _against_refined(result: CaseResult, curves: dict[str, Curve], along: int, rows: int) -> None:
+    """Stiffnesses of the folded fan against those of the consistent formulation on a refined mesh."""
+    fan = Fan(along, ANGLE, THICKNESS, "consistent", RADIUS, rows)
+    path = trace(fan.folded)
+    axial, turning = stiffness_of(fan, path, len(path) - 1)
+    for formulation, found in curves.items():
+        at = int(np.flatnonzero(found.progress <= 1.0)[-1])
+        spent = sum(record.wall_time_s for record in found.path.records if record.step == 0)
+        for name, value, reference in (("K_a", found.axial[at], axial), ("K_r", found.turning[at], turning)):
+            quantity = f"{name}, folded to 90 degrees, against the refined fan"
+            params = {"formulation": formulation, "refined": f"{along} x {rows}"}
+            result.checks.append(
+                Check("fig3_11", quantity, params, float(value), "N/mm", reference, "consistent formulation, refined",
+                      None, found.path.unknowns, found.path.iterations, spent, path.outcome)
+            )  # fmt: skip
 
 
 def _plots(result: CaseResult, curves: dict[str, Curve]) -> None:

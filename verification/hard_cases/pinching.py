@@ -114,11 +114,12 @@ class Fan:
         t: float = 0.127,
         formulation: str = "bars-and-hinges",
         radius: float = RADIUS,
+        rows: int = 2,
     ) -> None:
         radii = [radius + PLEAT * i for i in range(PLEATS)]
         folds = ["mountain" if i % 2 == 0 else "valley" for i in range(PLEATS)]
         pattern = meshes.annulus_sector(radii, PLEAT, angle, folds)  # type: ignore[arg-type]
-        self.mesh = meshes.structured(pattern, along=along, rows=2)
+        self.mesh = meshes.structured(pattern, along=along, rows=rows)
         self.er = np.array([math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0])
         self.et = np.array([-math.sin(0.5 * angle), math.cos(0.5 * angle), 0.0])
         places = ["edge:inner", *(f"crease:{name}" for name in self.mesh.creases), "edge:outer"]
