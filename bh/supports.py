@@ -16,6 +16,10 @@ Array = NDArray[np.float64]
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 MOTIONS = ("translation along x", "translation along y", "translation along z",
            "rotation about x", "rotation about y", "rotation about z")  # fmt: skip
+UNBALANCED = (
+    "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
+)
+TURNED = "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
 
 
 @dataclass(frozen=True)

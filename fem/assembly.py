@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import BandMatrix, reverse_cuthill_mckee
-from bh.solvers.sparse import SparseMatrix, SparsePattern, band_is_cheaper
+from bh.solvers.matrices import Storage, reverse_cuthill_mckee
+from bh.solvers.sparse import SparsePattern, band_is_cheaper
 from fem.points import OPTIONS
 from meshes.curved import QuadraticMesh
 from meshes.topology import Ints
@@ -64,29 +64,10 @@ def scatter(K, sides, slots, data):  # type: ignore[no-untyped-def]
 
 
 @dataclass(frozen=True)
-class Pattern:
-    """Where the lower entries of all element matrices (t, 465) go; -1 where a component is prescribed.
+class Pattern(Storage):
+    """Where the lower entries of all element matrices (t, 465) go; -1 in `slots` where a component is prescribed."""
 
-    Attributes:
-        order: (n,) permutation of the unknowns, order[k] is the unknown in row k.
-        size: number of values.
-        bandwidth: of the banded matrix; unused where there is a `sparse` pattern.
-    """
-
-    order: Ints
     slots: Ints
-    size: int
-    bandwidth: int
-    sparse: SparsePattern | None
-
-    @property
-    def banded(self) -> bool:
-        return self.sparse is None
-
-    def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
-        if self.sparse is None:
-            return BandMatrix(data.reshape((self.bandwidth + 1, len(self.order)), order="F"), self.order)
-        return SparseMatrix(data, self.sparse)
 
 
 def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
@@ -119,10 +100,10 @@ def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints, banded: b
         a, b = rows[:, LOWER[0]], rows[:, LOWER[1]]
         column = np.minimum(a, b)
         slots = np.where(column >= 0, np.abs(a - b) + column * (bandwidth + 1), -1)
-        return Pattern(order, slots, (bandwidth + 1) * len(order), bandwidth, None)
+        return Pattern(order, bandwidth, (bandwidth + 1) * len(order), None, slots)
     sparse, _ = SparsePattern.dissected(high, low, sizes[used], mesh.nodes[used, :2], unknowns)
     slots = _sparse_slots(_rows(components, number, sparse.order), sparse.indptr, sparse.indices)
-    return Pattern(sparse.order, slots, len(sparse.indices), bandwidth, sparse)
+    return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, slots)
 
 
 def _owners(mesh: QuadraticMesh, components: Ints, number: Ints) -> Ints:

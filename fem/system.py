@@ -12,8 +12,9 @@ from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.model import Model
 from bh.program import StepProgram
-from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError, Matrix
-from bh.solvers.system import Evaluation
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.solvers.system import Evaluation, grows_ahead
+from bh.supports import TURNED, UNBALANCED
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
@@ -282,17 +283,7 @@ class ShellSystem:
     def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
         if not self.constraints.rigid_body or not (self.load.start.any() or self.load.end.any()):
             return "", ""
-        # an accepted state is in equilibrium; do the forces stay so a little further along the path?
-        try:
-            factor = self.tangent(q, lam, self.evaluate(q, lam).forces).factorise(1e-9)
-        except IndefiniteError:
-            return "", ""
-        ahead = 1e-3 * max(lam, 0.01)
-        moved = q - ahead * factor.solve(self.control_rate(q, lam))
-        lost = self._unbalanced(moved, lam + ahead) - self._unbalanced(q, lam)
-        if lost <= 1e-6 * ahead:
-            return "", ""
-        return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
+        return ("mechanism", TURNED) if grows_ahead(self, q, lam, self._unbalanced) else ("", "")
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         c = self.components
@@ -348,6 +339,4 @@ class ShellSystem:
     def _check_balance(self) -> None:
         for lam in (0.0, 1.0):
             if self._unbalanced(self.start(), lam) > 1e-9:
-                raise ModelError(
-                    "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
-                )
+                raise ModelError(UNBALANCED)

@@ -15,8 +15,24 @@ from bh.solvers.system import Evaluation
 Array = NDArray[np.float64]
 
 
+class Silent:
+    """The answers of a system that has nothing to say of its states."""
+
+    def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        return ""
+
+    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        return ""
+
+    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+        return "", ""
+
+    def describe(self, q: Array, lam: float, motion: Array) -> str:
+        return "the toy moves"
+
+
 @dataclass(frozen=True)
-class VonMisesTruss:
+class VonMisesTruss(Silent):
     """Two bars from (+-span, 0) to (0, rise), pushed down by lambda * force at the top, or through a spring there.
 
     Unknowns: deflection w of the top (mm, downwards); with a spring of stiffness `spring` also the displacement s of
@@ -87,15 +103,3 @@ class VonMisesTruss:
 
     def power(self, q: Array, lam: float) -> float:
         return -self.force * float(q[-1])
-
-    def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return ""
-
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return ""
-
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        return "", ""
-
-    def describe(self, q: Array, lam: float, motion: Array) -> str:
-        return "the toy moves"

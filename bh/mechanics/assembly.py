@@ -74,7 +74,7 @@ def nodal_forces(  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _rotate(H, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
+def rotate(H, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
     """Turn the rows and columns of nodes with local axes; H (3 p, 3 p) with its lower triangle filled."""
     n = 3 * len(nodes)
     any_turned = False
@@ -107,7 +107,7 @@ def _rotate(H, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _scatter(H, n, slots, data):  # type: ignore[no-untyped-def]
+def scatter(H, n, slots, data):  # type: ignore[no-untyped-def]
     at = 0
     for i in range(n):
         for j in range(i + 1):
@@ -173,8 +173,8 @@ def tangent_values(  # type: ignore[no-untyped-def]
         d = _bar_matrix(x, bars[i, 0], bars[i, 1], rest_length[i], k_bar[i], s_bar[i], green, B)
         d_bar[i, 0], d_bar[i, 1], d_bar[i, 2] = d[0], d[1], d[2]
         if turned:
-            _rotate(B, bars[i], frame_of, frames)
-        _scatter(B, 6, bar_slots[i], data)
+            rotate(B, bars[i], frame_of, frames)
+        scatter(B, 6, bar_slots[i], data)
     for i in range(len(hinges)):
         g = g_hinge[i]
         geometry = hinge_geometry(x, hinges[i], g)
@@ -187,8 +187,8 @@ def tangent_values(  # type: ignore[no-untyped-def]
                 H[p, q] = k * g[p] * g[q]
         add_hinge_hessian(geometry, s_hinge[i], H)
         if turned:
-            _rotate(H, hinges[i], frame_of, frames)
-        _scatter(H, 12, hinge_slots[i], data)
+            rotate(H, hinges[i], frame_of, frames)
+        scatter(H, 12, hinge_slots[i], data)
 
 
 @njit(**OPTIONS)
@@ -199,7 +199,7 @@ def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge,
     g = np.empty(12)
     for i in range(len(bars)):
         _bar_matrix(x, bars[i, 0], bars[i, 1], rest_length[i], k_bar[i], s_bar[i], green, B)
-        _multiply(B, bars[i], v, out)
+        add_product(B, bars[i], v, out)
     for i in range(len(hinges)):
         geometry = hinge_geometry(x, hinges[i], g)
         k = k_hinge[i]
@@ -209,11 +209,11 @@ def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge,
             for q in range(p + 1):
                 H[p, q] = k * g[p] * g[q]
         add_hinge_hessian(geometry, s_hinge[i], H)
-        _multiply(H, hinges[i], v, out)
+        add_product(H, hinges[i], v, out)
 
 
 @njit(**OPTIONS)
-def _multiply(H, nodes, v, out):  # type: ignore[no-untyped-def]
+def add_product(H, nodes, v, out):  # type: ignore[no-untyped-def]
     n = 3 * len(nodes)
     for p in range(n):
         value = 0.0

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.mechanics import closing
 from bh.mechanics.assembly import (
     Pattern,
     build_pattern,
@@ -17,12 +16,11 @@ from bh.mechanics.assembly import (
     tangent_times,
     tangent_values,
 )
-from bh.mechanics.displacements import Displacements, turning_forces
 from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
-from bh.mechanics.motions import describe_motion
+from bh.mechanics.supported import SupportedSheet
 from bh.model import Model
-from bh.program import HELD, StepProgram
+from bh.program import StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
@@ -34,12 +32,11 @@ COMPLIANCE = 1e-9  # of a held crease, in parts of 1 / gamma
 ROUNDING = 8.0 * np.finfo(float).eps
 
 
-class BarsAndHingesSystem:
+class BarsAndHingesSystem(SupportedSheet):
     """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then held moments (N mm)."""
 
     def __init__(self, model: Model, program: StepProgram, start: State | None) -> None:
-        self.mesh = model.mesh
-        mesh = self.mesh
+        mesh = model.mesh
         if len(program.constraints.clamped):
             raise ModelError(
                 "bars and hinges have no slope at an edge to clamp; take formulation consistent, or hold the next row"
@@ -51,25 +48,16 @@ class BarsAndHingesSystem:
         moments = np.zeros(len(held_start)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
         self.elements = sheet_elements(model, program, held_start, moments)
-        self.displacements = Displacements(mesh, program.constraints, start_points)
-        self.constraints = self.displacements.constraints
-        self.force = program.force
-        self.program = program
-        self.primal = len(self.displacements.free)
+        super().__init__(model, program, start)
+        self.primal = self.moving
         self.size = self.primal + self.elements.held
         self._bar_scale = model.sheet.E * model.sheet.t
         self._moments_start = moments
         self._d_bar = np.empty((len(self.elements.bars), 3))
         self._g_hinge = np.empty((len(self.elements.hinges), 12))
         self._k_hinge = np.empty(len(self.elements.hinges))  # with the locks, as of the last tangent
-        if self.constraints.rigid_body:
-            self.displacements.check_balance(self.force)
 
     # ------------------------------------------------------------------------------- unknowns and positions
-
-    @property
-    def rotation(self) -> float:
-        return self.program.rotation
 
     @cached_property
     def energy_scale(self) -> float:
@@ -82,20 +70,6 @@ class BarsAndHingesSystem:
         if self.elements.held:
             q[self.primal :] = self._moments_start[self.elements.source[-self.elements.held :]]
         return q
-
-    def positions(self, q: Array, lam: float) -> Array:
-        """(n, 3) node positions, mm."""
-        return self.displacements.positions(q[: self.primal], lam)
-
-    def vectors(self, dq: Array) -> Array:
-        """(n, 3) changes of positions, mm, for changes dq (size,) of the unknowns."""
-        return self.displacements.vectors(dq[: self.primal])
-
-    def loads(self, forces: Array) -> Array:
-        """(size,) what nodal forces (n, 3), N, are to the unknowns; their part along supports is left out."""
-        out = np.zeros(self.size)
-        out[: self.primal] = self.displacements.components(forces)
-        return out
 
     @cached_property
     def hinge_lengths(self) -> Array:
@@ -250,36 +224,6 @@ class BarsAndHingesSystem:
             e.hinges, e.hinge_stiffness, e.lock, forces[bars:], out,
         )  # fmt: skip
         return out
-
-    # ------------------------------------------------------------------------------- what to say of a state
-
-    def angles(self, q: Array, lam: float) -> Array:
-        """(m,) dihedral angles at every hinge of the mesh, rad."""
-        return dihedral_angles(self.positions(q, lam), self.mesh.topology.hinges)
-
-    def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
-
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return closing.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
-
-    def contact(self, q: Array, lam: float) -> str:
-        """Which panels have met at a hinge that is not held, or an empty string."""
-        reference = dihedral_angles(self.reference, self.mesh.topology.hinges)
-        return closing.touching(self.mesh, self.angles(q, lam), reference, self.program.law != HELD)
-
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        touching = self.contact(q, lam)
-        return (
-            ("contact", touching)
-            if touching
-            else turning_forces(self, self.displacements, self.force, q, lam)
-        )
-
-    def describe(self, q: Array, lam: float, motion: Array) -> str:
-        return describe_motion(
-            self.mesh, self.positions(q, lam), self.displacements.vectors(motion[: self.primal])
-        )
 
     # ------------------------------------------------------------------------------- pattern, grounding, constraints
 

@@ -50,9 +50,9 @@ class BarsAndHinges:
         by_hinge = 0.5 * e.hinge_stiffness * turn**2
         by_lock = lock_terms(phi, e.lock)[:, 0].sum()
         density = {
-            "stretching": _to_triangles(model, stretch, np.arange(len(e.bars))),
-            "bending": _to_triangles(model, by_hinge[bend], mesh.topology.hinge_edges[e.source[bend]]),
-            "folding": _to_triangles(model, by_hinge[spring], mesh.topology.hinge_edges[e.source[spring]]),
+            "stretching": to_triangles(model, stretch, np.arange(len(e.bars))),
+            "bending": to_triangles(model, by_hinge[bend], mesh.topology.hinge_edges[e.source[bend]]),
+            "folding": to_triangles(model, by_hinge[spring], mesh.topology.hinge_edges[e.source[spring]]),
         }
         angles = np.empty(len(e.hinges))
         angles[e.source] = phi
@@ -72,7 +72,7 @@ class BarsAndHinges:
         )  # fmt: skip
 
 
-def _to_triangles(model: Model, energy: Array, edges: Ints) -> Array:
+def to_triangles(model: Model, energy: Array, edges: Ints) -> Array:
     """Energy of edges shared by area among their triangles, as a density (t,), N mm / mm^2."""
     mesh = model.mesh
     sides = mesh.topology.edge_triangles[edges]

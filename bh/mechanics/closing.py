@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.mechanics.assembly import _multiply, _rotate, _scatter
+from bh.mechanics.assembly import add_product, rotate, scatter
 from bh.mechanics.hinge_lock import ZONE, in_zone, lock, until_closed
 from bh.mechanics.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
 from bh.program import hinge_name
@@ -58,8 +58,8 @@ def lock_tangent(x, hinges, k, L, frame_of, frames, slots, data):  # type: ignor
     for h in range(len(hinges)):
         if _lock_matrix(x, hinges[h], k[h], L[h], g, H):
             if len(frames) > 0:
-                _rotate(H, hinges[h], frame_of, frames)
-            _scatter(H, 12, slots[h], data)
+                rotate(H, hinges[h], frame_of, frames)
+            scatter(H, 12, slots[h], data)
 
 
 @njit(**OPTIONS)
@@ -82,7 +82,7 @@ def lock_force_rates(x, v, hinges, k, L, f):  # type: ignore[no-untyped-def]
     g, H = np.empty(12), np.zeros((12, 12))
     for h in range(len(hinges)):
         if _lock_matrix(x, hinges[h], k[h], L[h], g, H):
-            _multiply(H, hinges[h], v, f)
+            add_product(H, hinges[h], v, f)
 
 
 def crossing(mesh: SheetMesh, before: Array, after: Array) -> str:

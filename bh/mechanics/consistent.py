@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.mechanics.bars_and_hinges import _to_triangles
+from bh.mechanics.bars_and_hinges import to_triangles
 from bh.mechanics.consistent_kernels import TURN
 from bh.mechanics.consistent_system import ConsistentSystem
 from bh.mechanics.kinematics import dihedral_angles
@@ -72,7 +72,7 @@ class Consistent:
             energy_density={
                 "stretching": stretching / mesh.areas,
                 "bending": bending / mesh.areas,
-                "folding": _to_triangles(model, folding, topology.hinge_edges[e.springs]),
+                "folding": to_triangles(model, folding, topology.hinge_edges[e.springs]),
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable,

@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from bh.mechanics.assembly import _rotate, _scatter
+from bh.mechanics.assembly import rotate, scatter
 from bh.mechanics.hinge_lock import in_zone
 from bh.mechanics.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
 
@@ -90,8 +90,8 @@ def stretching_tangent(x, triangles, K, N, frame_of, frames, slots, data):  # ty
                         H[3 * p + i, 3 * q + j] = W[q1] * d[q1, j] - W[q2] * d[q2, j]
                     H[3 * p + i, 3 * q + i] += geometric
         if len(frames) > 0:
-            _rotate(H, triangles[t], frame_of, frames)
-        _scatter(H, 9, slots[t], data)
+            rotate(H, triangles[t], frame_of, frames)
+        scatter(H, 9, slots[t], data)
 
 
 @njit(**OPTIONS)
@@ -213,8 +213,8 @@ def bending_tangent(  # type: ignore[no-untyped-def]
                     for j in range(i + 1):
                         H[i, j] += G[a, i] * W[a, j]
         if len(frames) > 0:
-            _rotate(H, nodes[c], frame_of, frames)
-        _scatter(H, n, slots[c], data)
+            rotate(H, nodes[c], frame_of, frames)
+        scatter(H, n, slots[c], data)
     return closing
 
 
@@ -292,8 +292,8 @@ def spring_tangent(x, hinges, stiffness, S, nodes, frame_of, frames, slots, data
     for h in range(len(hinges)):
         closing = _spring_matrix(x, hinges[h], stiffness[h], S[h], H, small, g) or closing
         if len(frames) > 0:
-            _rotate(H, nodes[h], frame_of, frames)
-        _scatter(H, 14, slots[h], data)
+            rotate(H, nodes[h], frame_of, frames)
+        scatter(H, 14, slots[h], data)
     return closing
 
 

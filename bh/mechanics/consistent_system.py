@@ -14,13 +14,12 @@ from bh.mechanics import consistent_kernels as kernels
 from bh.mechanics import consistent_setup as setup
 from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent_pattern import rotation_pattern
-from bh.mechanics.displacements import Displacements, turning_forces
 from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
-from bh.mechanics.motions import describe_motion
 from bh.mechanics.pattern import Pattern
+from bh.mechanics.supported import SupportedSheet
 from bh.model import Model
-from bh.program import HELD, StepProgram
+from bh.program import StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation
 from bh.state import State
@@ -60,13 +59,12 @@ class Internal(NamedTuple):
     turns: Array
 
 
-class ConsistentSystem:
+class ConsistentSystem(SupportedSheet):
     """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then edge rotations (rad)."""
 
     def __init__(self, model: Model, program: StepProgram, start: State | None) -> None:
-        self.mesh = mesh = model.mesh
-        self.program = program
-        self.force = program.force
+        super().__init__(model, program, start)
+        mesh = self.mesh
         self.hinges = hinges = mesh.topology.hinges
         start_points = mesh.points if start is None else start.points
         reference = dihedral_angles(mesh.points, hinges)
@@ -82,23 +80,14 @@ class ConsistentSystem:
             else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
         )
         self.elements = consistent_elements(model, program, angles, moments)
-        self.displacements = Displacements(mesh, program.constraints, start_points)
-        self.constraints = self.displacements.constraints
-        self.moving = len(self.displacements.free)
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
         self._tangent_at = mesh.points
         self._closing = False
         self._frame_of = np.append(self.constraints.frame_of, -1)
-        if self.constraints.rigid_body:
-            self.displacements.check_balance(self.force)
 
     # ------------------------------------------------------------------------------- unknowns and positions
-
-    @property
-    def rotation(self) -> float:
-        return self.program.rotation
 
     @cached_property
     def energy_scale(self) -> float:
@@ -124,20 +113,6 @@ class ConsistentSystem:
         )
         entries = (values[:used], (rows[:used], columns[:used]))
         return sp.csc_matrix(entries, shape=(e.rotations, e.rotations))
-
-    def positions(self, q: Array, lam: float) -> Array:
-        """(n, 3) node positions, mm."""
-        return self.displacements.positions(q[: self.moving], lam)
-
-    def vectors(self, dq: Array) -> Array:
-        """(n, 3) changes of positions, mm, for changes dq (size,) of the unknowns."""
-        return self.displacements.vectors(dq[: self.moving])
-
-    def loads(self, forces: Array) -> Array:
-        """(size,) what nodal forces (n, 3), N, are to the unknowns; their part along supports is left out."""
-        out = np.zeros(self.size)
-        out[: self.moving] = self.displacements.components(forces)
-        return out
 
     @cached_property
     def _counts(self) -> tuple[int, int, int, int]:
@@ -346,30 +321,3 @@ class ConsistentSystem:
         """d^2 energy / d lambda^2 at fixed q, N mm."""
         v = self.displacements.prescribed_motion
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v))
-
-    # ------------------------------------------------------------------------------- what to say of a state
-
-    def angles(self, q: Array, lam: float) -> Array:
-        """(m,) dihedral angles between the triangles at every hinge of the mesh, rad."""
-        return dihedral_angles(self.positions(q, lam), self.hinges)
-
-    def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return closings.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
-
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Which panels passed through each other at a hinge between two states, or an empty string."""
-        return closings.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
-
-    def contact(self, q: Array, lam: float) -> str:
-        """Which panels have met at a hinge that is not held, or an empty string."""
-        reference = dihedral_angles(self.mesh.points, self.hinges)
-        return closings.touching(self.mesh, self.angles(q, lam), reference, self.program.law != HELD)
-
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        touching = self.contact(q, lam)
-        if touching:
-            return "contact", touching
-        return turning_forces(self, self.displacements, self.force, q, lam)
-
-    def describe(self, q: Array, lam: float, motion: Array) -> str:
-        return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from bh.actuation import Ramp
 from bh.errors import ModelError
-from bh.solvers.matrices import IndefiniteError
-from bh.solvers.system import System
-from bh.supports import Constraints, free_motions, rigid_motions
+from bh.supports import UNBALANCED, Constraints, free_motions, rigid_motions
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -125,27 +123,4 @@ class Displacements:
         """Raises `ModelError` where dead forces would push a sheet that is free to move rigidly."""
         for load in (force.start, force.end):
             if self.unbalanced(self.reference, load) > 1e-9:
-                raise ModelError(
-                    "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
-                )
-
-
-def turning_forces(
-    system: System, displacements: Displacements, force: Ramp, q: Array, lam: float
-) -> tuple[str, str]:
-    """Outcome "mechanism" and its reason where dead forces do not stay in equilibrium on a free sheet, else empty."""
-    if not displacements.constraints.rigid_body or not (force.start.any() or force.end.any()):
-        return "", ""
-    # an accepted state is in equilibrium; do the forces stay so a little further along the path?
-    try:
-        factor = system.tangent(q, lam, system.evaluate(q, lam).forces).factorise(1e-9)
-    except IndefiniteError:
-        return "", ""
-    ahead = 1e-3 * max(lam, 0.01)
-    moved = q - ahead * factor.solve(system.control_rate(q, lam))
-    k = len(displacements.free)
-    there = displacements.unbalanced(displacements.positions(moved[:k], lam + ahead), force.at(lam + ahead))
-    here = displacements.unbalanced(displacements.positions(q[:k], lam), force.at(lam))
-    if there - here <= 1e-6 * ahead:
-        return "", ""
-    return "mechanism", "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
+                raise ModelError(UNBALANCED)

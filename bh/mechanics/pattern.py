@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import BandMatrix, reverse_cuthill_mckee
-from bh.solvers.sparse import SparseMatrix, SparsePattern, band_is_cheaper
+from bh.solvers.matrices import Storage, reverse_cuthill_mckee
+from bh.solvers.sparse import SparsePattern, band_is_cheaper
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -17,32 +17,15 @@ Slots = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
-class Pattern:
+class Pattern(Storage):
     """Where the entries of all elements go.
 
     Attributes:
-        order: (n,) permutation of the unknowns, order[k] is the unknown in row k.
-        bandwidth: of the permuted matrix; used if `banded`.
         slots: one (elements, entries) array for each group of elements: where the lower entries of its matrix, row
             by row, go in the values; -1 where an unknown is prescribed.
-        size: number of values.
-        sparse: the pattern of the sparse matrix, None if banded.
     """
 
-    order: Ints
-    bandwidth: int
     slots: tuple[Slots, ...]
-    size: int
-    sparse: SparsePattern | None
-
-    @property
-    def banded(self) -> bool:
-        return self.sparse is None
-
-    def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
-        if self.sparse is None:
-            return BandMatrix(data.reshape((self.bandwidth + 1, len(self.order)), order="F"), self.order)
-        return SparseMatrix(data, self.sparse)
 
 
 def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None = None) -> Pattern:
@@ -68,7 +51,7 @@ def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None =
     if band_is_cheaper(n, bandwidth):
         starts = np.arange(n, dtype=np.int64) * (bandwidth + 1)
         slots = tuple(_band_slots(group, number, place, first, starts) for group in groups)
-        return Pattern(_unknowns(number, order), bandwidth, slots, (bandwidth + 1) * n, None)
+        return Pattern(_unknowns(number, order), bandwidth, (bandwidth + 1) * n, None, slots)
     sparse, tree_order = SparsePattern.dissected(
         high, low, sizes, None if places is None else places[used], lambda order: _unknowns(number, order)
     )
@@ -76,7 +59,7 @@ def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None =
     slots = tuple(
         _sparse_slots(group, number, place, first, sparse.indptr, sparse.indices) for group in groups
     )
-    return Pattern(sparse.order, bandwidth, slots, len(sparse.indices), sparse)
+    return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, slots)
 
 
 def _unknowns(number: Ints, order: Ints) -> Ints:

@@ -23,12 +23,11 @@ class IndefiniteError(ArithmeticError):
 
 
 class Descent(NamedTuple):
-    """A direction (n,), the rate of change of the merit along its primal part (N mm, negative), and whether that is so
-    once the multipliers have been changed as it says (`first`) or before they are."""
+    """A direction (n,), and the rate of change of the merit along its primal part (N mm, negative) once the multipliers
+    have been changed as it says."""
 
     direction: Array
     slope: float
-    first: bool = True
 
 
 class Factor(Protocol):

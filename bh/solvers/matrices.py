@@ -19,6 +19,7 @@ from bh.solvers.factor import Factor as Factor
 from bh.solvers.factor import IndefiniteError as IndefiniteError
 from bh.solvers.factor import Matrix as Matrix
 from bh.solvers.sparse import SparseMatrix as SparseMatrix
+from bh.solvers.sparse import SparsePattern
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -123,6 +124,35 @@ class BandLDLFactor(Factor):
 
     def descend(self, residual: Array) -> Descent:
         raise IndefiniteError(1)
+
+
+# ---------------------------------------------------------------------------------------------- either
+
+
+@dataclass(frozen=True)
+class Storage:
+    """How the values of a symmetric matrix are stored, in a band or sparse: found once, filled many times.
+
+    Attributes:
+        order: (n,) permutation of the unknowns, order[k] is the unknown in row k.
+        bandwidth: of the permuted matrix; used if `banded`.
+        size: number of values.
+        sparse: the pattern of the sparse matrix, None if banded.
+    """
+
+    order: Ints
+    bandwidth: int
+    size: int
+    sparse: SparsePattern | None
+
+    @property
+    def banded(self) -> bool:
+        return self.sparse is None
+
+    def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
+        if self.sparse is None:
+            return BandMatrix(data.reshape((self.bandwidth + 1, len(self.order)), order="F"), self.order)
+        return SparseMatrix(data, self.sparse)
 
 
 # ---------------------------------------------------------------------------------------------- composed

@@ -56,8 +56,6 @@ class Newton:
         bold_shift: largest shift of the bold way; a tangent that is more indefinite asks for the careful one.
         transient: the last resort; None to do without.
         unstable: take indefinite tangents as they are and go boldly only, to stay on a branch that is not stable.
-        saddles: where the careful way comes close to a saddle, solve for it, so that whoever asked can see what
-            lies there; False rolls on downhill.
     """
 
     tolerance: float = 1e-8
@@ -66,7 +64,6 @@ class Newton:
     bold_shift: float = 1e-5
     transient: PseudoTransient | None = field(default_factory=PseudoTransient)
     unstable: bool = False
-    saddles: bool = False
 
     def solve(
         self,
@@ -133,7 +130,6 @@ class Newton:
         """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns."""
         now = system.evaluate(q, lam)
         shift, before = 0.0, np.inf
-        saddles = self.saddles
         for iteration in range(self.careful):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=True)
@@ -147,11 +143,6 @@ class Newton:
                 return self._finish(system, q, lam, now, iteration, careful=True)
             if shift > 1e-9 and now.imbalance < NEAR_SADDLE:
                 # nearly at rest where the tangent is indefinite: without a push it would take for ever to roll off
-                if saddles:
-                    there = replace(self, unstable=True, bold=6).solve_boldly(system, q, lam, now.forces)
-                    if there.converged:
-                        return replace(there, iterations=iteration + there.iterations, careful=True)
-                    saddles = False
                 rolled = roll_off(system, q, lam, now, matrix)
                 if rolled is not None:
                     q, now = rolled
@@ -229,12 +220,12 @@ def line_search(
 ) -> tuple[Array, Evaluation, float] | None:
     """Step along a direction that lowers the merit enough (Armijo); None if there is none.
 
-    Multipliers are held while looking, changed before or after as the descent says.
+    Multipliers are changed before and held while looking.
     """
     p = system.primal
     dq, slope = descent.direction, descent.slope
     start = q
-    if len(q) > p and descent.first:
+    if len(q) > p:
         start = q.copy()
         start[p:] += dq[p:]
         now = system.evaluate(start, lam)
@@ -247,9 +238,6 @@ def line_search(
         if np.isfinite(there.energy) and (
             there.merit <= now.merit + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
         ):
-            if len(q) > p and not descent.first:
-                trial[p:] += length * dq[p:]
-                there = system.evaluate(trial, lam)
             return trial, there, length
         gain = there.merit - now.merit - length * slope
         best = -0.5 * slope * length**2 / gain if np.isfinite(gain) and gain > 0.0 else 0.0

@@ -46,7 +46,7 @@ class PseudoTransient:
                 continue
             descent = factor.descend(now.residual)
             base, start = now, q.copy()
-            if len(q) > p and descent.first:
+            if len(q) > p:
                 start[p:] += descent.direction[p:]
                 base = system.evaluate(start, lam)
             trial = start.copy()
@@ -56,9 +56,6 @@ class PseudoTransient:
             if not (np.isfinite(there.energy) and there.merit <= base.merit + noise):
                 shift = max(4.0 * shift, 1e-9)
                 continue
-            if len(q) > p and not descent.first:
-                trial[p:] += descent.direction[p:]
-                there = system.evaluate(trial, lam)
             steps += 1
             ratio = there.imbalance / now.imbalance
             shift *= min(2.0, max(0.1, ratio))

@@ -16,7 +16,6 @@ Ints = NDArray[np.int64]
 NOISE = 2e-14  # error of a constraint that is rounding (angles in rad)
 ROUNDING = 4.0 * np.finfo(float).eps  # of a sum, in parts of the sum of its sizes
 TINY_SHIFT = 1e-12  # shifts up to this only take rounding off
-MUCH_SHIFT = 1e9  # shifts above this make multipliers of their own
 MOST_BRISK = (
     300  # constraints up to which an indefinite augmented matrix is looked at closely in every iteration
 )
@@ -90,9 +89,7 @@ class MultiplierMatrix:
 
     def factorise(self, shift: float = 0.0) -> MultiplierFactor | DenseSchurFactor:
         try:
-            return MultiplierFactor(
-                self.augmented.factorise(shift), self.G, self.gamma, self.compliance, shift
-            )
+            return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma, self.compliance)
         except IndefiniteError:
             if shift > TINY_SHIFT or len(self.gamma) > MOST_BRISK:
                 raise
@@ -132,7 +129,6 @@ class MultiplierFactor(Factor):
     G: ConstraintRows
     gamma: Array
     compliance: Array
-    shift: float = 0.0
     most: int = 40
     tolerance: float = 1e-3
 
@@ -175,16 +171,9 @@ class MultiplierFactor(Factor):
 
         With those the gradient of the augmented Lagrangian is -(K + gamma G^T G) x, as G x = -gap; so its slope along x
         is negative wherever the (shifted) augmented matrix is definite. Updating the multipliers to first order only
-        (gamma times what is missed) crawls where the sheet is stiffer against the constraint than gamma. But where the
-        matrix had to be shifted much its multipliers are those of the shift: then the first order it is.
+        (gamma times what is missed) crawls where the sheet is stiffer against the constraint than gamma.
         """
         n = self.G.n
-        if self.shift > MUCH_SHIFT:
-            gap = residual[n:]
-            gradient = residual[:n] + self.G.transpose_times(self.gamma * gap)
-            x = -self.factor.solve(gradient)
-            change = self.gamma * (gap + self.G.times(x))
-            return Descent(np.concatenate((x, change)), float(gradient @ x), first=False)
         direction = -self.solve(residual)
         moments = direction[n:] + self.gamma * residual[n:]
         gradient = residual[:n] + self.G.transpose_times(moments)

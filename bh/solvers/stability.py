@@ -26,7 +26,6 @@ def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -
     _, mode = lowest_mode(tangent, len(saddle.q), system.primal)
     mode /= max(float(np.abs(mode).max()), 1e-300)
     size = float(np.ptp(saddle.q[: system.primal])) or 1.0
-    newton = replace(newton, saddles=False)
     spent = 0
     for amplitude in (1e-2, 5e-2, 2e-1):
         starts = [saddle.q + sense * amplitude * size * mode for sense in (1.0, -1.0)]

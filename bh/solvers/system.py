@@ -5,12 +5,13 @@ All actuation enters through one scalar lambda, which runs from 0 to 1 in a step
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.matrices import Matrix
+from bh.solvers.factor import IndefiniteError, Matrix
 
 Array = NDArray[np.float64]
 
@@ -95,3 +96,14 @@ class System(Protocol):
     def rotation(self) -> float:
         """Largest change of an imposed or rest angle while lambda runs from 0 to 1, rad."""
         ...
+
+
+def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, float], float]) -> bool:
+    """Does `measure`, zero in equilibrium, grow to first order along the path's own tangent from an accepted state?"""
+    try:
+        factor = system.tangent(q, lam, system.evaluate(q, lam).forces).factorise(1e-9)
+    except IndefiniteError:
+        return False
+    ahead = 1e-3 * max(lam, 0.01)
+    moved = q - ahead * factor.solve(system.control_rate(q, lam))
+    return measure(moved, lam + ahead) - measure(q, lam) > 1e-6 * ahead

@@ -67,7 +67,7 @@ def test_product_and_solution_in_the_users_numbering(store: Any) -> None:
     assert np.array_equal(matrix.diagonal(), np.diag(A))
     factor = matrix.factorise()
     assert np.allclose(factor.solve(A @ x), x, rtol=1e-12, atol=1e-12)
-    direction, slope, _ = factor.descend(A @ x)
+    direction, slope = factor.descend(A @ x)
     assert np.allclose(direction, -x, rtol=1e-12, atol=1e-12)
     assert slope == pytest.approx(-x @ A @ x)
 

@@ -19,6 +19,7 @@ from bh.solvers.newton import Newton, Solution, line_search
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
 from bh.solvers.trace import Walk, walk
+from verification.toys import Silent
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ def band(A: Array) -> BandMatrix:
     return BandMatrix(ab, np.arange(n))
 
 
-class Toy:
+class Toy(Silent):
     """A system given by its energy, gradient and Hessian in q; lambda is a dead load along `load`."""
 
     rotation = 0.0
@@ -68,18 +69,6 @@ class Toy:
 
     def power(self, q: Array, lam: float) -> float:
         return -float(self.load @ q)
-
-    def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return ""
-
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return ""
-
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        return "", ""
-
-    def describe(self, q: Array, lam: float, motion: Array) -> str:
-        return "the toy moves"
 
 
 class Springs(Toy):
