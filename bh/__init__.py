@@ -35,7 +35,7 @@ _HOME = {
 }  # fmt: skip
 
 _SUBMODULES = {
-    "contact": "bh.analysis.contact", "plotting": "bh.plotting", "scan": "bh.scan",
+    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "plotting": "bh.plotting", "scan": "bh.scan",
     "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 
