@@ -35,8 +35,8 @@ _HOME = {
 }  # fmt: skip
 
 _SUBMODULES = {
-    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "plotting": "bh.plotting", "scan": "bh.scan",
-    "stiffness_probe": "bh.analysis.stiffness_probe",
+    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "pinching": "bh.applications.pinching",
+    "plotting": "bh.plotting", "scan": "bh.scan", "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 
 __all__ = [

@@ -25,6 +25,7 @@ ALL_CASES = {
     "fig5_9": "verification.fig5_9",
     "fig5_10": "verification.fig5_10",
     "fig5_11": "verification.fig5_11",
+    "pinch_shell": "verification.pinch_shell",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
