@@ -45,7 +45,7 @@ def turn_blocks(K, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def scatter(K, sides, slots, data):  # type: ignore[no-untyped-def]
-    """Add element matrices (t, w, w) by positions and gamma = +-alpha + beta / 2 to the values `data`; sides (t, 3 r)."""
+    """Add element matrices (t, w, w) by positions and gamma = +-alpha + beta / 2 to `data`; sides (t, 3 r)."""
     width, turns = K.shape[1], sides.shape[1]
     source = np.empty(width + turns, dtype=np.int64)
     factor = np.ones(width + turns)

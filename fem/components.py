@@ -1,9 +1,9 @@
 """All components of the shell in one vector, prescribed ones included, and what an element sees of them.
 
 Displacements of all nodes in local axes (mm), r rotations alpha an edge and r fold angles beta a creased edge (rad).
-r = 2 with quadratic positions: values at the lower and the higher node; r = 1 with linear positions: constant. An element
-of n nodes sees 3 n displacements, 3 r alpha and 3 r beta (-1 where its edge is not creased), and works with its positions
-and the rotations gamma = +-alpha + beta / 2 of its side of its edges.
+r = 2 with quadratic positions: values at the lower and the higher node; r = 1 with linear positions: constant. An
+element of n nodes sees 3 n displacements, 3 r alpha and 3 r beta (-1 where its edge is not creased), and works with its
+positions and the rotations gamma = +-alpha + beta / 2 of its side of its edges.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class Shell:
 
 
 class LinearShell(Shell):
-    """Formulation "linear-shell": linear displacements, constant moments (HHJ) and membrane strains; the cheap member."""
+    """Formulation "linear-shell": linear displacements, constant moments (HHJ) and strains; the cheap member."""
 
     name = "linear-shell"
     degree = 1

@@ -14,7 +14,7 @@ each other:
 So the energy of the sheet is a plain minimum over positions and edge rotations, and keeping the forces as independent
 variables in Newton's method is the mixed method itself.
 
-With linear positions there are 3 strains and 3 curvatures, all constant. Shapes below: n nodes, m functions with each of
+With linear positions: 3 strains and 3 curvatures, all constant. Shapes below: n nodes, m functions with each of
 three tensors, r rotations an edge (`fem.spaces.Tables`); n = 6, m = 3, r = 2 or n = 3, m = 1, r = 1.
 """
 
@@ -129,7 +129,7 @@ def _basis(table: Tables, tensors: Array) -> Array:
 
 
 def membrane_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> Array:
-    """(t, 3 m, 3 m) of int C : eps : eps dA; eps covariant, C = E t / (1 - nu^2) [(1 - nu) eps : eps + nu tr(eps)^2]."""
+    """(t, 3 m, 3 m) of int C:eps:eps dA; eps covariant, C = E t / (1 - nu^2) [(1 - nu) eps : eps + nu tr(eps)^2]."""
     stiffness = sheet.E * sheet.t / (1.0 - sheet.nu**2)
     raised = np.linalg.inv(metric)
     eps = _basis(table, STRAINS)

@@ -125,8 +125,8 @@ def edge_points(edge: int, s: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """What the element loops need; n nodes, q points inside, p points on an edge, m functions with each of the tensors S_j
-    or R_j (3 m in all, number m j + k), r of which and of the rotations live on the edge.
+    """What the element loops need; n nodes, q points inside, p points on an edge, m functions with each of the tensors
+    S_j or R_j (3 m in all, number m j + k), r of which and of the rotations live on the edge.
 
     Attributes:
         Q: (3 m, n, n) the strain's coefficients are 1/2 sum_ij Q[c, i, j] x_i . x_j; see `regge_interpolation`.
@@ -168,7 +168,7 @@ class Tables:
 
 @cache
 def tables(degree: int = 2) -> Tables:
-    """Tables of positions of degree 2, exact to degree 4 inside and 5 on edges, or of degree 1, where all is constant."""
+    """Tables of positions of degree 2, exact to degree 4 inside and 5 on edges, or of degree 1: all is constant."""
     return _quadratic(4, 5) if degree == 2 else _linear()
 
 

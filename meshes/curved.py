@@ -1,5 +1,5 @@
-"""Nodes for elements of first and second order: the mesh as it is, or lifted, with a node in the middle of every edge on
-the curve that the edge lies on.
+"""Nodes for elements of first and second order: the mesh as it is, or lifted, with a node in the middle of every edge
+on the curve that the edge lies on.
 
 High-order shells need it: with straight edges along a curved crease their energy is 10-40 % wrong and converges at
 first order only.

@@ -1,5 +1,5 @@
-"""The shell with linear positions and constant moments (HHJ0): the same discrete energy as the consistent bars and hinges,
-which were written apart from it, so that each proves the other; and what it shares with the quadratic one."""
+"""The shell with linear positions and constant moments (HHJ0): the same discrete energy as the consistent bars and
+hinges, which were written apart from it, so that each proves the other; and what it shares with the quadratic one."""
 
 from __future__ import annotations
 
