@@ -116,7 +116,7 @@ class GmshTable(Table):
     kind: Literal["gmsh"] = Field(description='"gmsh"')
     size: Annotated[float, Field(gt=0.0)] = Field(description="the length of an edge in mm, positive")
     near: dict[str, Annotated[float, Field(gt=0.0)]] = Field(
-        default_factory=dict,
+        {},
         description='shorter edges at some creases or sides in mm, such as { "crease:crease" = 1.0 }',
     )
     growth: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
