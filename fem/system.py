@@ -135,6 +135,20 @@ class ShellSystem:
         """(n, 3) positions of the corners, mm."""
         return self.node_positions(self.components.whole(q, lam))[: len(self.mesh.sheet.points)]
 
+    def vectors(self, dq: Array) -> Array:
+        """(n, 3) changes of the corners' positions, mm, for changes dq (size,) of the unknowns."""
+        change = np.zeros(len(self.components.number))
+        change[self.components.free] = dq
+        return self.components.moves(change)[: len(self.mesh.sheet.points)]
+
+    def loads(self, forces: Array) -> Array:
+        """(size,) what forces (n, 3) at the corners, N, are to the unknowns; their part along supports is left out."""
+        nodal = np.zeros_like(self.mesh.nodes)
+        nodal[: len(forces)] = forces
+        whole = np.zeros(len(self.components.number))
+        whole[: self.components.first_alpha] = self.components.to_local(nodal).ravel()
+        return whole[self.components.free]
+
     def carried_frames(self, components: Array) -> Frames:
         """Frames for a step that begins at this state."""
         x = self.node_positions(components)

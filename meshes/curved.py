@@ -23,9 +23,16 @@ NEAR = 1e-6  # of the sheet's size: farther nodes are not on the curve
 
 @dataclass(frozen=True, eq=False)
 class LinearMesh:
-    """A flat sheet of three-node triangles, under the names of `QuadraticMesh`."""
+    """A flat sheet of three-node triangles, under the names of `QuadraticMesh`.
+
+    Raises:
+        MeshError: the sheet is not flat.
+    """
 
     sheet: SheetMesh
+
+    def __post_init__(self) -> None:
+        check_flat(self.sheet)
 
     degree = 1
 
@@ -104,6 +111,12 @@ def _with_edges(mesh: SheetMesh) -> Ints:
     return np.column_stack((mesh.triangles, len(mesh.points) + mesh.topology.triangle_edges))
 
 
+def check_flat(mesh: SheetMesh) -> None:
+    """Refuse a sheet that does not lie in z = 0 (MeshError)."""
+    if not mesh.flat:
+        raise MeshError("the shell takes only a sheet that is flat in z = 0; unfold it first")
+
+
 def lift(mesh: SheetMesh) -> QuadraticMesh:
     """Lift a flat sheet to second order on the curves of its edge sets.
 
@@ -111,8 +124,7 @@ def lift(mesh: SheetMesh) -> QuadraticMesh:
         MeshError: the sheet is not flat, an edge set does not lie on its curve, or a curved edge turns a triangle
             inside out (the mesh is too coarse for its curves).
     """
-    if not mesh.flat:
-        raise MeshError("only a sheet that is flat in z = 0 can be lifted to second order; unfold it first")
+    check_flat(mesh)
     ends = mesh.points[mesh.topology.edges]
     middle = ends.mean(axis=1)
     for name, curve in mesh.curves.items():

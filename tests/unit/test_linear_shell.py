@@ -11,6 +11,7 @@ import pytest
 
 import bh
 import meshes
+from bh.errors import InputError
 from bh.model import Model, Sheet
 from fem.observables import ShellState
 
@@ -71,3 +72,9 @@ def test_observables() -> None:
     assert isinstance(quadratic, ShellState)
     across = [np.average(np.abs(s.moments[:, 0]), weights=GMSH.areas) for s in (state, quadratic)]
     assert across[0] == pytest.approx(across[1], rel=0.2)
+
+
+def test_takes_only_flat_sheets() -> None:
+    tilted = replace(GMSH, points=GMSH.points[:, [0, 2, 1]])
+    with pytest.raises(InputError, match="flat in z = 0; unfold it"):
+        bh.trace(Model(tilted, MYLAR, formulation="linear-shell").fold("crease", by=0.1))
