@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from bh.actuation import Actuation, Fold, Moment
+from bh.actuation import Actuation, Fold, Moment, Pinch
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
@@ -43,7 +43,7 @@ from bh.scene_schema import (
     within,
 )
 from bh.supports import RigidBody, Support, directions, select
-from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip, structured
+from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, parallel_creases, strip, structured
 
 SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
@@ -209,6 +209,8 @@ def _pattern(table: Any) -> CreasePattern:
     with within("pattern"):
         if table.kind == "strip":
             return strip(table.length, table.width, table.creases, table.fold)
+        if table.kind == "parallel_creases":
+            return parallel_creases(table.curvature, table.length, table.spacing, table.creases, table.fold)
         if table.kind == "annulus_sector":
             return annulus_sector(table.radius, table.width, table.angle, table.fold)
         return full_annulus(table.radius, table.width, table.fold)
@@ -267,8 +269,6 @@ def _crease(item: Any, at: str) -> CreaseLaw:
 
 def _step(item: Any, at: str) -> tuple[Actuation, ...]:
     step = as_table(item, at)
-    if "pinch" in step:
-        raise SceneError(f"{at}.pinch: this version cannot pinch yet; use fold, moment, force or displace")
     check_keys(at, step, ACTUATIONS)
     if not step:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
@@ -308,7 +308,7 @@ def _check(model: Model) -> None:
     for i, actuations in enumerate(model.steps):
         for item in actuations:
             key = type(item).__name__.lower()
-            if isinstance(item, Fold | Moment):
+            if isinstance(item, Fold | Moment | Pinch):
                 if item.crease != "all":
                     with within(f"steps[{i}].{key}.crease"):
                         mesh.crease_edges(item.crease)
