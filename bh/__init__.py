@@ -35,7 +35,8 @@ _HOME = {
 }  # fmt: skip
 
 _SUBMODULES = {
-    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "plotting": "bh.plotting", "scan": "bh.scan",
+    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
+    "plotting": "bh.plotting", "scan": "bh.scan",
     "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 
