@@ -6,7 +6,6 @@ Every error is a `SceneError` of one line. Keys are told as dotted paths; entrie
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -44,6 +43,8 @@ from bh.scene_schema import (
 )
 from bh.supports import RigidBody, Support, directions, select
 from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip, structured
+from meshes.corrugations import KINDS as CORRUGATIONS
+from meshes.corrugations import corrugation, curved_corrugation
 
 SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
@@ -211,6 +212,11 @@ def _pattern(table: Any) -> CreasePattern:
             return strip(table.length, table.width, table.creases, table.fold)
         if table.kind == "annulus_sector":
             return annulus_sector(table.radius, table.width, table.angle, table.fold)
+        if table.kind in CORRUGATIONS:
+            return corrugation(table.kind, table.width, table.height, table.panels, table.fold)
+        if table.kind == "curved-corrugation":
+            shape = (table.exponent, table.root, table.spread)
+            return curved_corrugation(*shape, table.width, table.height, table.panels, table.fold)
         return full_annulus(table.radius, table.width, table.fold)
 
 
@@ -232,8 +238,9 @@ def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
     along = float(how.along or 0)
     if how.aspect_ratio is not None:
         length = max(rail.length for rail in pattern.rails)
-        inner, outer = (rail.point(np.zeros(1))[0] for rail in (pattern.rails[0], pattern.rails[-1]))
-        height = math.dist(inner, outer) / panels
+        # at one end and in the middle: panels can taper
+        inner, outer = (rail.point(np.array([0.0, 0.5])) for rail in (pattern.rails[0], pattern.rails[-1]))
+        height = float(np.linalg.norm(outer - inner, axis=1).max()) / panels
         along = how.aspect_ratio * length / height * how.rows
     _check_triangles(2.0 * along * how.rows * panels)
 

@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from bh.errors import InputError, SceneError
+from meshes.corrugations import KINDS as CORRUGATIONS
 from meshes.pattern import FoldKind
 from meshes.structured import Kind
 
@@ -36,6 +37,8 @@ Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Node = Annotated[int, Field(ge=0, le=2**62)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Folds = FoldKind | Annotated[list[FoldKind], Field(min_length=1)]
+Panels = Annotated[int, Field(ge=2, le=100)]
+Power = Annotated[float, Field(ge=1.0, le=100.0)]
 Place = str | Annotated[list[Node], Field(min_length=1)]
 
 FOLDS = '"mountain", "valley" or "flat", or a list with one of them a crease'
@@ -83,6 +86,35 @@ class FullAnnulusPattern(Table):
     fold: Folds = Field("mountain", description=FOLDS)
 
 
+class CorrugationPattern(Table):
+    """One of the five corrugations of the source (4.3)."""
+
+    kind: Literal["straight", "parabolic-point", "parabolic-edge", "elliptical-point", "elliptical-edge"] = (
+        Field(
+            description='"straight", "parabolic-point", "parabolic-edge", "elliptical-point" or "elliptical-edge"'
+        )
+    )
+    width: Length = Field(100.0, description="a positive length W along x in mm")
+    height: Length = Field(100.0, description="a positive length H along y in mm")
+    panels: Panels = Field(5, description="a whole number of sheets between creases, from 2 to 100")
+    fold: Folds | None = Field(None, description=FOLDS)
+
+
+class CurvedCorrugationPattern(Table):
+    """Any corrugation of the family of `meshes.curved_corrugation`."""
+
+    kind: Literal["curved-corrugation"]
+    exponent: Power = Field(2.0, description="a number p from 1 to 100 (2 for parabolas and ellipses)")
+    root: Power = Field(1.0, description="a number q from 1 to 100 (1 for parabolas, 2 for ellipses)")
+    spread: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.0, description="a number from 0 (creases end at the straight edge) to 1 (in the corners)"
+    )
+    width: Length = Field(100.0, description="a positive length W along x in mm")
+    height: Length = Field(100.0, description="a positive length H along y in mm")
+    panels: Panels = Field(5, description="a whole number of sheets between creases, from 2 to 100")
+    fold: Folds | None = Field(None, description=FOLDS)
+
+
 class FilePattern(Table):
     file: Annotated[str, Field(min_length=1)] = Field(
         description="the name of a .fold file, from the folder of the scene"
@@ -92,10 +124,12 @@ class FilePattern(Table):
     )
 
 
-LIBRARY: dict[str, type[StripPattern | AnnulusSectorPattern | FullAnnulusPattern]] = {
+LIBRARY: dict[str, type[Table]] = {
     "strip": StripPattern,
     "annulus_sector": AnnulusSectorPattern,
     "full_annulus": FullAnnulusPattern,
+    **dict.fromkeys(CORRUGATIONS, CorrugationPattern),
+    "curved-corrugation": CurvedCorrugationPattern,
 }
 
 

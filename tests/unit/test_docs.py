@@ -15,6 +15,8 @@ TABLES: dict[str, type[schema.Table]] = {
     'pattern, kind = "strip"': schema.StripPattern,
     'pattern, kind = "annulus_sector"': schema.AnnulusSectorPattern,
     'pattern, kind = "full_annulus"': schema.FullAnnulusPattern,
+    "pattern, corrugations": schema.CorrugationPattern,
+    'pattern, kind = "curved-corrugation"': schema.CurvedCorrugationPattern,
     "pattern, file": schema.FilePattern,
     "sheet": schema.SheetTable,
     "mesh": schema.MeshTable,
