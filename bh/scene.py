@@ -18,6 +18,7 @@ from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
+from bh.observables import Until
 from bh.program import program
 from bh.scene_schema import (
     ACTUATIONS,
@@ -30,6 +31,7 @@ from bh.scene_schema import (
     OutputsTable,
     SheetTable,
     SupportTable,
+    UntilTable,
     as_table,
     as_tables,
     check_keys,
@@ -272,18 +274,31 @@ def _crease(item: Any, at: str) -> CreaseLaw:
         return CreaseLaw(table.Lstar, table.stiffness, table.rest)
 
 
-def _step(item: Any, at: str) -> tuple[Actuation, ...]:
+def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
     step = as_table(item, at)
     if "pinch" in step:
         raise SceneError(f"{at}.pinch: this version cannot pinch yet; use fold, moment, force or displace")
-    check_keys(at, step, ACTUATIONS)
-    if not step:
+    check_keys(at, step, (*ACTUATIONS, "until"))
+    if not set(step) - {"until"}:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
-    found: list[Actuation] = []
+    found: list[Actuation | Until] = []
     for key, value in step.items():
+        if key == "until":
+            found.append(_until(value, f"{at}.until"))
+            continue
         for where, each in one_or_more(value, f"{at}.{key}"):
             found.append(_actuation(key, each, where))
     return tuple(found)
+
+
+def _until(item: Any, at: str) -> Until:
+    table = read_table(UntilTable, item, at)
+    with within(at):
+        if table.depth is not None:
+            return Until("depth", table.depth, tolerance=table.tolerance)
+        assert table.observable is not None
+        assert table.value is not None
+        return Until(table.observable, table.value, table.of, table.tolerance)
 
 
 def _actuation(key: str, item: Any, at: str) -> Actuation:
@@ -314,6 +329,8 @@ def _check(model: Model) -> None:
                 select(mesh, support.at)
     for i, actuations in enumerate(model.steps):
         for item in actuations:
+            if isinstance(item, Until):
+                continue
             key = type(item).__name__.lower()
             if isinstance(item, Fold | Moment):
                 if item.crease != "all":

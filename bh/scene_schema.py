@@ -244,6 +244,28 @@ class DisplaceTable(Table):
     by: Number = Field(description="a displacement in mm")
 
 
+class UntilTable(Table):
+    """What ends a step before its actuations are complete."""
+
+    depth: Length | None = Field(None, description="a depth of the corrugation in mm (docs/corrugations.md)")
+    observable: str | None = Field(None, description="the name of an observable, or module:function")
+    value: Number | None = Field(
+        None, description="its value at the end of the step, a number in its own unit"
+    )
+    of: str | None = Field(None, description="the crease or place that it is of")
+    tolerance: Positive = Field(
+        1e-4, description="how near the value must be met, a positive number in its unit"
+    )
+
+    @model_validator(mode="after")
+    def one_target(self) -> UntilTable:
+        if (self.depth is None) == (self.observable is None) or (self.observable is None) != (
+            self.value is None
+        ):
+            raise ValueError("needs either depth (mm), or observable and value")
+        return self
+
+
 ACTUATIONS: dict[str, type[FoldTable | MomentTable | ForceTable | DisplaceTable]] = {
     "fold": FoldTable,
     "moment": MomentTable,

@@ -56,10 +56,10 @@ def run(context: Context) -> CaseResult:
         result.plots.append(_drawing(kind, pattern))
         _mesh(result, kind, pattern)
     result.notes.append(
-        "Angles below 10 degrees remain where curves meet in a point: at the corners of the parabolic-point pattern they "
-        "enclose 3.4 degrees; those of the elliptical-point pattern touch, and are taken as one where they are closer "
-        "than 0.04 of a cell's length; and a few where rows end. Staggered cells of the straight pattern with an aspect "
-        "ratio of 6 are 9.5 degrees at their tips, and half of that at the ends of the sheet."
+        "Angles below 10 degrees remain where curves meet in a point: at the corners of the parabolic-point pattern "
+        "they enclose 3.4 degrees; those of the elliptical-point pattern touch, and are taken as one where they are "
+        "closer than 0.04 of a cell's length; and a few where rows end. Staggered cells of the straight pattern with "
+        "an aspect ratio of 6 are 9.5 degrees at their tips, and half of that at the ends of the sheet."
     )
     return result
 

@@ -28,6 +28,7 @@ TABLES: dict[str, type[schema.Table]] = {
     "steps: moment": schema.MomentTable,
     "steps: force": schema.ForceTable,
     "steps: displace": schema.DisplaceTable,
+    "steps: until": schema.UntilTable,
     "outputs": schema.OutputsTable,
 }
 
