@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from bh.actuation import Displace, Fold, Force, Moment, Pinch
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.model import CreaseLaw, Model, Sheet
+    from bh.observables import Until, depth
     from bh.path import Path, trace
     from bh.scene import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
@@ -31,7 +32,8 @@ _HOME = {
     "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
     "Path": "bh.path", "PathFileError": "bh.errors", "Pinch": "bh.actuation",
     "RigidBody": "bh.supports", "SceneError": "bh.errors",
-    "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
+    "Sheet": "bh.model", "State": "bh.state", "Until": "bh.observables", "depth": "bh.observables",
+    "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
 }  # fmt: skip
 
 _SUBMODULES = {
@@ -43,8 +45,8 @@ _SUBMODULES = {
 __all__ = [
     "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
     "InputError", "LoadControl", "Model", "ModelError", "Moment",
-    "Newton", "Path", "PathFileError", "Pinch", "RigidBody", "SceneError", "Sheet", "State",
-    "Support", "load_scene", "trace",
+    "Newton", "Path", "PathFileError", "Pinch", "RigidBody", "SceneError", "Sheet", "State", "Support", "Until",
+    "depth", "load_scene", "trace",
 ]  # fmt: skip
 
 _ensure_kernel_cache()

@@ -6,6 +6,7 @@ Description only, shared by all formulations: no stiffness of the sheet, no unkn
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from bh.actuation import Actuation, Array, Displace, Fold, Force, Moment, Pinch, Ramp
 from bh.errors import ModelError
 from bh.model import CreaseLaw, Model
+from bh.observables import Until
 from bh.pinch_zone import Pinched, chain, is_chain, parts, zone
 from bh.supports import AXES, Constraints, Prescribed, resolve, select
 from meshes import SheetMesh
@@ -73,6 +75,21 @@ class StepProgram:
             (np.abs(self.held.end - held)[self.law == HELD], np.abs(np.nan_to_num(self.rest.rate)))
         )
         return float(change.max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """Where a step ended before its actuations were complete.
+
+    Attributes:
+        lam: its control parameter there.
+        points: (n, 3) node positions, mm.
+        dihedral_angles: (m,) rad.
+    """
+
+    lam: float
+    points: Array
+    dihedral_angles: Array
 
 
 class _Builder:
@@ -150,7 +167,20 @@ class _Builder:
             joined = np.concatenate(hinges)[first]
         return joined, np.concatenate(sense)[first], np.concatenate(drawn)[first]
 
-    def step(self, actuations: tuple[Actuation, ...]) -> StepProgram:
+    def stop(self, step: StepProgram, end: Ended) -> None:
+        """What the next step begins with where `step` ended early."""
+        self.rest, self.rest_ends, self.moment, self.force = (
+            ramp.at(end.lam) for ramp in (step.rest, step.rest_ends, step.moment, step.force)
+        )
+        if np.isnan(self.rest).any():
+            raise ModelError(
+                "a held crease is released in a step that ends early (until); release it in a step before"
+            )
+        self.held = np.where(self.law == HELD, end.dihedral_angles, np.nan)
+        moved = end.points - self.mesh.points
+        self.displaced = {(node, axis): float(moved[node] @ axis) for node, axis in self.displaced}
+
+    def step(self, actuations: tuple[Actuation | Until, ...]) -> StepProgram:
         before = (self.rest.copy(), self.held.copy(), self.moment.copy(), self.force.copy())
         ends = self.rest_ends.copy()
         self.steps += 1
@@ -173,7 +203,7 @@ class _Builder:
                 self.moment[hinges] = sense * item.to
             elif isinstance(item, Force):
                 self._force(item)
-            else:
+            elif isinstance(item, Displace):
                 self._displace(item)
         angles = self._present()
         for item in actuations:  # a pinch goes from where the fold of its step ends
@@ -349,14 +379,19 @@ class _Builder:
         ]
 
 
-def program(model: Model) -> tuple[StepProgram, ...]:
-    """The ramps of every step of `model`, in order; nothing is solved.
+def program(model: Model, ended: Mapping[int, Ended] | None = None) -> tuple[StepProgram, ...]:
+    """The ramps of every step of `model`, in order; nothing is solved. `ended` tells of steps that ended early.
 
     Raises:
         ModelError, MeshError: an actuation or support that the sheet cannot take; the message names it.
     """
     builder = _Builder(model)
-    return tuple(builder.step(actuations) for actuations in model.steps)
+    steps = []
+    for number, actuations in enumerate(model.steps):
+        steps.append(builder.step(actuations))
+        if ended is not None and number in ended:
+            builder.stop(steps[-1], ended[number])
+    return tuple(steps)
 
 
 def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:

@@ -6,7 +6,6 @@ Every error is a `SceneError` of one line. Keys are told as dotted paths; entrie
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
+from bh.observables import Until
 from bh.program import program
 from bh.scene_schema import (
     ACTUATIONS,
@@ -31,6 +31,7 @@ from bh.scene_schema import (
     OutputsTable,
     SheetTable,
     SupportTable,
+    UntilTable,
     as_table,
     as_tables,
     check_keys,
@@ -44,6 +45,8 @@ from bh.scene_schema import (
 )
 from bh.supports import RigidBody, Support, directions, select
 from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, parallel_creases, strip, structured
+from meshes.corrugations import KINDS as CORRUGATIONS
+from meshes.corrugations import corrugation, curved_corrugation
 
 SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
@@ -213,6 +216,11 @@ def _pattern(table: Any) -> CreasePattern:
             return parallel_creases(table.curvature, table.length, table.spacing, table.creases, table.fold)
         if table.kind == "annulus_sector":
             return annulus_sector(table.radius, table.width, table.angle, table.fold)
+        if table.kind in CORRUGATIONS:
+            return corrugation(table.kind, table.width, table.height, table.panels, table.fold)
+        if table.kind == "curved-corrugation":
+            shape = (table.exponent, table.root, table.spread)
+            return curved_corrugation(*shape, table.width, table.height, table.panels, table.fold)
         return full_annulus(table.radius, table.width, table.fold)
 
 
@@ -234,8 +242,9 @@ def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
     along = float(how.along or 0)
     if how.aspect_ratio is not None:
         length = max(rail.length for rail in pattern.rails)
-        inner, outer = (rail.point(np.zeros(1))[0] for rail in (pattern.rails[0], pattern.rails[-1]))
-        height = math.dist(inner, outer) / panels
+        # at one end and in the middle: panels can taper
+        inner, outer = (rail.point(np.array([0.0, 0.5])) for rail in (pattern.rails[0], pattern.rails[-1]))
+        height = float(np.linalg.norm(outer - inner, axis=1).max()) / panels
         along = how.aspect_ratio * length / height * how.rows
     _check_triangles(2.0 * along * how.rows * panels)
 
@@ -267,16 +276,29 @@ def _crease(item: Any, at: str) -> CreaseLaw:
         return CreaseLaw(table.Lstar, table.stiffness, table.rest)
 
 
-def _step(item: Any, at: str) -> tuple[Actuation, ...]:
+def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
     step = as_table(item, at)
-    check_keys(at, step, ACTUATIONS)
-    if not step:
+    check_keys(at, step, (*ACTUATIONS, "until"))
+    if not set(step) - {"until"}:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
-    found: list[Actuation] = []
+    found: list[Actuation | Until] = []
     for key, value in step.items():
+        if key == "until":
+            found.append(_until(value, f"{at}.until"))
+            continue
         for where, each in one_or_more(value, f"{at}.{key}"):
             found.append(_actuation(key, each, where))
     return tuple(found)
+
+
+def _until(item: Any, at: str) -> Until:
+    table = read_table(UntilTable, item, at)
+    with within(at):
+        if table.depth is not None:
+            return Until("depth", table.depth, tolerance=table.tolerance)
+        assert table.observable is not None
+        assert table.value is not None
+        return Until(table.observable, table.value, table.of, table.tolerance)
 
 
 def _actuation(key: str, item: Any, at: str) -> Actuation:
@@ -307,6 +329,8 @@ def _check(model: Model) -> None:
                 select(mesh, support.at)
     for i, actuations in enumerate(model.steps):
         for item in actuations:
+            if isinstance(item, Until):
+                continue
             key = type(item).__name__.lower()
             if isinstance(item, Fold | Moment | Pinch):
                 if item.crease != "all":

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from bh.errors import InputError, SceneError
 from bh.pinch_zone import Profile
+from meshes.corrugations import KINDS as CORRUGATIONS
 from meshes.pattern import FoldKind
 from meshes.structured import Kind
 
@@ -37,6 +38,8 @@ Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Node = Annotated[int, Field(ge=0, le=2**62)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Folds = FoldKind | Annotated[list[FoldKind], Field(min_length=1)]
+Panels = Annotated[int, Field(ge=2, le=100)]
+Power = Annotated[float, Field(ge=1.0, le=100.0)]
 Place = str | Annotated[list[Node], Field(min_length=1)]
 
 FOLDS = '"mountain", "valley" or "flat", or a list with one of them a crease'
@@ -97,6 +100,35 @@ class ParallelPattern(Table):
     fold: Folds | None = Field(None, description=FOLDS + "; alternating from mountain unless given")
 
 
+class CorrugationPattern(Table):
+    """One of the five corrugations of the source (4.3)."""
+
+    kind: Literal["straight", "parabolic-point", "parabolic-edge", "elliptical-point", "elliptical-edge"] = (
+        Field(
+            description='"straight", "parabolic-point", "parabolic-edge", "elliptical-point" or "elliptical-edge"'
+        )
+    )
+    width: Length = Field(100.0, description="a positive length W along x in mm")
+    height: Length = Field(100.0, description="a positive length H along y in mm")
+    panels: Panels = Field(5, description="a whole number of sheets between creases, from 2 to 100")
+    fold: Folds | None = Field(None, description=FOLDS)
+
+
+class CurvedCorrugationPattern(Table):
+    """Any corrugation of the family of `meshes.curved_corrugation`."""
+
+    kind: Literal["curved-corrugation"]
+    exponent: Power = Field(2.0, description="a number p from 1 to 100 (2 for parabolas and ellipses)")
+    root: Power = Field(1.0, description="a number q from 1 to 100 (1 for parabolas, 2 for ellipses)")
+    spread: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.0, description="a number from 0 (creases end at the straight edge) to 1 (in the corners)"
+    )
+    width: Length = Field(100.0, description="a positive length W along x in mm")
+    height: Length = Field(100.0, description="a positive length H along y in mm")
+    panels: Panels = Field(5, description="a whole number of sheets between creases, from 2 to 100")
+    fold: Folds | None = Field(None, description=FOLDS)
+
+
 class FilePattern(Table):
     file: Annotated[str, Field(min_length=1)] = Field(
         description="the name of a .fold file, from the folder of the scene"
@@ -106,11 +138,13 @@ class FilePattern(Table):
     )
 
 
-LIBRARY: dict[str, type[StripPattern | AnnulusSectorPattern | FullAnnulusPattern | ParallelPattern]] = {
+LIBRARY: dict[str, type[Table]] = {
     "strip": StripPattern,
     "parallel_creases": ParallelPattern,
     "annulus_sector": AnnulusSectorPattern,
     "full_annulus": FullAnnulusPattern,
+    **dict.fromkeys(CORRUGATIONS, CorrugationPattern),
+    "curved-corrugation": CurvedCorrugationPattern,
 }
 
 
@@ -253,6 +287,28 @@ class DisplaceTable(Table):
     at: Place = Field(description=PLACE)
     direction: Literal["x", "y", "z"] | Vector = Field(description='"x", "y", "z" or a direction [x, y, z]')
     by: Number = Field(description="a displacement in mm")
+
+
+class UntilTable(Table):
+    """What ends a step before its actuations are complete."""
+
+    depth: Length | None = Field(None, description="a depth of the corrugation in mm (docs/corrugations.md)")
+    observable: str | None = Field(None, description="the name of an observable, or module:function")
+    value: Number | None = Field(
+        None, description="its value at the end of the step, a number in its own unit"
+    )
+    of: str | None = Field(None, description="the crease or place that it is of")
+    tolerance: Positive = Field(
+        1e-4, description="how near the value must be met, a positive number in its unit"
+    )
+
+    @model_validator(mode="after")
+    def one_target(self) -> UntilTable:
+        if (self.depth is None) == (self.observable is None) or (self.observable is None) != (
+            self.value is None
+        ):
+            raise ValueError("needs either depth (mm), or observable and value")
+        return self
 
 
 ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable]] = {

@@ -16,6 +16,8 @@ TABLES: dict[str, type[schema.Table]] = {
     'pattern, kind = "annulus_sector"': schema.AnnulusSectorPattern,
     'pattern, kind = "full_annulus"': schema.FullAnnulusPattern,
     'pattern, kind = "parallel_creases"': schema.ParallelPattern,
+    "pattern, corrugations": schema.CorrugationPattern,
+    'pattern, kind = "curved-corrugation"': schema.CurvedCorrugationPattern,
     "pattern, file": schema.FilePattern,
     "sheet": schema.SheetTable,
     "mesh": schema.MeshTable,
@@ -28,6 +30,7 @@ TABLES: dict[str, type[schema.Table]] = {
     "steps: moment": schema.MomentTable,
     "steps: force": schema.ForceTable,
     "steps: displace": schema.DisplaceTable,
+    "steps: until": schema.UntilTable,
     "outputs": schema.OutputsTable,
 }
 
