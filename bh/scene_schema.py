@@ -33,6 +33,7 @@ Dihedral = Annotated[float, Field(gt=0.0, lt=TURN)]
 Rest = Annotated[float, Field(ge=0.0, le=TURN)]
 FoldAngle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Few = Annotated[int, Field(ge=1, le=1000)]
 Node = Annotated[int, Field(ge=0, le=2**62)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Folds = FoldKind | Annotated[list[FoldKind], Field(min_length=1)]
@@ -41,6 +42,8 @@ Place = str | Annotated[list[Node], Field(min_length=1)]
 FOLDS = '"mountain", "valley" or "flat", or a list with one of them a crease'
 PLACE = 'a place ("corner:inner-start", "edge:inner", "crease:NAME", "node:N", "all", ...) or a list of nodes'
 RADII = "the radius of the crease in mm, or a list of rising radii"
+ALTERNATING = FOLDS + "; alternating where it is left out"
+ALONG, ACROSS = "the side along x in mm", "the side along y in mm"
 DENSITY = "cell height across over width along the crease, a positive number, best 5 to 12"
 LSTAR = "the length scale of the crease in mm, a positive number"
 VECTOR = "three numbers [x, y, z]"
@@ -83,6 +86,44 @@ class FullAnnulusPattern(Table):
     fold: Folds = Field("mountain", description=FOLDS)
 
 
+class TwoArcsPattern(Table):
+    kind: Literal["two_arcs"]
+    width: Length = Field(100.0, description=ALONG)
+    height: Length = Field(100.0, description=ACROSS)
+    radii: list[Length] = Field(
+        [80.0, 250.0], description="radii in mm, each at least half the width, from below"
+    )
+    at: list[Number] = Field([35.0, 70.0], description="heights in mm of the tops of the arcs, rising")
+    fold: Folds = Field(["mountain", "valley"], description=FOLDS)
+
+
+class SineTessellationPattern(Table):
+    kind: Literal["sine_tessellation"]
+    width: Length = Field(100.0, description=ALONG)
+    height: Length = Field(100.0, description=ACROSS)
+    creases: Few = Field(5, description="a whole number of creases, from 1")
+    amplitude: Length = Field(4.0, description="the amplitude of the sines in mm")
+    waves: Positive = Field(2.0, description="how many waves fit into the width, a positive number")
+    fold: Folds | None = Field(None, description=ALTERNATING)
+
+
+class ParabolicCanopyPattern(Table):
+    kind: Literal["parabolic_canopy"]
+    width: Length = Field(100.0, description=ALONG)
+    height: Length = Field(100.0, description=ACROSS)
+    creases: Few = Field(3, description="a whole number of creases, from 1")
+    sag: Number = Field(15.0, description="how much lower the ends of a parabola are than its top, mm")
+    fold: Folds | None = Field(None, description=ALTERNATING)
+
+
+class OppositeParabolasPattern(Table):
+    kind: Literal["opposite_parabolas"]
+    side: Length = Field(100.0, description="the side of the square in mm")
+    gap: Length = Field(30.0, description="the distance between the tops in mm")
+    sag: Length = Field(20.0, description="from a top to the ends of its parabola in mm")
+    fold: Folds = Field("mountain", description=FOLDS)
+
+
 class FilePattern(Table):
     file: Annotated[str, Field(min_length=1)] = Field(
         description="the name of a .fold file, from the folder of the scene"
@@ -92,10 +133,32 @@ class FilePattern(Table):
     )
 
 
-LIBRARY: dict[str, type[StripPattern | AnnulusSectorPattern | FullAnnulusPattern]] = {
+class DrawingPattern(Table):
+    file: Annotated[str, Field(min_length=1)] = Field(
+        description="the name of an .svg or .dxf file, from the folder of the scene"
+    )
+    scale: Positive | None = Field(
+        None, description="how many mm a unit of the drawing is, a positive number"
+    )
+    fit: Length | None = Field(None, description="the longer side of the sheet in mm, in place of scale")
+    tolerance: Length | None = Field(None, description="how far chords may stay off curves, in mm")
+    gap: Length | None = Field(
+        None, description="up to which distance lines that miss each other are joined, in mm"
+    )
+    lines: dict[str, str] = Field(
+        {}, description='what lines stand for, such as { "#00aa00" = "valley", "layer:score" = "mountain" }'
+    )
+
+
+# by the name of the function of `meshes` that draws it; `fold` is its argument `folds`
+LIBRARY: dict[str, type[Table]] = {
     "strip": StripPattern,
     "annulus_sector": AnnulusSectorPattern,
     "full_annulus": FullAnnulusPattern,
+    "two_arcs": TwoArcsPattern,
+    "sine_tessellation": SineTessellationPattern,
+    "parabolic_canopy": ParabolicCanopyPattern,
+    "opposite_parabolas": OppositeParabolasPattern,
 }
 
 
@@ -116,6 +179,12 @@ class GmshTable(Table):
     kind: Literal["gmsh"] = Field(description='"gmsh"')
     size: Annotated[float, Field(gt=0.0)] = Field(description="the length of an edge in mm, positive")
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
+
+
+class DrawnTable(Table):
+    """The faces of a drawing, cut into triangles."""
+
+    kind: Literal["drawn"] = Field(description='"drawn"')
 
 
 class MeshTable(Table):

@@ -19,7 +19,7 @@ import numpy as np
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
 from meshes.mesh import SheetMesh
-from meshes.pattern import CreasePattern
+from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.topology import Ints, build
 
 Kind = Literal["staggered", "alternating", "one-way", "mirrored"]
@@ -81,9 +81,10 @@ def structured(
     return SheetMesh(
         points=points,
         triangles=triangles,
-        edge_sets=edge_sets,
+        edge_sets=with_groups(pattern, edge_sets),
         corners=corners,
         folds=pattern.folds,
+        fold_angles=drawn_angles(pattern, edge_sets),
         curves=curves,
         spans=spans,
         kind=kind,
