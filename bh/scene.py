@@ -24,6 +24,8 @@ from bh.scene_schema import (
     ACTUATIONS,
     LIBRARY,
     CreaseTable,
+    DrawingPattern,
+    DrawnTable,
     FilePattern,
     GmshTable,
     MeshTable,
@@ -44,9 +46,7 @@ from bh.scene_schema import (
     within,
 )
 from bh.supports import RigidBody, Support, directions, select
-from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, parallel_creases, strip, structured
-from meshes.corrugations import KINDS as CORRUGATIONS
-from meshes.corrugations import corrugation, curved_corrugation
+from meshes import CreasePattern, SheetMesh, structured
 
 SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
@@ -171,7 +171,7 @@ def _formulation(name: str) -> str:
 def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
     table = as_table(pattern, "pattern")
     if "file" in table:
-        return _mesh_from_file(read_table(FilePattern, table, "pattern"), mesh, folder)
+        return _mesh_from_file(table, mesh, folder)
     kind = table.get("kind")
     listed = ", ".join(LIBRARY)
     if kind is None:
@@ -186,21 +186,35 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
             "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
         )
     how = _mesh_table(as_table(mesh, "mesh"))
-    flat = _pattern(drawn)
+    if isinstance(how, DrawnTable):
+        raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
+    with within("pattern"):
+        pattern = drawn.draw()
+    return _meshed(pattern, how)
+
+
+def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
     if isinstance(how, GmshTable):
         from meshes.unstructured import sheet_area, unstructured
 
         _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
         with within("mesh"):
             return unstructured(flat, size=how.size, near=how.near, growth=how.growth, seed=how.seed)
+    if not flat.rails:
+        raise SceneError(
+            f'mesh.kind = "{how.kind}" is for creases that run across the sheet side by side, or round a hole; '
+            'these do not: use kind = "gmsh" with size'
+        )
     _check_size(flat, how)
     with within("mesh"):
         return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
 
 
-def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable:
+def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable | DrawnTable:
     if table.get("kind") == "gmsh":
         return read_table(GmshTable, table, "mesh")
+    if table.get("kind") == "drawn":
+        return read_table(DrawnTable, table, "mesh")
     if "size" in table:
         raise SceneError(
             f'mesh.size = {shown(table["size"])} is for kind = "gmsh"; use along or aspect_ratio, or add that kind'
@@ -208,32 +222,37 @@ def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable:
     return read_table(MeshTable, table, "mesh")
 
 
-def _pattern(table: Any) -> CreasePattern:
-    with within("pattern"):
-        if table.kind == "strip":
-            return strip(table.length, table.width, table.creases, table.fold)
-        if table.kind == "parallel_creases":
-            return parallel_creases(table.curvature, table.length, table.spacing, table.creases, table.fold)
-        if table.kind == "annulus_sector":
-            return annulus_sector(table.radius, table.width, table.angle, table.fold)
-        if table.kind in CORRUGATIONS:
-            return corrugation(table.kind, table.width, table.height, table.panels, table.fold)
-        if table.kind == "curved-corrugation":
-            shape = (table.exponent, table.root, table.spread)
-            return curved_corrugation(*shape, table.width, table.height, table.panels, table.fold)
-        return full_annulus(table.radius, table.width, table.fold)
-
-
-def _mesh_from_file(table: FilePattern, mesh: Any, folder: Path) -> SheetMesh:
-    name = shown(table.file)
-    if Path(table.file).suffix.lower() != ".fold":
-        raise SceneError(f"pattern.file = {name} is not a .fold file; this version reads no other yet")
+def _mesh_from_file(table: dict[str, Any], mesh: Any, folder: Path) -> SheetMesh:
+    name = shown(table["file"])
+    suffix = Path(str(table["file"])).suffix.lower()
+    if suffix in (".svg", ".dxf"):
+        return _mesh_from_drawing(read_table(DrawingPattern, table, "pattern"), mesh, folder)
+    stored = read_table(FilePattern, table, "pattern")
+    if suffix != ".fold":
+        raise SceneError(f"pattern.file = {name} is no file of a pattern; give .svg, .dxf or .fold")
     if mesh is not None:
         raise SceneError(f"mesh: {name} brings its own faces, and they are the mesh; remove [mesh]")
     from meshes.io import read_fold
 
     with within("pattern.file"):
-        return read_fold(folder / table.file, table.frame)
+        return read_fold(folder / stored.file, stored.frame)
+
+
+def _mesh_from_drawing(table: DrawingPattern, mesh: Any, folder: Path) -> SheetMesh:
+    from meshes.io import read_drawn, read_pattern
+
+    if mesh is None:
+        raise SceneError(
+            'mesh is missing; add a table [mesh] with kind = "gmsh" and size, along or aspect_ratio (creases side by '
+            'side), or kind = "drawn" (the faces of the drawing)'
+        )
+    how = _mesh_table(as_table(mesh, "mesh"))
+    options = {name: value for name, value in table if name != "file"}
+    with within("pattern.file"):
+        if isinstance(how, DrawnTable):
+            return read_drawn(folder / table.file, **options)
+        drawn = read_pattern(folder / table.file, **options)
+    return _meshed(drawn, how)
 
 
 def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
