@@ -13,7 +13,7 @@ from typing import TypeVar
 
 T = TypeVar("T")
 # (seconds, repetitions): a solve that takes less is repeated so often
-REPEATS = ((2.0, 5), (6.0, 3), (math.inf, 1))
+REPEATS = ((1.5, 5), (4.0, 3), (math.inf, 1))
 CLEAR, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")
 
 
@@ -27,23 +27,22 @@ class Cost:
 
 
 def measure(solve: Callable[[], T], quick: bool = False) -> tuple[T, Cost]:
-    """Solve once for the result, once more for the memory, then for the time.
+    """Solve once for the result and the memory, then for the time.
 
-    Memory is the peak of what Python and NumPy have allocated during a solve (tracemalloc). Compiled code that takes
+    Memory is the peak of what Python and NumPy have allocated during the first solve (tracemalloc). Compiled code that takes
     memory of its own is not seen there; where the highest resident size of the process (Linux: VmHWM, set back before)
     rises by more, that counts. `quick` times one solve.
     """
     before = _peak(reset=True)
-    began = time.perf_counter()
-    result = solve()
-    first = time.perf_counter() - began
-    grown = _peak(reset=False) - before
     tracemalloc.start()
     try:
-        solve()
+        began = time.perf_counter()
+        result = solve()
+        first = time.perf_counter() - began
         traced = tracemalloc.get_traced_memory()[1] / 2**20
     finally:
         tracemalloc.stop()
+    grown = _peak(reset=False) - before
     repeats = 1 if quick else next(n for limit, n in REPEATS if first < limit)
     times = []
     for _ in range(repeats):

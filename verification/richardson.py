@@ -54,9 +54,9 @@ def fitted(values: Sequence[float], sizes: Sequence[float]) -> Limit:
     Least squares of v0 + c h^p over the four finest meshes, finer ones with more weight (1 / h), with the order p from
     `LOWEST` to `HIGHEST` (Eca and Hoekstra 2014). The bar is `SAFETY` times the distance from the finest value to v0,
     plus the scatter about the fit, and not less than the last change. Where the best order lies at the end of that
-    range, or the values scatter about the best fit, or it leads farther away than the last three values lie apart,
+    range, or the values scatter about the best fit, or it leads farther away than the four values lie apart,
     there is no order: then the value is the finest one and the bar is `UNCLEAN` times the last change, or the range of
-    the last three if that is larger.
+    the four if that is larger.
 
     Raises:
         ValueError: there are fewer than four values.
@@ -75,7 +75,7 @@ def fitted(values: Sequence[float], sizes: Sequence[float]) -> Limit:
             best = (scatter, float(p), float(found[0]))
     scatter, p, value = best
     rest = abs(value - float(v[-1]))
-    spread, change = float(np.ptp(v[-3:])), abs(float(v[-1] - v[-2]))
-    if orders[0] < p < orders[-1] and scatter <= 0.5 * spread and rest <= spread:
+    spread, change = float(np.ptp(v)), abs(float(v[-1] - v[-2]))
+    if orders[0] < p < orders[-1] and scatter <= 0.1 * spread and rest <= spread:
         return Limit(value, p, max(SAFETY * rest + scatter, change))
     return Limit(float(v[-1]), math.nan, max(spread, UNCLEAN * change))

@@ -362,7 +362,7 @@ def _notes(result: CaseResult) -> list[str]:
         "finest value with a bar of three times the last change. Of the curve it is the finest shell, compared at the "
         "nodes after rigid alignment; its bar is what the last refinement leaves at second order.",
         f"Wall time is the median of repeated traces ({repeats}) after one that is not counted, without meshing; "
-        "memory is the peak of a further trace, by tracemalloc (Python and NumPy; what compiled code takes for itself "
+        "memory is the peak of that one, by tracemalloc (Python and NumPy; what compiled code takes for itself "
         "is seen only where it raises the peak of the process, VmHWM). Bars and hinges take Poisson's ratio as 0, "
         "which is part of their error where the sheet has 0.38.",
     ]
