@@ -72,6 +72,7 @@ class _Builder:
         self.force = np.zeros((nodes, 3))
         self.displaced: dict[tuple[int, tuple[float, float, float]], float] = {}
         self.now: dict[tuple[int, tuple[float, float, float]], float] = {}  # of this step
+        self.given = np.full((2, hinges), np.nan)  # angles and moments of this step
         for name, crease in model.creases.items():
             self._spring(self.hinges(name), crease)
             self.made[self.hinges(name)] = crease.rest
@@ -131,11 +132,13 @@ class _Builder:
         self.released = np.zeros(len(self.rest), dtype=bool)
         displaced = dict(self.displaced)
         self.now = {}
+        self.given[:] = np.nan
         for item in actuations:
             if isinstance(item, Fold):
                 self._fold(item)
             elif isinstance(item, Moment):
                 hinges, sense, _ = self.creases(item.crease)
+                self._once(1, hinges, sense * item.to, "N mm / mm")
                 self.moment[hinges] = sense * item.to
             elif isinstance(item, Force):
                 self._force(item)
@@ -168,6 +171,7 @@ class _Builder:
             value = item.to if item.to is not None else item.rest
             assert value is not None
             angle = self._per_edge(item, value, len(hinges))
+        self._once(0, hinges, angle, "rad")
         if not spring:
             inside = (angle > 0.0) & (angle < 2.0 * math.pi)
             if not inside.all():
@@ -183,6 +187,18 @@ class _Builder:
         if (self.law[hinges] != SPRING).any():
             raise ModelError(f"fold of crease '{item.crease}' by its rest angle needs Lstar or stiffness")
         self.rest[hinges] = angle
+
+    def _once(self, kind: int, hinges: Ints, value: Array, unit: str) -> None:
+        """Refuse two different values for one crease in one step."""
+        known = self.given[kind, hinges]
+        other = ~np.isnan(known) & ~np.isclose(known, value, rtol=1e-12, atol=0.0)
+        if other.any():
+            row = int(np.argmax(other))
+            raise ModelError(
+                f"{hinge_name(self.mesh, int(hinges[row]))} is given {known[row]:g} and {value[row]:g} {unit} in one "
+                f"step ({self.steps}); give it one, or the second in a step of its own"
+            )
+        self.given[kind, hinges] = value
 
     @staticmethod
     def _per_edge(item: Fold, value: float | object, count: int) -> Array:

@@ -189,7 +189,7 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
 
         _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
         with within("mesh"):
-            return unstructured(flat, size=how.size, seed=how.seed)
+            return unstructured(flat, size=how.size, near=how.near, growth=how.growth, seed=how.seed)
     _check_size(flat, how)
     with within("mesh"):
         return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)

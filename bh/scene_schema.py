@@ -115,6 +115,13 @@ class GmshTable(Table):
 
     kind: Literal["gmsh"] = Field(description='"gmsh"')
     size: Annotated[float, Field(gt=0.0)] = Field(description="the length of an edge in mm, positive")
+    near: dict[str, Annotated[float, Field(gt=0.0)]] = Field(
+        {},
+        description='shorter edges at some creases or sides in mm, such as { "crease:crease" = 1.0 }',
+    )
+    growth: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
+        0.3, description="how fast edges grow away from these, mm a mm, above 0 up to 10"
+    )
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
 
 

@@ -35,7 +35,9 @@ def rows(table: type[schema.Table]) -> list[str]:
     found = ["| Key | Default | Give |", "|---|---|---|"]
     for key, field in table.model_fields.items():
         value = "pi" if field.default == math.pi else schema.shown(field.default)
-        default = "needed" if field.is_required() else {"None": "", "[]": "none"}.get(value, value)
+        default = (
+            "needed" if field.is_required() else {"None": "", "[]": "none", "{}": "none"}.get(value, value)
+        )
         about = field.description or f'"{key_of(field)}"'
         found.append(f"| `{key}` | {default} | {about} |")
     return found
