@@ -20,13 +20,15 @@ from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
 from bh.observables import Until
 from bh.program import program
+from bh.scene_patterns import (
+    LIBRARY,
+    DrawingPattern,
+    FilePattern,
+)
 from bh.scene_schema import (
     ACTUATIONS,
-    LIBRARY,
     CreaseTable,
-    DrawingPattern,
     DrawnTable,
-    FilePattern,
     GmshTable,
     MeshTable,
     ModelTable,
@@ -34,6 +36,8 @@ from bh.scene_schema import (
     SheetTable,
     SupportTable,
     UntilTable,
+)
+from bh.scene_tables import (
     as_table,
     as_tables,
     check_keys,
