@@ -20,11 +20,12 @@ def report(
         bool, typer.Option("--reuse", help="show the results that are there, run nothing")
     ] = False,
 ) -> None:
-    """Run the verification cases and write the report page.
+    """Run the verification cases and write the report: a front page, and a folder of chapters beside it.
 
-    It is one HTML file that needs nothing else.
+    They need nothing else, no network and no server.
     """
-    from reports.build import build, read, shortfall
+    from reports.build import build
+    from reports.records import read, shortfall
 
     page = results / "report.html" if out is None else out
     if not reuse:

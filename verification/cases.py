@@ -26,6 +26,7 @@ ALL_CASES = {
     "appendix_b_shell": "verification.appendix_b_shell",
     "appendix_b_cross": "verification.appendix_b_cross",
     "appendix_b_fields": "verification.appendix_b_fields",
+    "appendix_b_sheets": "verification.appendix_b_sheets",
     "shell_benchmarks": "verification.shell_benchmarks",
     "campaign": "verification.campaign",
 }
@@ -34,7 +35,7 @@ LONG = {"campaign", "fig3_8", "fig3_10"}
 LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
 CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
 # run with the case by `bh verify`
-PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields")}
+PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields", "appendix_b_sheets")}
 
 
 def case(name: str) -> Case:
