@@ -36,7 +36,9 @@ FOLDER = FilePath(__file__).with_name("viewer")
 
 
 def frames(
-    models: Mapping[str, Sequence[State]], lambdas: Sequence[float], label: str = "\N{GREEK SMALL LETTER LAMDA}"
+    models: Mapping[str, Sequence[State]],
+    lambdas: Sequence[float],
+    label: str = "\N{GREEK SMALL LETTER LAMDA}",
 ) -> dict[str, Any]:
     """The states of one or several models as JSON data that the viewer draws.
 
@@ -46,10 +48,11 @@ def frames(
         label: the name of what the slider reads.
 
     Returns:
-        {"format", "label", "lambdas": [...], "tops": {kind: N mm / mm^2}, "eye": [x, y, z], "models": [...]}; of each
-        model its "name", "nodes" (m,) of the points that are corners of the sheet cut open along its creases, "triangles"
-        (t, 3) of those corners, "outline" (k, 2) pairs of nodes along boundary and creases, and by frame "points" (f, n, 3) mm, "density" {kind: (f, n)} and
-        "energy" {kind: (f,)} N mm. Arrays are little-endian float32 or int32 in base64.
+        {"format", "label", "lambdas": [...], "tops": {kind: N mm / mm^2}, "eye": [x, y, z], "models": [...]}; of
+        each model its "name", "nodes" (m,) of the points that are corners of the sheet cut open along its creases,
+        "triangles" (t, 3) of those corners, "outline" (k, 2) pairs of nodes along boundary and creases, and by
+        frame "points" (f, n, 3) mm, "density" {kind: (f, n)} and "energy" {kind: (f,)} N mm. Arrays are
+        little-endian float32 or int32 in base64.
 
     Raises:
         PlotError: no models, no states, or not as many states as lambdas.
@@ -60,7 +63,9 @@ def frames(
         raise PlotError("there are no states to show; trace the model first")
     for name, states in models.items():
         if len(states) != len(lambdas):
-            raise PlotError(f"'{name}' has {len(states)} states for {len(lambdas)} lambdas; give one for each")
+            raise PlotError(
+                f"'{name}' has {len(states)} states for {len(lambdas)} lambdas; give one for each"
+            )
     last = [states[-1] for states in models.values()]
     kinds = [k for k in KINDS if any(float(np.max(s.energy_density[k], initial=0.0)) > 0.0 for s in last)]
     return {
@@ -86,7 +91,10 @@ def _model(name: str, states: Sequence[State], kinds: Sequence[str]) -> dict[str
         "triangles": packed(triangles, "<i4"),
         "outline": packed(np.vstack((mesh.topology.boundary, *creases)), "<i4"),
         "points": packed(np.stack([state.points for state in states]), "<f4"),
-        "density": {k: packed(np.stack([s.nodal_energy_density(k) for s in states]), "<f4") for k in kinds},
+        "density": {
+            kind: packed(np.stack([state.nodal_energy_density(kind) for state in states]), "<f4")
+            for kind in kinds
+        },
         "energy": {kind: [float(getattr(s.energy, kind)) for s in states] for kind in (*kinds, "total")},
     }
 
@@ -151,7 +159,9 @@ def view(paths: Path | Mapping[str, Path], title: str = "Folded sheet") -> View:
     found = [{round(float(at), 9) for at in path.lambdas} for path in named.values()]
     common = sorted(set.intersection(*found)) if found else []
     if not common:
-        raise PlotError("the paths have no states at the same lambda; trace them in steps of the same lengths")
+        raise PlotError(
+            "the paths have no states at the same lambda; trace them in steps of the same lengths"
+        )
     states = {}
     for name, path in named.items():
         where = {round(float(at), 9): index for index, at in enumerate(path.lambdas)}
@@ -173,8 +183,8 @@ def figure(data: Mapping[str, Any], name: str, title: str, still: str = "") -> s
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     return (
         f'<div class="sheet3d" id="{name}" role="group" aria-label="{escape(title)}">'
-        f'<div class="still">{still}</div><div class="canvas" id="{name}-canvas" role="img" aria-label="{escape(title)}, '
-        f'to be turned with the mouse"></div>'
+        f'<div class="still">{still}</div><div class="canvas" id="{name}-canvas" role="img" '
+        f'aria-label="{escape(title)}, to be turned with the mouse"></div>'
         f'<div class="controls" hidden><label for="{name}-slider">{label}</label>'
         f'<input type="range" id="{name}-slider" min="0" max="{last}" step="1" value="{last}">'
         f'<output for="{name}-slider" id="{name}-value"></output>'

@@ -1,4 +1,4 @@
-"""The report, built from a folder of stored results: a front page and a page a chapter. Reads and writes, never solves."""
+"""The report, built from stored results: a front page and a page a chapter. Reads and writes, never solves."""
 
 from __future__ import annotations
 
@@ -77,7 +77,9 @@ def build(results_folder: Path, out_file: Path) -> Path:
     """
     folder, target = Path(results_folder), Path(out_file)
     site = Site(folder, target.stem, target.name)
-    pages = {page.file: site.render("chapter.html", page) for page in site.pages if page.cases or page.missing}
+    pages = {
+        page.file: site.render("chapter.html", page) for page in site.pages if page.cases or page.missing
+    }
     front = site.render("front.html", None)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -136,25 +138,29 @@ class Site:
         """One page; `page` is the chapter that it shows, None for the front."""
         every = self.cases
         failed = [item for case in every for item in case.checks if item[1].passed is False]
-        text: str = _environment(self._linker(page)).get_template(template).render(
-            site=self,
-            here=page,
-            results=self.results,
-            source=SOURCE,
-            shortfall=shortfall(self.results),
-            others=_others(self.results),
-            date=words.date(self.results.date),
-            seeds=_seeds(every),
-            machine=_machine(self.results.machine),
-            style=(TEMPLATES / "style.css").read_text(encoding="utf-8") + interactive.style(),
-            judged=sum(case.judged for case in every),
-            reported=sum(case.count(None) for case in every),
-            failed=failed,
-            most_failures=MOST_FAILURES,
-            most_moves=MOST,
-            pareto=_pareto(every),
-            odd=[item for case in every for item in case.checks if item[1].passed and item[1].use > 1.0],
-            seconds_in_all=sum(case.info.wall_time_s or 0.0 for case in every),
+        text: str = (
+            _environment(self._linker(page))
+            .get_template(template)
+            .render(
+                site=self,
+                here=page,
+                results=self.results,
+                source=SOURCE,
+                shortfall=shortfall(self.results),
+                others=_others(self.results),
+                date=words.date(self.results.date),
+                seeds=_seeds(every),
+                machine=_machine(self.results.machine),
+                style=(TEMPLATES / "style.css").read_text(encoding="utf-8") + interactive.style(),
+                judged=sum(case.judged for case in every),
+                reported=sum(case.count(None) for case in every),
+                failed=failed,
+                most_failures=MOST_FAILURES,
+                most_moves=MOST,
+                pareto=_pareto(every),
+                odd=[item for case in every for item in case.checks if item[1].passed and item[1].use > 1.0],
+                seconds_in_all=sum(case.info.wall_time_s or 0.0 for case in every),
+            )
         )
         return text
 
@@ -224,7 +230,9 @@ def _others(results: Results) -> list[tuple[str, str]]:
 
 def _seeds(cases: Sequence[Case]) -> str:
     """The seeds that records name."""
-    found = sorted({str(check.params["seed"]) for case in cases for _, check in case.checks if "seed" in check.params})
+    found = sorted(
+        {str(check.params["seed"]) for case in cases for _, check in case.checks if "seed" in check.params}
+    )
     few = found if len(found) <= 6 else [*found[:6], f"and {len(found) - 6} more"]
     return ", ".join(few) or "none"
 

@@ -38,7 +38,11 @@ class Claim:
     def yes_or_no(self) -> bool:
         """Is the figure the answer to a question, 1 for yes?"""
         check = self.check
-        return (check.unit, check.reference, check.tolerance) == ("", 1.0, 0.0) and check.value in (0.0, 1.0, None)
+        return (check.unit, check.reference, check.tolerance) == ("", 1.0, 0.0) and check.value in (
+            0.0,
+            1.0,
+            None,
+        )
 
     @property
     def verdict(self) -> str:

@@ -71,7 +71,7 @@ class Picture(BaseModel):
 
 
 class Scene(BaseModel):
-    """Folded sheets to be turned: frames of `bh.interactive` beside the results, and a picture for where they cannot."""
+    """Folded sheets to be turned: frames of `bh.interactive`, and a picture for where they cannot be."""
 
     model_config = ConfigDict(strict=True)
 
@@ -286,7 +286,10 @@ def validated(model: type[Stored], text: str, name: str) -> Stored:
 
 def schema(model: type[BaseModel]) -> dict[str, Any]:
     """The JSON schema (draft 2020-12) of the files that a model reads."""
-    titles = {Results: "Results of bh verify (checks.json)", Frames: "Folded sheets, frame by frame (*.frames.json)"}
+    titles = {
+        Results: "Results of bh verify (checks.json)",
+        Frames: "Folded sheets, frame by frame (*.frames.json)",
+    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **model.model_json_schema(),

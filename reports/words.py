@@ -10,6 +10,7 @@ from typing import Any
 from reports.figures import markup, scientific
 from reports.records import Check
 
+
 def number(value: float | None, digits: int = 5, full: bool = False) -> str:
     """A number with so many significant digits; without trailing zeros where it is exact, unless in `full`."""
     if value is None:

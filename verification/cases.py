@@ -21,6 +21,7 @@ ALL_CASES = {
     "derivatives": "verification.derivatives",
     "fig3_9": "verification.fig3_9",
     "fig3_11": "verification.fig3_11",
+    "sheets_3": "verification.sheets_3",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",

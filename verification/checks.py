@@ -88,12 +88,8 @@ class CaseResult:
         return "holds" if all(judged) else "differs"
 
     def summary(self) -> dict[str, Any]:
-        data = {
-            key: getattr(self, key)
-            for key in (
-                "name", "title", "question", "source", "notes", "plots", "pictures", "scenes", "wall_time_s",
-            )  # fmt: skip
-        }
+        told = "name title question source notes plots pictures scenes wall_time_s"
+        data = {key: getattr(self, key) for key in told.split()}
         return {**data, "verdict": self.verdict}
 
 

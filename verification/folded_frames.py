@@ -17,7 +17,7 @@ Fold = Callable[[Model, float], Model]
 
 
 def in_frames(model: Model, fold: Fold, count: int = FRAMES) -> Path:
-    """The path of a model whose actuation is reached in `count` equal steps; `fold` adds the one to a fraction of it."""
+    """The path of a model folded in `count` equal steps; `fold` adds the step to a fraction of the whole."""
     for number in range(1, count + 1):
         model = fold(model, number / count)
     return trace(model)
@@ -26,7 +26,10 @@ def in_frames(model: Model, fold: Fold, count: int = FRAMES) -> Path:
 def step_ends(path: Path) -> list[Any]:
     """The state that the path begins with and the one at the end of every step that was reached."""
     last = {record.step: index for index, record in enumerate(path.records)}
-    return [path[0], *(path[last[step]] for step in range(len(path.steps)) if path.steps[step].outcome == "reached")]
+    return [
+        path[0],
+        *(path[last[step]] for step in range(len(path.steps)) if path.steps[step].outcome == "reached"),
+    ]
 
 
 def store(

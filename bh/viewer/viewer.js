@@ -83,7 +83,7 @@
     function layout() {
       const { ink } = look(box), count = models.length, height = stacked() ? 250 * count + 70 : count > 1 ? 380 : 430;
       const part = stacked() ? [box.clientWidth, 250] : [box.clientWidth / count, 0.86 * height];
-      const zoom = 0.92 * 2 * HALF * Math.min(1 / high, part[0] / part[1] / wide);
+      const zoom = 0.88 * 2 * HALF * Math.min(1 / high, part[0] / part[1] / wide);
       const result = {
         margin: { l: 0, r: 0, t: 4, b: 0 }, showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", annotations: [],
         height, font: { color: ink, family: "system-ui, sans-serif", size: 13 },
@@ -100,7 +100,7 @@
             eye: { x: 2 * data.eye[0], y: 2 * data.eye[1], z: 2 * data.eye[2] } },
         };
         if (count > 1)
-          result.annotations.push({ text: model.name, showarrow: false, xref: "paper", yref: "paper", x: (place.x[0] + place.x[1]) / 2,
+          result.annotations.push({ text: model.name, showarrow: false, xref: "paper", yref: "paper", x: place.x[0], xanchor: "left",
             y: place.y[1], yanchor: "top", font: { color: ink, size: 14 } });
       });
       return result;
@@ -127,7 +127,7 @@
     function tell() {
       output.textContent = number(data.lambdas[frame()]);
       slider.setAttribute("aria-valuetext", data.label + " " + output.textContent);
-      energies.textContent = "Energy, N mm: " + models.map((model) => {
+      energies.textContent = kind()[0].toUpperCase() + kind().slice(1) + " energy, N mm: " + models.map((model) => {
         const value = model.energy[kind()];
         return (models.length > 1 ? model.name + " " : "") + (value ? number(value[frame()]) : "0");
       }).join(" · ");
