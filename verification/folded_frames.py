@@ -8,7 +8,7 @@ from typing import Any
 from bh import Model, Path, trace
 from bh.interactive import frames
 from bh.plotting import picture
-from verification.checks import CaseResult, Context
+from verification.checks import CaseResult, Check, Context, cost_of
 from verification.run import write_json
 
 FRAMES = 8  # steps that a folding is told in
@@ -21,6 +21,21 @@ def in_frames(model: Model, fold: Fold, count: int = FRAMES) -> Path:
     for number in range(1, count + 1):
         model = fold(model, number / count)
     return trace(model)
+
+
+def compare(
+    result: CaseResult, params: dict[str, Any], path: Path, shell: Path, tolerance: float | None
+) -> None:
+    """Energies at the end of a path against the shell's; the total is judged where there is a tolerance."""
+    outcome = path.outcome if path.outcome != "reached" else shell.outcome
+    energy, reference = path[-1].energy.as_dict(), shell[-1].energy.as_dict()
+    for kind, value in energy.items():
+        if value or reference[kind]:
+            judged = tolerance if kind == "total" else None
+            result.checks.append(
+                Check(result.name, f"{kind} energy, folded", params, value, "N mm", reference[kind],
+                      "the shell on the same sheet", judged, outcome=outcome, **cost_of(path))
+            )  # fmt: skip
 
 
 def step_ends(path: Path) -> list[Any]:

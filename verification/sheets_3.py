@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import meshes
 from bh import Model, Path, Sheet
 from meshes.structured import Kind
-from verification.checks import CaseResult, Check, Context, cost_of, reached_energy
-from verification.folded_frames import in_frames, store
+from verification.checks import CaseResult, Context
+from verification.folded_frames import compare, in_frames, store
 
 CASE = "sheets_3"
 SHEET = Sheet(E=4000.0, nu=0.38, t=0.127)
 ANGLE = math.pi / 2
 LSTAR = 25.0  # mm
 CREASES = (80.0, 90.0, 100.0, 110.0, 120.0)  # radii of the pleats, mm
+FOLDS: tuple[Literal["mountain", "valley"], ...] = ("mountain", "valley", "mountain", "valley", "mountain")
 # rows of cells between creases and mesh pattern that suit each
 MESHES: dict[str, tuple[int, Kind]] = {
     "bars-and-hinges": (1, "staggered"),
     "consistent": (4, "mirrored"),
     "shell": (2, "mirrored"),
 }
-TOLERANCE = 0.03  # of the shell's energy
+TOLERANCE = {False: 0.03, True: 0.08}  # of the shell's energy; quick meshes are twice as coarse
 
 
 def run(context: Context) -> CaseResult:
@@ -34,8 +36,7 @@ def run(context: Context) -> CaseResult:
     )
     along = 16 if context.quick else 32
     annulus = meshes.annulus_sector(100.0, 10.0, math.pi)
-    senses = [("mountain", "valley")[i % 2] for i in range(len(CREASES))]
-    pleats = meshes.annulus_sector(CREASES, 10.0, ANGLE, folds=senses)
+    pleats = meshes.annulus_sector(CREASES, 10.0, ANGLE, folds=FOLDS)
     for name, pattern, fold, cells, what in (
         (
             "annulus",
@@ -52,7 +53,9 @@ def run(context: Context) -> CaseResult:
             mesh = meshes.structured(pattern, along=cells, rows=rows, kind=kind)
             paths[formulation] = in_frames(Model(mesh, SHEET, formulation=formulation), fold)
         for formulation in ("bars-and-hinges", "consistent"):
-            _compare(result, name, cells, paths[formulation], paths["shell"])
+            params = {"sheet": name, "formulation": formulation, "along": cells}
+            judged = TOLERANCE[context.quick] if formulation == "consistent" else None
+            compare(result, params, paths[formulation], paths["shell"], judged)
         store(result, context, f"{CASE}_{name}", paths, what, f"{what}; the sheet is free.", what)
     return result
 
@@ -63,14 +66,3 @@ def _spring(model: Model, fraction: float) -> Model:
 
 def _exactly(model: Model, fraction: float) -> Model:
     return model.fold("all", by=fraction * ANGLE)
-
-
-def _compare(result: CaseResult, sheet: str, along: int, path: Path, shell: Path) -> None:
-    formulation = path.model.formulation
-    judged = TOLERANCE if formulation == "consistent" and along >= 32 else None
-    outcome = path.outcome if path.outcome != "reached" else shell.outcome
-    params = {"sheet": sheet, "formulation": formulation, "along": along}
-    result.checks.append(
-        Check(CASE, "total energy, folded", params, reached_energy(path), "N mm", reached_energy(shell),
-              "the shell on the same sheet", judged, outcome=outcome, **cost_of(path))
-    )  # fmt: skip
