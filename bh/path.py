@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import astuple, dataclass
 from functools import lru_cache
@@ -19,10 +19,11 @@ from bh.describe import describe, fingerprint, rebuild
 from bh.errors import ModelError, PathFileError
 from bh.formulations import Formulation, formulation
 from bh.model import Model
-from bh.program import StepProgram, open_ends, program
+from bh.observables import Until
+from bh.program import Ended, StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
 from bh.solvers.automatic import Automatic
-from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
+from bh.solvers.increments import ARC, LOAD, CriticalPoint, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
 from bh.storage import CriticalRow, PathFile, StateRow, reading
@@ -237,8 +238,25 @@ class Path:
             if step > 0:
                 last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
                 start = None if last is None else self[last]
+                if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
+                    self._programs = program(self.model, self._ended(step))
             self._systems[step] = self._formulation.system(self.model, self._programs[step], start)
         return self._systems[step]
+
+    def _ended(self, before: int) -> dict[int, Ended]:
+        """Steps before `before` that ended early, by an `Until`."""
+        last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
+        found = {}
+        for step, index in last.items():
+            if until_of(self.model.steps[step]) is not None and self.records[index].lam < 1.0:
+                state = self[index]
+                found[step] = Ended(state.lam, state.points, state.dihedral_angles)
+        return found
+
+
+def until_of(actuations: Sequence[object]) -> Until | None:
+    """What ends a step early, if anything does."""
+    return next((item for item in actuations if isinstance(item, Until)), None)
 
 
 def trace(
@@ -327,7 +345,8 @@ def _run_step(
             len(history) < 3 and step > 0 and not any(r.jumped for r in done)
         ):  # later steps do not store their start
             history.insert(0, origin)
-    for item in walk(Walk(system, strategy, tuple(history), increment, origin)):
+    goal, tolerance = _goal(path, step, system)
+    for item in walk(Walk(system, strategy, tuple(history), increment, origin, goal, tolerance)):
         now = time.perf_counter()
         if item.outcome != "reached":
             return StepOutcome(item.outcome, item.note, item.iterations)
@@ -342,6 +361,18 @@ def _run_step(
         report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
         began = time.perf_counter()
     return StepOutcome("reached")
+
+
+def _goal(path: Path, step: int, system: Any) -> tuple[Callable[[Point], float] | None, float]:
+    """What is zero where the step ends early, and to which tolerance; None if nothing ends it early."""
+    until = until_of(path.model.steps[step])
+    if until is None:
+        return None, 0.0
+
+    def missed(at: Point) -> float:
+        return until.measure(path._formulation.observe(path.model, system, at.q, at.lam, step)) - until.value
+
+    return missed, until.tolerance
 
 
 def _recent(done: list[Record]) -> list[Record]:

@@ -16,7 +16,11 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+import meshes
 from bh.errors import InputError, SceneError
+from bh.pinch_zone import Profile
+from meshes import CreasePattern
+from meshes.corrugations import KINDS as CORRUGATIONS
 from meshes.pattern import FoldKind
 from meshes.structured import Kind
 
@@ -33,14 +37,19 @@ Dihedral = Annotated[float, Field(gt=0.0, lt=TURN)]
 Rest = Annotated[float, Field(ge=0.0, le=TURN)]
 FoldAngle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Few = Annotated[int, Field(ge=1, le=1000)]
 Node = Annotated[int, Field(ge=0, le=2**62)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Folds = FoldKind | Annotated[list[FoldKind], Field(min_length=1)]
+Panels = Annotated[int, Field(ge=2, le=100)]
+Power = Annotated[float, Field(ge=1.0, le=100.0)]
 Place = str | Annotated[list[Node], Field(min_length=1)]
 
 FOLDS = '"mountain", "valley" or "flat", or a list with one of them a crease'
 PLACE = 'a place ("corner:inner-start", "edge:inner", "crease:NAME", "node:N", "all", ...) or a list of nodes'
 RADII = "the radius of the crease in mm, or a list of rising radii"
+ALTERNATING = FOLDS + "; alternating where it is left out"
+ALONG, ACROSS = "the side along x in mm", "the side along y in mm"
 DENSITY = "cell height across over width along the crease, a positive number, best 5 to 12"
 LSTAR = "the length scale of the crease in mm, a positive number"
 VECTOR = "three numbers [x, y, z]"
@@ -58,7 +67,17 @@ T = TypeVar("T", bound=Table)
 # --- pattern: the class is chosen by `kind`, or is FilePattern where there is `file` ------------------------
 
 
-class StripPattern(Table):
+class PatternTable(Table):
+    """A pattern of the library, drawn by the function of `meshes` that has the name of its kind."""
+
+    def draw(self) -> CreasePattern:
+        given = dict(self)
+        kind, folds = given.pop("kind"), given.pop("fold")
+        drawn: CreasePattern = getattr(meshes, kind.replace("-", "_"))(folds=folds, **given)
+        return drawn
+
+
+class StripPattern(PatternTable):
     kind: Literal["strip"]
     length: Length = Field(description="a positive length along x in mm")
     width: Length = Field(description="a positive width along y in mm")
@@ -66,7 +85,7 @@ class StripPattern(Table):
     fold: Folds = Field("mountain", description=FOLDS)
 
 
-class AnnulusSectorPattern(Table):
+class AnnulusSectorPattern(PatternTable):
     kind: Literal["annulus_sector"]
     radius: Length | list[Length] = Field(description=RADII)
     width: Length = Field(description="a positive width each side of the creases in mm")
@@ -76,10 +95,93 @@ class AnnulusSectorPattern(Table):
     fold: Folds = Field("mountain", description=FOLDS)
 
 
-class FullAnnulusPattern(Table):
+class FullAnnulusPattern(PatternTable):
     kind: Literal["full_annulus"]
     radius: Length | list[Length] = Field(description=RADII)
     width: Length = Field(description="a positive width each side of the creases in mm")
+    fold: Folds = Field("mountain", description=FOLDS)
+
+
+class ParallelPattern(PatternTable):
+    kind: Literal["parallel_creases"]
+    curvature: Number | Annotated[list[Number], Field(min_length=1)] = Field(
+        description="the curvature of the first crease in 1/mm, of any sign, or a list with one of them a piece"
+    )
+    length: Length | Annotated[list[Length], Field(min_length=1)] = Field(
+        description="the length of the first crease in mm, or a list with one of them a piece"
+    )
+    spacing: Length = Field(5.0, description="a positive distance between creases and to the edges in mm")
+    creases: Annotated[int, Field(ge=1, le=1000)] = Field(1, description="a whole number of creases, from 1")
+    fold: Folds | None = Field(None, description=FOLDS + "; alternating from mountain unless given")
+
+
+class CorrugationPattern(PatternTable):
+    """One of the five corrugations of the source (4.3)."""
+
+    kind: Literal["straight", "parabolic-point", "parabolic-edge", "elliptical-point", "elliptical-edge"] = (
+        Field(
+            description='"straight", "parabolic-point", "parabolic-edge", "elliptical-point" or "elliptical-edge"'
+        )
+    )
+    width: Length = Field(100.0, description="a positive length W along x in mm")
+    height: Length = Field(100.0, description="a positive length H along y in mm")
+    panels: Panels = Field(5, description="a whole number of sheets between creases, from 2 to 100")
+    fold: Folds | None = Field(None, description=FOLDS)
+
+    def draw(self) -> CreasePattern:
+        return meshes.corrugation(self.kind, self.width, self.height, self.panels, self.fold)
+
+
+class CurvedCorrugationPattern(PatternTable):
+    """Any corrugation of the family of `meshes.curved_corrugation`."""
+
+    kind: Literal["curved-corrugation"]
+    exponent: Power = Field(2.0, description="a number p from 1 to 100 (2 for parabolas and ellipses)")
+    root: Power = Field(1.0, description="a number q from 1 to 100 (1 for parabolas, 2 for ellipses)")
+    spread: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.0, description="a number from 0 (creases end at the straight edge) to 1 (in the corners)"
+    )
+    width: Length = Field(100.0, description="a positive length W along x in mm")
+    height: Length = Field(100.0, description="a positive length H along y in mm")
+    panels: Panels = Field(5, description="a whole number of sheets between creases, from 2 to 100")
+    fold: Folds | None = Field(None, description=FOLDS)
+
+
+class TwoArcsPattern(PatternTable):
+    kind: Literal["two_arcs"]
+    width: Length = Field(100.0, description=ALONG)
+    height: Length = Field(100.0, description=ACROSS)
+    radii: list[Length] = Field(
+        [80.0, 250.0], description="radii in mm, each at least half the width, from below"
+    )
+    at: list[Number] = Field([35.0, 70.0], description="heights in mm of the tops of the arcs, rising")
+    fold: Folds = Field(["mountain", "valley"], description=FOLDS)
+
+
+class SineTessellationPattern(PatternTable):
+    kind: Literal["sine_tessellation"]
+    width: Length = Field(100.0, description=ALONG)
+    height: Length = Field(100.0, description=ACROSS)
+    creases: Few = Field(5, description="a whole number of creases, from 1")
+    amplitude: Length = Field(4.0, description="the amplitude of the sines in mm")
+    waves: Positive = Field(2.0, description="how many waves fit into the width, a positive number")
+    fold: Folds | None = Field(None, description=ALTERNATING)
+
+
+class ParabolicCanopyPattern(PatternTable):
+    kind: Literal["parabolic_canopy"]
+    width: Length = Field(100.0, description=ALONG)
+    height: Length = Field(100.0, description=ACROSS)
+    creases: Few = Field(3, description="a whole number of creases, from 1")
+    sag: Number = Field(15.0, description="how much lower the ends of a parabola are than its top, mm")
+    fold: Folds | None = Field(None, description=ALTERNATING)
+
+
+class OppositeParabolasPattern(PatternTable):
+    kind: Literal["opposite_parabolas"]
+    side: Length = Field(100.0, description="the side of the square in mm")
+    gap: Length = Field(30.0, description="the distance between the tops in mm")
+    sag: Length = Field(20.0, description="from a top to the ends of its parabola in mm")
     fold: Folds = Field("mountain", description=FOLDS)
 
 
@@ -92,10 +194,34 @@ class FilePattern(Table):
     )
 
 
-LIBRARY: dict[str, type[StripPattern | AnnulusSectorPattern | FullAnnulusPattern]] = {
+class DrawingPattern(Table):
+    file: Annotated[str, Field(min_length=1)] = Field(
+        description="the name of an .svg or .dxf file, from the folder of the scene"
+    )
+    scale: Positive | None = Field(
+        None, description="how many mm a unit of the drawing is, a positive number"
+    )
+    fit: Length | None = Field(None, description="the longer side of the sheet in mm, in place of scale")
+    tolerance: Length | None = Field(None, description="how far chords may stay off curves, in mm")
+    gap: Length | None = Field(
+        None, description="up to which distance lines that miss each other are joined, in mm"
+    )
+    lines: dict[str, str] = Field(
+        {}, description='what lines stand for, such as { "#00aa00" = "valley", "layer:score" = "mountain" }'
+    )
+
+
+LIBRARY: dict[str, type[PatternTable]] = {
     "strip": StripPattern,
+    "parallel_creases": ParallelPattern,
     "annulus_sector": AnnulusSectorPattern,
     "full_annulus": FullAnnulusPattern,
+    **dict.fromkeys(CORRUGATIONS, CorrugationPattern),
+    "curved-corrugation": CurvedCorrugationPattern,
+    "two_arcs": TwoArcsPattern,
+    "sine_tessellation": SineTessellationPattern,
+    "parabolic_canopy": ParabolicCanopyPattern,
+    "opposite_parabolas": OppositeParabolasPattern,
 }
 
 
@@ -115,7 +241,20 @@ class GmshTable(Table):
 
     kind: Literal["gmsh"] = Field(description='"gmsh"')
     size: Annotated[float, Field(gt=0.0)] = Field(description="the length of an edge in mm, positive")
+    near: dict[str, Annotated[float, Field(gt=0.0)]] = Field(
+        {},
+        description='shorter edges at some creases or sides in mm, such as { "crease:crease" = 1.0 }',
+    )
+    growth: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
+        0.3, description="how fast edges grow away from these, mm a mm, above 0 up to 10"
+    )
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
+
+
+class DrawnTable(Table):
+    """The faces of a drawing, cut into triangles."""
+
+    kind: Literal["drawn"] = Field(description='"drawn"')
 
 
 class MeshTable(Table):
@@ -193,6 +332,29 @@ class FoldTable(Table):
     stiffness: Positive | None = Field(None, description="a positive stiffness a length, N mm / (mm rad)")
 
 
+class PinchTable(Table):
+    """Keys of `bh.Pinch`."""
+
+    crease: str = Field(description='the name of a crease, or "all"')
+    at: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.5, description="the middle of the zone in parts of the crease's length, 0 to 1"
+    )
+    to: Dihedral | None = Field(
+        None, description="the dihedral angle in the middle in rad inside (0, 2 pi), flat is pi"
+    )
+    by: Annotated[float, Field(gt=0.0, lt=math.pi)] | None = Field(
+        None,
+        description="a fold angle in rad inside (0, pi), mountain or valley as drawn; pi - pi / 14 without to",
+    )
+    length: Length | None = Field(
+        None, description="the length of the zone along the crease in mm; a fifth of the crease unless given"
+    )
+    how: Literal["imposed", "rest"] = Field(
+        "imposed", description='"imposed", or "rest" for the rest angles of the crease\'s spring'
+    )
+    profile: Profile = Field("cosine", description='"cosine", or "grip" for the same angle all over the zone')
+
+
 class MomentTable(Table):
     crease: str = Field(description='the name of a crease, or "all"')
     to: Number = Field(description="a couple a length in N mm / mm")
@@ -210,8 +372,31 @@ class DisplaceTable(Table):
     by: Number = Field(description="a displacement in mm")
 
 
-ACTUATIONS: dict[str, type[FoldTable | MomentTable | ForceTable | DisplaceTable]] = {
+class UntilTable(Table):
+    """What ends a step before its actuations are complete."""
+
+    depth: Length | None = Field(None, description="a depth of the corrugation in mm (docs/corrugations.md)")
+    observable: str | None = Field(None, description="the name of an observable, or module:function")
+    value: Number | None = Field(
+        None, description="its value at the end of the step, a number in its own unit"
+    )
+    of: str | None = Field(None, description="the crease or place that it is of")
+    tolerance: Positive = Field(
+        1e-4, description="how near the value must be met, a positive number in its unit"
+    )
+
+    @model_validator(mode="after")
+    def one_target(self) -> UntilTable:
+        if (self.depth is None) == (self.observable is None) or (self.observable is None) != (
+            self.value is None
+        ):
+            raise ValueError("needs either depth (mm), or observable and value")
+        return self
+
+
+ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable]] = {
     "fold": FoldTable,
+    "pinch": PinchTable,
     "moment": MomentTable,
     "force": ForceTable,
     "displace": DisplaceTable,

@@ -21,7 +21,7 @@ from fem.observables import ShellState, observe
 from fem.shell import ShellElements, shell_elements
 from fem.system import ShellSystem
 from meshes import SheetMesh
-from meshes.curved import lift
+from meshes.curved import LinearMesh, lift
 
 Array = NDArray[np.float64]
 FREE = EdgeMoments()
@@ -32,6 +32,7 @@ class Shell:
 
     name = "shell"
     takes_nu = True
+    degree = 2
 
     def system(
         self, model: Model, program: StepProgram, start: State | None, moments: EdgeMoments = FREE
@@ -45,7 +46,7 @@ class Shell:
             raise ModelError(
                 f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
             )
-        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet), moments)
+        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet, self.degree), moments)
 
     def observe(
         self,
@@ -60,10 +61,17 @@ class Shell:
         return observe(model, system, q, lam, step, stable)
 
 
+class LinearShell(Shell):
+    """Formulation "linear-shell": linear displacements, constant moments (HHJ) and strains; the cheap member."""
+
+    name = "linear-shell"
+    degree = 1
+
+
 @lru_cache(maxsize=4)
-def _elements(mesh: SheetMesh, sheet: Sheet) -> ShellElements:
+def _elements(mesh: SheetMesh, sheet: Sheet, degree: int) -> ShellElements:
     """Elements are those of the sheet, whatever the step."""
-    return shell_elements(lift(mesh), sheet)
+    return shell_elements(lift(mesh) if degree == 2 else LinearMesh(mesh), sheet)
 
 
 def follow(

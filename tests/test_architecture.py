@@ -20,6 +20,8 @@ HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "pymoo")
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.program", "bh.scene", "bh.scene_schema",
     "bh.describe", "bh.state", "bh.formulations",
+    "bh.pinch_zone",
+    "bh.describe", "bh.state", "bh.formulations", "bh.observables",
 )  # fmt: skip
 PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")

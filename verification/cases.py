@@ -29,6 +29,7 @@ ALL_CASES = {
     "appendix_b_fields": "verification.appendix_b_fields",
     "appendix_b_sheets": "verification.appendix_b_sheets",
     "shell_benchmarks": "verification.shell_benchmarks",
+    "tables4": "verification.tables4",
     "campaign": "verification.campaign",
 }
 # run only when named: minutes, not seconds; `records` keeps a run of each

@@ -1,6 +1,7 @@
-"""File formats: FOLD in and out, triangles out through meshio."""
+"""File formats: FOLD, SVG and DXF in, FOLD and triangles out (through meshio)."""
 
+from meshes.io.drawing import read_drawn, read_pattern
 from meshes.io.export import write_mesh
 from meshes.io.fold import read_fold, write_fold
 
-__all__ = ["read_fold", "write_fold", "write_mesh"]
+__all__ = ["read_drawn", "read_fold", "read_pattern", "write_fold", "write_mesh"]
