@@ -21,11 +21,13 @@ ALL_CASES = {
     "derivatives": "verification.derivatives",
     "fig3_9": "verification.fig3_9",
     "fig3_11": "verification.fig3_11",
+    "sheets_3": "verification.sheets_3",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
     "appendix_b_cross": "verification.appendix_b_cross",
     "appendix_b_fields": "verification.appendix_b_fields",
+    "appendix_b_sheets": "verification.appendix_b_sheets",
     "shell_benchmarks": "verification.shell_benchmarks",
     "tables4": "verification.tables4",
     "speed_error": "verification.speed_error",
@@ -36,7 +38,7 @@ LONG = {"campaign", "speed_error", "fig3_8", "fig3_10"}
 LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
 CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
 # run with the case by `bh verify`
-PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields")}
+PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields", "appendix_b_sheets")}
 
 
 def case(name: str) -> Case:
