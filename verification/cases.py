@@ -21,6 +21,8 @@ ALL_CASES = {
     "derivatives": "verification.derivatives",
     "fig3_9": "verification.fig3_9",
     "fig3_11": "verification.fig3_11",
+    "fig5_3": "verification.fig5_3",
+    "appendix_a": "verification.appendix_a",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
