@@ -26,6 +26,8 @@ ALL_CASES = {
     "fig5_9": "verification.fig5_9",
     "fig5_10": "verification.fig5_10",
     "fig5_11": "verification.fig5_11",
+    "fig5_3": "verification.fig5_3",
+    "appendix_a": "verification.appendix_a",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
