@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from bh.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
+    from bh.accuracy import Accuracy, Goal
     from bh.actuation import Displace, Fold, Force, Moment
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.model import CreaseLaw, Model, Sheet
@@ -24,10 +25,11 @@ if TYPE_CHECKING:
     from bh.supports import RigidBody, Support
 
 _HOME = {
-    "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic", "CreaseLaw": "bh.model",
+    "Accuracy": "bh.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
+    "CreaseLaw": "bh.model",
     "Displace": "bh.actuation", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.state",
     "Fold": "bh.actuation",
-    "Force": "bh.actuation", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
+    "Force": "bh.actuation", "Goal": "bh.accuracy", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
     "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
     "Path": "bh.path", "PathFileError": "bh.errors", "RigidBody": "bh.supports", "SceneError": "bh.errors",
     "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
@@ -39,8 +41,8 @@ _SUBMODULES = {
 }  # fmt: skip
 
 __all__ = [
-    "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
-    "InputError", "LoadControl", "Model", "ModelError", "Moment",
+    "Accuracy", "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
+    "Goal", "InputError", "LoadControl", "Model", "ModelError", "Moment",
     "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "load_scene", "trace",
 ]  # fmt: skip
 

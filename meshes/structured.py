@@ -18,7 +18,7 @@ import numpy as np
 
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
-from meshes.mesh import SheetMesh
+from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.topology import Ints, build
 
@@ -88,6 +88,7 @@ def structured(
         spans=spans,
         kind=kind,
         aspect_ratio=alpha,
+        origin=Origin.of(pattern, points, triangles),
     )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
-from meshes.mesh import SheetMesh
+from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.topology import Ints
 
@@ -105,6 +105,7 @@ def unstructured(
         folds=pattern.folds,
         curves=curves,
         kind="gmsh",
+        origin=Origin.of(pattern, points, triangles),
     )
 
 

@@ -19,11 +19,11 @@ HEAVY = ("gmsh", "pyvista", "matplotlib", "skfem", "dask", "pymoo")
 
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.program", "bh.scene", "bh.scene_schema",
-    "bh.describe", "bh.state", "bh.formulations",
+    "bh.describe", "bh.state", "bh.formulations", "bh.refinement",
 )  # fmt: skip
 PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
-TOP = ("bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.offscreen", "bh.warm_up")
+TOP = ("bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.offscreen", "bh.warm_up", "bh.accuracy")
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,
 # so that a part can be closed against itself too (the description does not know `bh.path`, ...).
@@ -32,8 +32,9 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("bh.mechanics", ("meshes", *DESCRIPTION, "bh.mechanics", *PROTOCOL)),
     ("bh.solvers", ("meshes", "bh.solvers")),
     *((module, ("meshes", *DESCRIPTION)) for module in DESCRIPTION),
-    # `path.plot()` is the user's word; it loads the plotting when it is called
-    *((module, ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.plotting")) for module in PATH),
+    # `path.plot()` and `bh.trace(..., accuracy=...)` are the user's words; what they need is loaded when it is called
+    *((module, ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.plotting", "bh.accuracy")) for module in PATH),
+    ("bh.accuracy", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.accuracy", "bh.analysis")),
     ("bh.analysis", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis")),
     ("bh.applications", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis", "bh.applications")),
     *(
