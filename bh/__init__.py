@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from bh.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
-    from bh.accuracy import Accuracy, Goal
+    from bh.accuracy import Accuracy
     from bh.actuation import Displace, Fold, Force, Moment
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.model import CreaseLaw, Model, Sheet
     from bh.path import Path, trace
+    from bh.refinement import Goal
     from bh.scene import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
     from bh.solvers.automatic import Automatic
@@ -29,7 +30,8 @@ _HOME = {
     "CreaseLaw": "bh.model",
     "Displace": "bh.actuation", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.state",
     "Fold": "bh.actuation",
-    "Force": "bh.actuation", "Goal": "bh.accuracy", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
+    "Force": "bh.actuation", "Goal": "bh.refinement", "InputError": "bh.errors",
+    "LoadControl": "bh.solvers.continuation",
     "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
     "Path": "bh.path", "PathFileError": "bh.errors", "RigidBody": "bh.supports", "SceneError": "bh.errors",
     "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",

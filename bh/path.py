@@ -21,6 +21,7 @@ from bh.formulations import Formulation, formulation
 from bh.model import Model
 from bh.program import StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
+from bh.refinement import Goal
 from bh.solvers.automatic import Automatic
 from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
 from bh.solvers.trace import Strategy, Walk, walk
@@ -30,7 +31,7 @@ from bh.threads import one_blas_thread
 from meshes.mesh import count
 
 if TYPE_CHECKING:
-    from bh.accuracy import Accuracy, Goal
+    from bh.accuracy import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -319,7 +320,7 @@ def _trace_to(
     file: str | FilePath | None,
     resume: bool,
 ) -> Path:
-    from bh.accuracy import Goal, solve
+    from bh.accuracy import solve
 
     if resume:
         raise ModelError("a run to a wanted accuracy begins anew on every mesh; run it without resume")

@@ -17,6 +17,46 @@ from bh.supports import RigidBody, select
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.structured import Kind
 
+GOALS = ("energy", "tip", "stiffness")
+LEAST, MOST = 1e-4, 0.5  # accuracies that can be asked for
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is to be how accurate.
+
+    Attributes:
+        within: relative error, 0.02 is 2 %.
+        of: "energy" (elastic, total), "tip" (displacement of a place, as a part of itself) or "stiffness" (of a place
+            against a force in a direction).
+        at: the place of a tip or a stiffness.
+        direction: of the force on it; three numbers.
+    """
+
+    within: float
+    of: str = "energy"
+    at: str | None = None
+    direction: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        ok = isinstance(self.within, float | int) and not isinstance(self.within, bool)
+        if not (ok and LEAST <= self.within <= MOST):
+            raise ModelError(
+                f"accuracy = {self.within!r} cannot be; give a relative error from {LEAST:g} to {MOST:g} (0.02 is 2 %)"
+            )
+        if self.of not in GOALS:
+            raise ModelError(f"accuracy of '{self.of}' is not known; use one of {', '.join(GOALS)}")
+        if self.of != "energy" and not isinstance(self.at, str):
+            raise ModelError(f'accuracy of the {self.of} needs a place: at = "corner:outer-end", for example')
+        if self.of == "energy" and self.at is not None:
+            raise ModelError(
+                'accuracy of the energy has no place; remove at, or say of = "tip" or "stiffness"'
+            )
+        if (self.of == "stiffness") != (self.direction is not None):
+            raise ModelError(
+                "a direction [x, y, z] goes with the accuracy of a stiffness, and with nothing else"
+            )
+
 
 @dataclass(frozen=True)
 class Refinement:

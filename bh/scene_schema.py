@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from bh.errors import InputError, SceneError
+from bh.refinement import LEAST, MOST
 from meshes.pattern import FoldKind
 from meshes.structured import Kind
 
@@ -150,6 +151,17 @@ class OutputsTable(Table):
     pictures: bool = Field(False, description="true or false")
     vtu: bool = Field(False, description="true or false")
     fold: bool = Field(False, description="true or false")
+
+
+class AccuracyTable(Table):
+    """Keys of `bh.Goal`; a number alone is `within`."""
+
+    within: Annotated[float, Field(ge=LEAST, le=MOST)] = Field(
+        description=f"a relative error from {LEAST:g} to {MOST:g} (0.02 is 2 %)"
+    )
+    of: Literal["energy", "tip", "stiffness"] = Field("energy", description='"energy", "tip" or "stiffness"')
+    at: str | None = Field(None, description='the place of a tip or a stiffness, such as "corner:outer-end"')
+    direction: Vector | None = Field(None, description=VECTOR + ", of the force on a stiffness")
 
 
 # --- supports, creases, steps -------------------------------------------------------------------------------
