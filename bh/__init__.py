@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 from bh.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
+    from bh.accuracy import Accuracy
     from bh.actuation import Displace, Fold, Force, Moment, Pinch
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.model import CreaseLaw, Model, Sheet
     from bh.observables import Until, depth
     from bh.path import Path, trace
+    from bh.refinement import Goal
     from bh.scene import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
     from bh.solvers.automatic import Automatic
@@ -25,10 +27,12 @@ if TYPE_CHECKING:
     from bh.supports import RigidBody, Support
 
 _HOME = {
-    "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic", "CreaseLaw": "bh.model",
+    "Accuracy": "bh.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
+    "CreaseLaw": "bh.model",
     "Displace": "bh.actuation", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.state",
     "Fold": "bh.actuation",
-    "Force": "bh.actuation", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
+    "Force": "bh.actuation", "Goal": "bh.refinement", "InputError": "bh.errors",
+    "LoadControl": "bh.solvers.continuation",
     "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
     "Path": "bh.path", "PathFileError": "bh.errors", "Pinch": "bh.actuation",
     "RigidBody": "bh.supports", "SceneError": "bh.errors",
@@ -43,8 +47,8 @@ _SUBMODULES = {
 }  # fmt: skip
 
 __all__ = [
-    "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
-    "InputError", "LoadControl", "Model", "ModelError", "Moment",
+    "Accuracy", "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
+    "Goal", "InputError", "LoadControl", "Model", "ModelError", "Moment",
     "Newton", "Path", "PathFileError", "Pinch", "RigidBody", "SceneError", "Sheet", "State", "Support", "Until",
     "depth", "load_scene", "trace",
 ]  # fmt: skip

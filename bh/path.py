@@ -10,7 +10,7 @@ from dataclasses import astuple, dataclass
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path as FilePath
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from bh.model import Model
 from bh.observables import Until
 from bh.program import Ended, StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
+from bh.refinement import Goal
 from bh.solvers.automatic import Automatic
 from bh.solvers.increments import ARC, LOAD, CriticalPoint, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
@@ -29,6 +30,9 @@ from bh.state import State
 from bh.storage import CriticalRow, PathFile, StateRow, reading
 from bh.threads import one_blas_thread
 from meshes.mesh import count
+
+if TYPE_CHECKING:
+    from bh.accuracy import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -74,6 +78,9 @@ class Path:
     """The accepted states of a model, in order, and how each step ended.
 
     `path[i]` is the i-th `State` (read when asked for); `path[0]` is the state that the first step begins with.
+
+    Attributes:
+        accuracy: the estimate of its error, where an accuracy was asked for (`bh.accuracy.Accuracy`), else None.
     """
 
     def __init__(self, model: Model, provenance: dict[str, Any] | None = None) -> None:
@@ -81,6 +88,7 @@ class Path:
         self.provenance = provenance or _provenance(model)
         self.records: list[Record] = []
         self.steps: list[StepOutcome] = []
+        self.accuracy: Accuracy | None = None
         self._formulation: Formulation = formulation(model.formulation)
         self._programs: tuple[StepProgram, ...] = program(model)
         self._systems: dict[int, Any] = {}
@@ -123,6 +131,8 @@ class Path:
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
         ends = [line for step in self._programs for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
+        if self.accuracy is not None and not self.accuracy.met:
+            found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
@@ -266,6 +276,7 @@ def trace(
     strategy: Strategy | None = None,
     file: str | FilePath | None = None,
     resume: bool = False,
+    accuracy: float | Goal | None = None,
 ) -> Path:
     """Follow the equilibrium of `model` through all its steps.
 
@@ -274,6 +285,9 @@ def trace(
         strategy: how increments are chosen; the default suits all scenes.
         file: write every accepted state to this file before the next increment begins.
         resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
+        accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
+            chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
+            see `bh.accuracy` and `path.accuracy`. The file is written when that is done.
 
     Returns:
         the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
@@ -288,6 +302,8 @@ def trace(
         raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
+    if accuracy is not None:
+        return _trace_to(model, accuracy, progress, strategy, file, resume)
     strategy = strategy or Automatic()
     path = Path(model)
     target: PathFile | None = None
@@ -311,6 +327,25 @@ def trace(
         report.close(path.outcome)
         if target is not None:
             target.close()
+    return path
+
+
+def _trace_to(
+    model: Model,
+    accuracy: float | Goal,
+    progress: bool | ProgressMeter,
+    strategy: Strategy | None,
+    file: str | FilePath | None,
+    resume: bool,
+) -> Path:
+    from bh.accuracy import solve
+
+    if resume:
+        raise ModelError("a run to a wanted accuracy begins anew on every mesh; run it without resume")
+    goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
+    path = solve(model, goal, progress=progress, strategy=strategy)
+    if file is not None:
+        path.save(file)
     return path
 
 

@@ -20,6 +20,7 @@ from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
 from bh.observables import Until
 from bh.program import program
+from bh.refinement import Goal, pattern_of
 from bh.scene_patterns import (
     LIBRARY,
     DrawingPattern,
@@ -27,6 +28,7 @@ from bh.scene_patterns import (
 )
 from bh.scene_schema import (
     ACTUATIONS,
+    AccuracyTable,
     CreaseTable,
     DrawnTable,
     GmshTable,
@@ -52,8 +54,9 @@ from bh.scene_tables import (
 from bh.supports import RigidBody, Support, directions, select
 from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
+SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
+COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
 
 
@@ -73,6 +76,7 @@ class Scene:
     Attributes:
         model: checked; its steps can be programmed (`bh.program`), nothing is solved.
         outputs: what a run is to write.
+        accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -81,6 +85,7 @@ class Scene:
     outputs: Outputs
     name: str = "scene"
     source: Path | None = None
+    accuracy: Goal | None = None
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -146,8 +151,12 @@ def _scene(text: str, folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
+    accuracy = _accuracy(data["accuracy"]) if "accuracy" in data else None
+    how_meshed = data.get("mesh")
+    if accuracy is not None and how_meshed is None and "file" not in as_table(data["pattern"], "pattern"):
+        how_meshed = COARSEST  # only to check the scene on
     model = Model(
-        mesh=_mesh(data["pattern"], data.get("mesh"), folder),
+        mesh=_mesh(data["pattern"], how_meshed, folder),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
@@ -156,7 +165,22 @@ def _scene(text: str, folder: Path) -> Scene:
         hinge_lock=how.hinge_lock,
     )
     _check(model)
-    return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold))
+    if accuracy is not None:
+        with within("accuracy"):
+            pattern_of(model)
+            if accuracy.at is not None:
+                model.mesh.nodes(accuracy.at)
+    return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold), accuracy=accuracy)
+
+
+def _accuracy(data: Any) -> Goal:
+    """A number, or a table."""
+    with within("accuracy"):
+        if not isinstance(data, dict):
+            return Goal(data)
+        table = read_table(AccuracyTable, data, "accuracy")
+        direction = None if table.direction is None else tuple(table.direction)
+        return Goal(table.within, table.of, table.at, direction)  # type: ignore[arg-type]
 
 
 # --- from tables to descriptions ----------------------------------------------------------------------------

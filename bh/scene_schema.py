@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from bh.pinch_zone import Profile
+from bh.refinement import LEAST, MOST
 from bh.scene_tables import (
     DENSITY,
     LSTAR,
@@ -87,6 +88,17 @@ class OutputsTable(Table):
     pictures: bool = Field(False, description="true or false")
     vtu: bool = Field(False, description="true or false")
     fold: bool = Field(False, description="true or false")
+
+
+class AccuracyTable(Table):
+    """Keys of `bh.Goal`; a number alone is `within`."""
+
+    within: Annotated[float, Field(ge=LEAST, le=MOST)] = Field(
+        description=f"a relative error from {LEAST:g} to {MOST:g} (0.02 is 2 %)"
+    )
+    of: Literal["energy", "tip", "stiffness"] = Field("energy", description='"energy", "tip" or "stiffness"')
+    at: str | None = Field(None, description='the place of a tip or a stiffness, such as "corner:outer-end"')
+    direction: Vector | None = Field(None, description=VECTOR + ", of the force on a stiffness")
 
 
 class SupportTable(Table):

@@ -16,7 +16,7 @@ import numpy as np
 
 from meshes.curves import Array, Curve, Polyline
 from meshes.errors import MeshError
-from meshes.mesh import SheetMesh
+from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.planar import corners
 from meshes.topology import Ints
@@ -111,6 +111,7 @@ def unstructured(
         fold_angles=drawn_angles(pattern, chains),
         curves=curves,
         kind="gmsh",
+        origin=Origin.of(pattern, points, triangles),
     )
 
 

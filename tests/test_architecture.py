@@ -20,11 +20,13 @@ HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "pymoo")
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.program", "bh.observables",
     "bh.describe", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state", "bh.formulations",
+    "bh.refinement",
 )  # fmt: skip
 PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = (
     "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.offscreen", "bh.warm_up",
+    "bh.accuracy",
 )  # fmt: skip
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,
@@ -34,8 +36,12 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("bh.mechanics", ("meshes", *DESCRIPTION, "bh.mechanics", *PROTOCOL)),
     ("bh.solvers", ("meshes", "bh.solvers")),
     *((module, ("meshes", *DESCRIPTION)) for module in DESCRIPTION),
-    # `path.plot()` is the user's word; it loads the plotting when it is called
-    *((module, ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.plotting")) for module in PATH),
+    # `path.plot()` and `bh.trace(..., accuracy=...)` are the user's words; what they need is loaded when it is called
+    *(
+        (module, ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.plotting", "bh.accuracy"))
+        for module in PATH
+    ),
+    ("bh.accuracy", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.accuracy", "bh.analysis")),
     ("bh.analysis", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis")),
     ("bh.applications", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis", "bh.applications")),
     *(

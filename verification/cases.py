@@ -37,10 +37,11 @@ ALL_CASES = {
     "shell_benchmarks": "verification.shell_benchmarks",
     "tables4": "verification.tables4",
     "speed_error": "verification.speed_error",
+    "honesty": "verification.honesty",
     "campaign": "verification.campaign",
 }
 # run only when named: minutes, not seconds; `records` keeps a run of each
-LONG = {"campaign", "speed_error", "fig3_8", "fig3_10"}
+LONG = {"campaign", "speed_error", "honesty", "fig3_8", "fig3_10"}
 LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
 CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
 # run with the case by `bh verify`

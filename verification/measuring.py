@@ -13,7 +13,7 @@ from typing import TypeVar
 
 T = TypeVar("T")
 # (seconds, repetitions): a solve that takes less is repeated so often
-REPEATS = ((1.5, 5), (4.0, 3), (math.inf, 1))
+REPEATS = ((1.0, 5), (3.0, 3), (math.inf, 1))
 CLEAR, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")
 
 
@@ -30,9 +30,8 @@ def measure(solve: Callable[[], T], quick: bool = False) -> tuple[T, Cost]:
     """Solve once for the result and the memory, then for the time.
 
     Memory is the peak of what Python and NumPy have allocated during the first solve (tracemalloc). Compiled code that
-    takes
-    memory of its own is not seen there; where the highest resident size of the process (Linux: VmHWM, set back before)
-    rises by more, that counts. `quick` times one solve.
+    takes memory of its own is not seen there; where the highest resident size of the process (Linux: VmHWM, set back
+    before) rises by more, that counts. `quick` times one solve.
     """
     before = _peak(reset=True)
     tracemalloc.start()

@@ -56,7 +56,7 @@ def fitted(values: Sequence[float], sizes: Sequence[float]) -> Limit:
     plus the scatter about the fit, and not less than the last change. Where the best order lies at the end of that
     range, or the values scatter about the best fit, or it leads farther away than the four values lie apart,
     there is no order: then the value is the finest one and the bar is `UNCLEAN` times the last change, or the range of
-    the four if that is larger.
+    the last three if that is larger.
 
     Raises:
         ValueError: there are fewer than four values.
@@ -78,4 +78,4 @@ def fitted(values: Sequence[float], sizes: Sequence[float]) -> Limit:
     spread, change = float(np.ptp(v)), abs(float(v[-1] - v[-2]))
     if orders[0] < p < orders[-1] and scatter <= 0.1 * spread and rest <= spread:
         return Limit(value, p, max(SAFETY * rest + scatter, change))
-    return Limit(float(v[-1]), math.nan, max(spread, UNCLEAN * change))
+    return Limit(float(v[-1]), math.nan, max(float(np.ptp(v[-3:])), UNCLEAN * change))

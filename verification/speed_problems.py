@@ -62,7 +62,7 @@ class Problem:
 
 
 def is_shell(name: str) -> bool:
-    return name.startswith("shell")
+    return name.endswith("shell")
 
 
 def curve(state: State, samples: int) -> Array:
