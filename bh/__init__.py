@@ -42,7 +42,7 @@ _HOME = {
 
 _SUBMODULES = {
     "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
-    "plotting": "bh.plotting", "scan": "bh.scan",
+    "pinching": "bh.applications.pinching", "plotting": "bh.plotting", "scan": "bh.scan",
     "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 

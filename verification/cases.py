@@ -28,6 +28,7 @@ ALL_CASES = {
     "fig5_11": "verification.fig5_11",
     "fig5_3": "verification.fig5_3",
     "appendix_a": "verification.appendix_a",
+    "pinch_shell": "verification.pinch_shell",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
