@@ -43,6 +43,7 @@ _HOME = {
 _SUBMODULES = {
     "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
     "pinching": "bh.applications.pinching", "plotting": "bh.plotting", "scan": "bh.scan",
+    "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 
