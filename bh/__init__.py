@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from bh.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
-    from bh.actuation import Displace, Fold, Force, Moment
+    from bh.actuation import Bar, Displace, Fold, Force, Moment, Tether
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.model import CreaseLaw, Model, Sheet
     from bh.observables import Until, depth
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from bh.supports import RigidBody, Support
 
 _HOME = {
-    "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic", "CreaseLaw": "bh.model",
+    "ArcLength": "bh.solvers.arc_length", "Bar": "bh.actuation",
+    "Tether": "bh.actuation", "Automatic": "bh.solvers.automatic", "CreaseLaw": "bh.model",
     "Displace": "bh.actuation", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.state",
     "Fold": "bh.actuation",
     "Force": "bh.actuation", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
@@ -36,15 +37,16 @@ _HOME = {
 }  # fmt: skip
 
 _SUBMODULES = {
-    "contact": "bh.analysis.contact", "plotting": "bh.plotting", "scan": "bh.scan",
+    "contact": "bh.analysis.contact", "corrugation": "bh.applications.corrugation",
+    "plotting": "bh.plotting", "scan": "bh.scan",
     "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 
 __all__ = [
-    "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
+    "ArcLength", "Automatic", "Bar", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
     "InputError", "LoadControl", "Model", "ModelError", "Moment",
-    "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "Until", "depth",
-    "load_scene", "trace",
+    "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "Tether", "Until",
+    "depth", "load_scene", "trace",
 ]  # fmt: skip
 
 _ensure_kernel_cache()

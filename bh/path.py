@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path as FilePath
@@ -19,7 +19,7 @@ from bh.describe import describe, fingerprint, rebuild
 from bh.errors import ModelError, PathFileError
 from bh.formulations import Formulation, formulation
 from bh.model import Model
-from bh.observables import Until
+from bh.observables import until_of
 from bh.program import Ended, StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
 from bh.solvers.automatic import Automatic
@@ -254,11 +254,6 @@ class Path:
         return found
 
 
-def until_of(actuations: Sequence[object]) -> Until | None:
-    """What ends a step early, if anything does."""
-    return next((item for item in actuations if isinstance(item, Until)), None)
-
-
 def trace(
     model: Model,
     *,
@@ -266,6 +261,7 @@ def trace(
     strategy: Strategy | None = None,
     file: str | FilePath | None = None,
     resume: bool = False,
+    after: Path | None = None,
 ) -> Path:
     """Follow the equilibrium of `model` through all its steps.
 
@@ -274,6 +270,7 @@ def trace(
         strategy: how increments are chosen; the default suits all scenes.
         file: write every accepted state to this file before the next increment begins.
         resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
+        after: a solved path of the same model with fewer steps, whose states this one begins with.
 
     Returns:
         the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
@@ -289,9 +286,13 @@ def trace(
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
     strategy = strategy or Automatic()
-    path = Path(model)
+    path = Path(model) if after is None else _continued(after, model)
     target: PathFile | None = None
     if file is not None:
+        if after is not None:
+            raise ModelError(
+                "a path that goes on from another one cannot have a file; save it when it is solved"
+            )
         if resume:
             path, target = _resume(model, FilePath(file))
         else:
@@ -382,6 +383,20 @@ def _recent(done: list[Record]) -> list[Record]:
     while arc > 0 and done[arc - 1].mode != LOAD:
         arc -= 1
     return done[max(arc - 3, jumps[-1] if jumps else 0, 0) :]
+
+
+def _continued(after: Path, model: Model) -> Path:
+    """A path of `model` that begins with all that `after` has."""
+    if after.outcome != "reached":
+        raise ModelError(f"the path to go on from ended early ({after.outcome}); solve it first")
+    if fingerprint(replace(model, steps=model.steps[: len(after.steps)])) != after.provenance["input"]:
+        raise ModelError(
+            "the path to go on from is of another model; add steps to its own: path.model.step(...)"
+        )
+    path = Path(model)
+    path.records, path.steps = list(after.records), list(after.steps)
+    path._states = dict(after._states)
+    return path
 
 
 def _new_file(path: Path, file: FilePath) -> PathFile:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Array, Displace, Fold, Force, Moment, Ramp
+from bh.actuation import Actuation, Array, Bar, Displace, Fold, Force, Moment, Ramp, Tether
 from bh.errors import ModelError
 from bh.model import CreaseLaw, Model
 from bh.observables import Until
@@ -36,6 +36,7 @@ class StepProgram:
         moment: couple a length that closes the dihedral angle below the sheet, N mm / mm.
         force: (n, 3) dead forces, N.
         constraints: supports and prescribed displacements.
+        bodies: bars and tethers that act in this step.
     """
 
     law: NDArray[np.int64]
@@ -45,6 +46,7 @@ class StepProgram:
     moment: Ramp
     force: Ramp
     constraints: Constraints
+    bodies: tuple[Bar | Tether, ...] = ()
 
     @property
     def rotation(self) -> float:
@@ -171,6 +173,7 @@ class _Builder:
                 self._force(item)
             elif isinstance(item, Displace):
                 self._displace(item)
+        bodies = tuple(item for item in actuations if isinstance(item, Bar | Tether))
         rest, held, moment, force = before
         rest[self.released] = np.nan
         return StepProgram(
@@ -180,7 +183,10 @@ class _Builder:
             held=Ramp(held, self.held.copy()),
             moment=Ramp(moment, self.moment.copy()),
             force=Ramp(force, self.force.copy()),
-            constraints=resolve(self.mesh, self.model.supports, self._prescribed(displaced)),
+            constraints=resolve(
+                self.mesh, self.model.supports, self._prescribed(displaced), touching=bool(bodies)
+            ),
+            bodies=bodies,
         )
 
     def _fold(self, item: Fold) -> None:
