@@ -12,7 +12,7 @@ from bh.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
     from bh.accuracy import Accuracy
-    from bh.actuation import Displace, Fold, Force, Moment, Pinch
+    from bh.actuation import Bar, Displace, Fold, Force, Moment, Pinch, Tether
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.model import CreaseLaw, Model, Sheet
     from bh.observables import Until, depth
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Accuracy": "bh.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
-    "CreaseLaw": "bh.model",
+    "Bar": "bh.actuation", "CreaseLaw": "bh.model", "Tether": "bh.actuation",
     "Displace": "bh.actuation", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.state",
     "Fold": "bh.actuation",
     "Force": "bh.actuation", "Goal": "bh.refinement", "InputError": "bh.errors",
@@ -41,17 +41,18 @@ _HOME = {
 }  # fmt: skip
 
 _SUBMODULES = {
-    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
+    "contact": "bh.analysis.contact", "corrugation": "bh.applications.corrugation",
+    "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
     "pinching": "bh.applications.pinching", "plotting": "bh.plotting", "scan": "bh.scan",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 
 __all__ = [
-    "Accuracy", "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
-    "Goal", "InputError", "LoadControl", "Model", "ModelError", "Moment",
-    "Newton", "Path", "PathFileError", "Pinch", "RigidBody", "SceneError", "Sheet", "State", "Support", "Until",
-    "depth", "load_scene", "trace",
+    "Accuracy", "ArcLength", "Automatic", "Bar", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold",
+    "Force", "Goal", "InputError", "LoadControl", "Model", "ModelError", "Moment",
+    "Newton", "Path", "PathFileError", "Pinch", "RigidBody", "SceneError", "Sheet", "State", "Support", "Tether",
+    "Until", "depth", "load_scene", "trace",
 ]  # fmt: skip
 
 _ensure_kernel_cache()

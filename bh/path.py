@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path as FilePath
@@ -19,7 +19,7 @@ from bh.describe import describe, fingerprint, rebuild
 from bh.errors import ModelError, PathFileError
 from bh.formulations import Formulation, formulation
 from bh.model import Model
-from bh.observables import Until
+from bh.observables import until_of
 from bh.program import Ended, StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
 from bh.refinement import Goal
@@ -264,11 +264,6 @@ class Path:
         return found
 
 
-def until_of(actuations: Sequence[object]) -> Until | None:
-    """What ends a step early, if anything does."""
-    return next((item for item in actuations if isinstance(item, Until)), None)
-
-
 def trace(
     model: Model,
     *,
@@ -277,6 +272,7 @@ def trace(
     file: str | FilePath | None = None,
     resume: bool = False,
     accuracy: float | Goal | None = None,
+    after: Path | None = None,
 ) -> Path:
     """Follow the equilibrium of `model` through all its steps.
 
@@ -288,6 +284,7 @@ def trace(
         accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
             chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
             see `bh.accuracy` and `path.accuracy`. The file is written when that is done.
+        after: a solved path of the same model with fewer steps, whose states this one begins with.
 
     Returns:
         the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
@@ -303,11 +300,15 @@ def trace(
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
     if accuracy is not None:
-        return _trace_to(model, accuracy, progress, strategy, file, resume)
+        return _trace_to(model, accuracy, progress, strategy, file, resume, after)
     strategy = strategy or Automatic()
-    path = Path(model)
+    path = Path(model) if after is None else _continued(after, model)
     target: PathFile | None = None
     if file is not None:
+        if after is not None:
+            raise ModelError(
+                "a path that goes on from another one cannot have a file; save it when it is solved"
+            )
         if resume:
             path, target = _resume(model, FilePath(file))
         else:
@@ -337,11 +338,14 @@ def _trace_to(
     strategy: Strategy | None,
     file: str | FilePath | None,
     resume: bool,
+    after: Path | None,
 ) -> Path:
     from bh.accuracy import solve
 
-    if resume:
-        raise ModelError("a run to a wanted accuracy begins anew on every mesh; run it without resume")
+    if resume or after is not None:
+        raise ModelError(
+            "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
+        )
     goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
     path = solve(model, goal, progress=progress, strategy=strategy)
     if file is not None:
@@ -417,6 +421,20 @@ def _recent(done: list[Record]) -> list[Record]:
     while arc > 0 and done[arc - 1].mode != LOAD:
         arc -= 1
     return done[max(arc - 3, jumps[-1] if jumps else 0, 0) :]
+
+
+def _continued(after: Path, model: Model) -> Path:
+    """A path of `model` that begins with all that `after` has."""
+    if after.outcome != "reached":
+        raise ModelError(f"the path to go on from ended early ({after.outcome}); solve it first")
+    if fingerprint(replace(model, steps=model.steps[: len(after.steps)])) != after.provenance["input"]:
+        raise ModelError(
+            "the path to go on from is of another model; add steps to its own: path.model.step(...)"
+        )
+    path = Path(model)
+    path.records, path.steps = list(after.records), list(after.steps)
+    path._states = dict(after._states)
+    return path
 
 
 def _new_file(path: Path, file: FilePath) -> PathFile:

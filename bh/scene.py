@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bh.actuation import Actuation, Fold, Moment, Pinch
+from bh.actuation import Actuation, Bar, Fold, Moment, Pinch, Tether
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
@@ -376,7 +376,7 @@ def _check(model: Model) -> None:
                 select(mesh, support.at)
     for i, actuations in enumerate(model.steps):
         for item in actuations:
-            if isinstance(item, Until):
+            if isinstance(item, Until | Bar | Tether):
                 continue
             key = type(item).__name__.lower()
             if isinstance(item, Fold | Moment | Pinch):
