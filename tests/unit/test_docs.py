@@ -15,10 +15,16 @@ TABLES: dict[str, type[schema.Table]] = {
     'pattern, kind = "strip"': schema.StripPattern,
     'pattern, kind = "annulus_sector"': schema.AnnulusSectorPattern,
     'pattern, kind = "full_annulus"': schema.FullAnnulusPattern,
+    'pattern, kind = "two_arcs"': schema.TwoArcsPattern,
+    'pattern, kind = "sine_tessellation"': schema.SineTessellationPattern,
+    'pattern, kind = "parabolic_canopy"': schema.ParabolicCanopyPattern,
+    'pattern, kind = "opposite_parabolas"': schema.OppositeParabolasPattern,
     "pattern, file": schema.FilePattern,
+    "pattern, drawing": schema.DrawingPattern,
     "sheet": schema.SheetTable,
     "mesh": schema.MeshTable,
     "mesh by gmsh": schema.GmshTable,
+    "mesh as drawn": schema.DrawnTable,
     "model": schema.ModelTable,
     "supports": schema.SupportTable,
     "creases.NAME": schema.CreaseTable,
@@ -59,7 +65,7 @@ def test_nothing_is_left_out() -> None:
     }
     assert set(TABLES.values()) == every - {schema.Table}
     named = {title.split(",")[0].split(":")[0].split(".")[0] for title in TABLES}
-    assert {name.split(" by ")[0] for name in named} == set(SECTIONS)
+    assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS)
     assert PAGE.count("\n### ") == len(TABLES)
 
 
