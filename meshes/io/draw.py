@@ -1,4 +1,4 @@
-"""Flat patterns as SVG and DXF in mm, for laser cutters and for other programs; `meshes.io.read_pattern` reads them back.
+"""Flat patterns as SVG and DXF in mm, for laser cutters and other programs; `meshes.io.read_pattern` reads them.
 
 One layer a kind of line: "boundary", "mountain", "valley", "flat" and "facet". Arcs stay arcs.
 """

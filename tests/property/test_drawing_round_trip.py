@@ -52,7 +52,7 @@ def drawn(pattern: CreasePattern) -> list[tuple[str, np.ndarray]]:
     return [(line.layer, sample(line.curve, 1e-4)) for line in flat_lines(pattern)]
 
 
-@SLOW
+@settings(max_examples=10, deadline=None)
 @given(patterns(), st.sampled_from([".svg", ".dxf"]))
 def test_round_trip(pattern: CreasePattern, suffix: str) -> None:
     """Same creases (kind, length, place), same outline; the only freedom of an SVG file is where its origin lies."""

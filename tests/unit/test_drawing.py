@@ -132,7 +132,7 @@ class TestUnits:
         assert sheet_area(read_pattern(file, scale=2.0)) == pytest.approx(4 * 6000.0)
         assert sheet_area(read_pattern(file, fit=50.0)) == pytest.approx(1500.0)
         for wrong in ({"scale": -1.0}, {"fit": math.nan}, {"scale": 1.0, "fit": 2.0}):
-            with pytest.raises(FileFormatError, match="scale|fit"):
+            with pytest.raises(FileFormatError, match=r"scale|fit"):
                 read_pattern(file, **wrong)
 
     def test_fit_measures_curves(self, tmp_path):
@@ -159,7 +159,7 @@ class TestUnits:
 
 class TestCurves:
     def test_tolerance(self, tmp_path):
-        """A quarter turn of radius 50 keeps its radius within the tolerance, and needs more points for a smaller one."""
+        """A quarter turn of radius 50 keeps within the tolerance, and needs more points for a smaller one."""
         body = SQUARE + '<path d="M10,0 A50,50 0 0,0 60,50 L60,60" stroke="red"/>'
         counts = []
         for tolerance in (0.1, 0.001):
