@@ -55,11 +55,13 @@ LONGEST_FILE = 20_000_000  # bytes
 
 @dataclass(frozen=True)
 class Outputs:
-    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet (FOLD)."""
+    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet, the flat pattern."""
 
     pictures: bool = False
     vtu: bool = False
     fold: bool = False
+    folded: tuple[str, ...] = ()
+    flat: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,7 @@ def _scene(text: str, folder: Path) -> Scene:
         hinge_lock=how.hinge_lock,
     )
     _check(model)
-    return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold))
+    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}))
 
 
 # --- from tables to descriptions ----------------------------------------------------------------------------

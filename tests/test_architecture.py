@@ -23,7 +23,19 @@ DESCRIPTION = (
 )  # fmt: skip
 PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
-TOP = ("bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.offscreen", "bh.warm_up")
+TOP = (
+    "bh.advice",
+    "bh.check",
+    "bh.example",
+    "bh.export",
+    "bh.schema",
+    "bh.sweep",
+    "bh.cli",
+    "bh.run",
+    "bh.plotting",
+    "bh.offscreen",
+    "bh.warm_up",
+)
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,
 # so that a part can be closed against itself too (the description does not know `bh.path`, ...).
