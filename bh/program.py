@@ -103,8 +103,8 @@ class _Builder:
         hinges, nodes = len(topology.hinges), len(model.mesh.points)
         self.law = np.zeros(hinges, dtype=np.int64)
         self.stiffness = np.zeros(hinges)
-        self.rest = np.full(hinges, math.pi)
-        self.made = np.full(hinges, math.pi)  # rest angles of the laws; they come in during the first step
+        self.rest = stress_free_angles(model.mesh)
+        self.made = self.rest.copy()  # rest angles of the laws; they come in during the first step
         self.held = np.full(hinges, np.nan)
         self.moment = np.zeros(hinges)
         self.steps = 0
@@ -383,6 +383,19 @@ class _Builder:
             Prescribed(np.array([node]), direction, before.get((node, direction), start), end)
             for (node, direction), end in self.displaced.items()
         ]
+
+
+def stress_free_angles(mesh: SheetMesh) -> Array:
+    """(m,) dihedral angles of the mesh as it is made, rad: there springs are at rest before the first step."""
+    hinges = mesh.topology.hinges
+    if mesh.flat:
+        return np.full(len(hinges), math.pi)
+    wing, tail, head, other = (mesh.points[hinges[:, k]] for k in range(4))
+    edge = head - tail
+    one, two = np.cross(edge, wing - tail), np.cross(other - tail, edge)
+    length = np.linalg.norm(edge, axis=1)
+    turn = np.arctan2(length * np.einsum("mi,mi->m", one, other - tail), np.einsum("mi,mi->m", one, two))
+    return np.asarray(np.mod(math.pi + turn, 2.0 * math.pi))
 
 
 def program(model: Model, ended: Mapping[int, Ended] | None = None) -> tuple[StepProgram, ...]:

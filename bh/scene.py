@@ -62,11 +62,13 @@ LONGEST_FILE = 20_000_000  # bytes
 
 @dataclass(frozen=True)
 class Outputs:
-    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet (FOLD)."""
+    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet, the flat pattern."""
 
     pictures: bool = False
     vtu: bool = False
     fold: bool = False
+    folded: tuple[str, ...] = ()
+    flat: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -170,7 +172,7 @@ def _scene(text: str, folder: Path) -> Scene:
             pattern_of(model)
             if accuracy.at is not None:
                 model.mesh.nodes(accuracy.at)
-    return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold), accuracy=accuracy)
+    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy)
 
 
 def _accuracy(data: Any) -> Goal:

@@ -88,6 +88,13 @@ class OutputsTable(Table):
     pictures: bool = Field(False, description="true or false")
     vtu: bool = Field(False, description="true or false")
     fold: bool = Field(False, description="true or false")
+    folded: list[Literal["glb", "obj", "off", "ply", "stl", "vtk", "msh", "inp"]] = Field(
+        [],
+        description='formats of the folded sheet: "glb" (glTF), "obj", "off", "ply", "stl", "vtk", "msh", "inp"',
+    )
+    flat: list[Literal["svg", "dxf", "fold"]] = Field(
+        [], description='formats of the flat pattern: "svg", "dxf" (mm, a layer a kind of line), "fold"'
+    )
 
 
 class AccuracyTable(Table):

@@ -20,9 +20,15 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "pattern, corrugations": scene_patterns.CorrugationPattern,
     'pattern, kind = "curved-corrugation"': scene_patterns.CurvedCorrugationPattern,
     "pattern, file": scene_patterns.FilePattern,
+    'pattern, kind = "two_arcs"': scene_patterns.TwoArcsPattern,
+    'pattern, kind = "sine_tessellation"': scene_patterns.SineTessellationPattern,
+    'pattern, kind = "parabolic_canopy"': scene_patterns.ParabolicCanopyPattern,
+    'pattern, kind = "opposite_parabolas"': scene_patterns.OppositeParabolasPattern,
+    "pattern, drawing": scene_patterns.DrawingPattern,
     "sheet": schema.SheetTable,
     "mesh": schema.MeshTable,
     "mesh by gmsh": schema.GmshTable,
+    "mesh as drawn": schema.DrawnTable,
     "model": schema.ModelTable,
     "supports": schema.SupportTable,
     "creases.NAME": schema.CreaseTable,
@@ -69,7 +75,7 @@ def test_nothing_is_left_out() -> None:
     }
     assert set(TABLES.values()) == every - {scene_tables.Table, scene_patterns.PatternTable}
     named = {title.split(",")[0].split(":")[0].split(".")[0] for title in TABLES}
-    assert {name.split(" by ")[0] for name in named} == set(SECTIONS)
+    assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS)
     assert PAGE.count("\n### ") == len(TABLES)
 
 
