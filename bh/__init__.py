@@ -35,7 +35,7 @@ _HOME = {
 
 _SUBMODULES = {
     "contact": "bh.analysis.contact", "plotting": "bh.plotting", "scan": "bh.scan",
-    "stiffness_probe": "bh.analysis.stiffness_probe",
+    "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",
 }  # fmt: skip
 
 __all__ = [
