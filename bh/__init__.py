@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from bh.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
-    from bh.actuation import Displace, Fold, Force, Moment
+    from bh.actuation import Displace, Fold, Force, Moment, Pinch
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.model import CreaseLaw, Model, Sheet
     from bh.path import Path, trace
@@ -29,19 +29,21 @@ _HOME = {
     "Fold": "bh.actuation",
     "Force": "bh.actuation", "InputError": "bh.errors", "LoadControl": "bh.solvers.continuation",
     "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
-    "Path": "bh.path", "PathFileError": "bh.errors", "RigidBody": "bh.supports", "SceneError": "bh.errors",
+    "Path": "bh.path", "PathFileError": "bh.errors", "Pinch": "bh.actuation",
+    "RigidBody": "bh.supports", "SceneError": "bh.errors",
     "Sheet": "bh.model", "State": "bh.state", "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
 }  # fmt: skip
 
 _SUBMODULES = {
-    "contact": "bh.analysis.contact", "plotting": "bh.plotting", "scan": "bh.scan",
+    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "plotting": "bh.plotting", "scan": "bh.scan",
     "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",
 }  # fmt: skip
 
 __all__ = [
     "ArcLength", "Automatic", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold", "Force",
     "InputError", "LoadControl", "Model", "ModelError", "Moment",
-    "Newton", "Path", "PathFileError", "RigidBody", "SceneError", "Sheet", "State", "Support", "load_scene", "trace",
+    "Newton", "Path", "PathFileError", "Pinch", "RigidBody", "SceneError", "Sheet", "State",
+    "Support", "load_scene", "trace",
 ]  # fmt: skip
 
 _ensure_kernel_cache()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Displace, Fold, Force, Moment
+from bh.actuation import Actuation, Displace, Fold, Force, Moment, Pinch
 from bh.errors import PathFileError
 from bh.model import CreaseLaw, ElementStiffness, Model, Sheet
 from bh.supports import RigidBody, Support
@@ -21,6 +21,7 @@ from meshes.curves import Curve
 AnyArray = NDArray[Any]
 ACTUATIONS: dict[str, type[Actuation]] = {
     "fold": Fold,
+    "pinch": Pinch,
     "moment": Moment,
     "force": Force,
     "displace": Displace,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.actuation import Actuation, Displace, Fold, Force, Moment
+from bh.actuation import Actuation, Displace, Fold, Force, Moment, Pinch
 from bh.errors import ModelError
 from bh.supports import RigidBody, Support
 from meshes import SheetMesh
@@ -219,12 +219,16 @@ class Model:
     def step(self, *actuations: Actuation) -> Model:
         """Add a step in which all `actuations` act together."""
         if not actuations:
-            raise ModelError("a step needs at least one actuation (fold, moment, force or displace)")
+            raise ModelError("a step needs at least one actuation (fold, pinch, moment, force or displace)")
         return replace(self, steps=(*self.steps, actuations))
 
     def fold(self, crease: str, **how: Any) -> Model:
         """Add a step that folds a crease; arguments of `bh.Fold`."""
         return self.step(Fold(crease, **how))
+
+    def pinch(self, crease: str, **how: Any) -> Model:
+        """Add a step that pinches a crease that is folded already; arguments of `bh.Pinch`."""
+        return self.step(Pinch(crease, **how))
 
     def moment(self, crease: str, to: float) -> Model:
         """Add a step with a couple a length on a crease; see `bh.Moment`."""

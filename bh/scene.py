@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from bh.actuation import Actuation, Fold, Moment
+from bh.actuation import Actuation, Fold, Moment, Pinch
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
@@ -282,8 +282,6 @@ def _crease(item: Any, at: str) -> CreaseLaw:
 
 def _step(item: Any, at: str) -> tuple[Actuation, ...]:
     step = as_table(item, at)
-    if "pinch" in step:
-        raise SceneError(f"{at}.pinch: this version cannot pinch yet; use fold, moment, force or displace")
     check_keys(at, step, ACTUATIONS)
     if not step:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
@@ -323,7 +321,7 @@ def _check(model: Model) -> None:
     for i, actuations in enumerate(model.steps):
         for item in actuations:
             key = type(item).__name__.lower()
-            if isinstance(item, Fold | Moment):
+            if isinstance(item, Fold | Moment | Pinch):
                 if item.crease != "all":
                     with within(f"steps[{i}].{key}.crease"):
                         mesh.crease_edges(item.crease)

@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from bh.errors import InputError, SceneError
+from bh.pinch_zone import Profile
 from meshes.pattern import FoldKind
 from meshes.structured import Kind
 
@@ -193,6 +194,29 @@ class FoldTable(Table):
     stiffness: Positive | None = Field(None, description="a positive stiffness a length, N mm / (mm rad)")
 
 
+class PinchTable(Table):
+    """Keys of `bh.Pinch`."""
+
+    crease: str = Field(description='the name of a crease, or "all"')
+    at: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.5, description="the middle of the zone in parts of the crease's length, 0 to 1"
+    )
+    to: Dihedral | None = Field(
+        None, description="the dihedral angle in the middle in rad inside (0, 2 pi), flat is pi"
+    )
+    by: Annotated[float, Field(gt=0.0, lt=math.pi)] | None = Field(
+        None,
+        description="a fold angle in rad inside (0, pi), mountain or valley as drawn; pi - pi / 14 without to",
+    )
+    length: Length | None = Field(
+        None, description="the length of the zone along the crease in mm; a fifth of the crease unless given"
+    )
+    how: Literal["imposed", "rest"] = Field(
+        "imposed", description='"imposed", or "rest" for the rest angles of the crease\'s spring'
+    )
+    profile: Profile = Field("cosine", description='"cosine", or "grip" for the same angle all over the zone')
+
+
 class MomentTable(Table):
     crease: str = Field(description='the name of a crease, or "all"')
     to: Number = Field(description="a couple a length in N mm / mm")
@@ -210,8 +234,9 @@ class DisplaceTable(Table):
     by: Number = Field(description="a displacement in mm")
 
 
-ACTUATIONS: dict[str, type[FoldTable | MomentTable | ForceTable | DisplaceTable]] = {
+ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable]] = {
     "fold": FoldTable,
+    "pinch": PinchTable,
     "moment": MomentTable,
     "force": ForceTable,
     "displace": DisplaceTable,

@@ -20,6 +20,7 @@ HEAVY = ("gmsh", "pyvista", "matplotlib", "skfem", "dask", "distributed", "pymoo
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.program", "bh.scene", "bh.scene_schema",
     "bh.describe", "bh.state", "bh.formulations",
+    "bh.pinch_zone",
 )  # fmt: skip
 PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")

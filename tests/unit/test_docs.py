@@ -23,6 +23,7 @@ TABLES: dict[str, type[schema.Table]] = {
     "supports": schema.SupportTable,
     "creases.NAME": schema.CreaseTable,
     "steps: fold": schema.FoldTable,
+    "steps: pinch": schema.PinchTable,
     "steps: moment": schema.MomentTable,
     "steps: force": schema.ForceTable,
     "steps: displace": schema.DisplaceTable,
