@@ -15,7 +15,7 @@ from bh.actuation import Actuation, Displace, Fold, Force, Moment, Pinch
 from bh.errors import PathFileError
 from bh.model import CreaseLaw, ElementStiffness, Model, Sheet
 from bh.supports import RigidBody, Support
-from meshes import Arc, Line, Polyline, SheetMesh
+from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
 AnyArray = NDArray[Any]
@@ -26,7 +26,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "force": Force,
     "displace": Displace,
 }
-CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "polyline": Polyline}
+CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 FORMAT = 1
 
 
@@ -120,7 +120,7 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
     rest = {key: value for key, value in data.items() if key != "kind"}
     if data["kind"] == "polyline":
         rest["vertices"] = np.asarray(rest["vertices"])
-    for key in ("start", "end", "centre"):
+    for key in ("start", "end", "centre", "curvatures", "lengths"):
         if isinstance(rest.get(key), list):
             rest[key] = tuple(rest[key])
     return kinds[data["kind"]](**rest)

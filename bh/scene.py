@@ -43,7 +43,7 @@ from bh.scene_schema import (
     within,
 )
 from bh.supports import RigidBody, Support, directions, select
-from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip, structured
+from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, parallel_creases, strip, structured
 
 SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
@@ -224,6 +224,8 @@ def _pattern(table: Any) -> CreasePattern:
     with within("pattern"):
         if table.kind == "strip":
             return strip(table.length, table.width, table.creases, table.fold)
+        if table.kind == "parallel_creases":
+            return parallel_creases(table.curvature, table.length, table.spacing, table.creases, table.fold)
         if table.kind == "annulus_sector":
             return annulus_sector(table.radius, table.width, table.angle, table.fold)
         return full_annulus(table.radius, table.width, table.fold)

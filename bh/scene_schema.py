@@ -84,6 +84,19 @@ class FullAnnulusPattern(Table):
     fold: Folds = Field("mountain", description=FOLDS)
 
 
+class ParallelPattern(Table):
+    kind: Literal["parallel_creases"]
+    curvature: Number | Annotated[list[Number], Field(min_length=1)] = Field(
+        description="the curvature of the first crease in 1/mm, of any sign, or a list with one of them a piece"
+    )
+    length: Length | Annotated[list[Length], Field(min_length=1)] = Field(
+        description="the length of the first crease in mm, or a list with one of them a piece"
+    )
+    spacing: Length = Field(5.0, description="a positive distance between creases and to the edges in mm")
+    creases: Annotated[int, Field(ge=1, le=1000)] = Field(1, description="a whole number of creases, from 1")
+    fold: Folds | None = Field(None, description=FOLDS + "; alternating from mountain unless given")
+
+
 class FilePattern(Table):
     file: Annotated[str, Field(min_length=1)] = Field(
         description="the name of a .fold file, from the folder of the scene"
@@ -93,8 +106,9 @@ class FilePattern(Table):
     )
 
 
-LIBRARY: dict[str, type[StripPattern | AnnulusSectorPattern | FullAnnulusPattern]] = {
+LIBRARY: dict[str, type[StripPattern | AnnulusSectorPattern | FullAnnulusPattern | ParallelPattern]] = {
     "strip": StripPattern,
+    "parallel_creases": ParallelPattern,
     "annulus_sector": AnnulusSectorPattern,
     "full_annulus": FullAnnulusPattern,
 }

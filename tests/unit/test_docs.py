@@ -15,6 +15,7 @@ TABLES: dict[str, type[schema.Table]] = {
     'pattern, kind = "strip"': schema.StripPattern,
     'pattern, kind = "annulus_sector"': schema.AnnulusSectorPattern,
     'pattern, kind = "full_annulus"': schema.FullAnnulusPattern,
+    'pattern, kind = "parallel_creases"': schema.ParallelPattern,
     "pattern, file": schema.FilePattern,
     "sheet": schema.SheetTable,
     "mesh": schema.MeshTable,
