@@ -1,7 +1,8 @@
 """The points that are finished, on disk at once: an SQLite file beside the data set that a sweep is to become.
 
 Tables: `meta` (key, JSON value) with the parameters and the provenance, `points` with one row for each finished point.
-One transaction a task; a killed sweep leaves a file that is whole up to its last one.
+One transaction a task; a killed sweep leaves a file that is whole up to its last one. It is written ahead (WAL): a kill
+of the program loses nothing, a power cut at most what the system had not written yet, and never the file.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ class Journal:
             SweepError: the folder cannot be written.
         """
         try:
-            for old in (file, _log(file)):
+            for old in (file, *_logs(file)):
                 old.unlink(missing_ok=True)
-            db = sqlite3.connect(file)
+            db = _connect(file)
             with db:
                 db.executescript(SCHEMA + f"PRAGMA user_version = {FORMAT};")
                 db.executemany(
@@ -60,7 +61,7 @@ class Journal:
         if not file.is_file():
             raise SweepError(f"there is no journal '{file}' to go on from; run without --resume")
         try:
-            db = sqlite3.connect(file)
+            db = _connect(file)
             (version,) = db.execute("PRAGMA user_version").fetchone()
         except sqlite3.Error as error:
             raise SweepError(f"'{file}' is not a journal of a sweep ({error})") from error
@@ -111,5 +112,13 @@ class Journal:
         self._db.close()
 
 
-def _log(file: Path) -> Path:
-    return file.with_name(file.name + "-journal")
+def _connect(file: Path) -> sqlite3.Connection:
+    db = sqlite3.connect(file)
+    # without waiting for the disk after each point (5 to 12 ms on a busy machine)
+    db.execute("PRAGMA journal_mode = WAL")
+    db.execute("PRAGMA synchronous = NORMAL")
+    return db
+
+
+def _logs(file: Path) -> list[Path]:
+    return [file.with_name(file.name + end) for end in ("-journal", "-wal", "-shm")]

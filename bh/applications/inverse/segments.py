@@ -77,7 +77,9 @@ def folded_transforms(k0: ArrayLike, length: ArrayLike, fold: float = 0.5 * math
     return t, matrix(uvw)
 
 
-def grid(domain: Domain | None = None, step_k0: float = 5e-4, step_length: float = 4.0) -> tuple[Array, Array]:
+def grid(
+    domain: Domain | None = None, step_k0: float = 5e-4, step_length: float = 4.0
+) -> tuple[Array, Array]:
     """(m,) curvatures and lengths of the source's grid that lie in the domain; 2,487 by default."""
     domain = domain or Domain()
     steps = round(domain.k0 / step_k0)
@@ -87,3 +89,25 @@ def grid(domain: Domain | None = None, step_k0: float = 5e-4, step_length: float
     k, l = (x.ravel() for x in np.meshgrid(k0, lengths, indexing="ij"))  # noqa: E741
     inside = domain.holds(k, l)
     return k[inside], l[inside]
+
+
+def beyond(
+    domain: Domain | None = None, step_k0: float = 5e-4, step_length: float = 4.0
+) -> tuple[Array, Array]:
+    """(m,) curvatures and lengths that continue the grid to the sector's bound, and one step past it.
+
+    Interpolation runs over parts of the largest sector angle; without these its edge would be extrapolated.
+    """
+    domain = domain or Domain()
+    steps = round(domain.k0 / step_k0)
+    low, high = domain.length
+    lengths = low + step_length * np.arange(round((high - low) / step_length) + 1)
+    bound = domain.sector * math.sin(0.5 * domain.fold) / lengths
+    last = np.floor(bound / step_k0 * (1.0 + 1e-9)).astype(int)
+    k0: list[float] = []
+    at: list[float] = []
+    for length, inside in zip(lengths, last, strict=True):
+        more = np.arange(min(steps, inside) + 1, inside + 2) * step_k0
+        k0 += [*(-more[::-1]), *more]
+        at += [length] * (2 * len(more))
+    return np.array(k0), np.array(at)

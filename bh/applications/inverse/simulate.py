@@ -70,7 +70,9 @@ def model(
         PatternError: the flat strip overlaps itself: it cannot be cut from one sheet.
     """
     if not len(k0) == len(lengths) == len(pinched) or not len(k0):
-        raise DesignError(f"{len(k0)} curvatures, {len(lengths)} lengths and {len(pinched)} pinches; give one of each")
+        raise DesignError(
+            f"{len(k0)} curvatures, {len(lengths)} lengths and {len(pinched)} pinches; give one of each"
+        )
     whole = float(sum(lengths))
     pattern = parallel_creases(list(k0), list(lengths), setting.width)
     along = max(2, round(whole / setting.edge))
@@ -97,7 +99,9 @@ def frames(state: State) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
 
 def _section(mesh: SheetMesh, end: int) -> tuple[int, int, int]:
     """Nodes of a cross-section at an end of the strip: crease, left edge, right edge."""
-    crease, left, right = (int(mesh.nodes(place)[end]) for place in ("crease:crease", "edge:outer", "edge:inner"))
+    crease, left, right = (
+        int(mesh.nodes(place)[end]) for place in ("crease:crease", "edge:outer", "edge:inner")
+    )
     return crease, left, right
 
 

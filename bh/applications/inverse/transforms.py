@@ -67,7 +67,9 @@ def relative(start: tuple[ArrayLike, ArrayLike], end: tuple[ArrayLike, ArrayLike
     return (back @ (p1 - p0)[..., None])[..., 0], back @ r1
 
 
-def chain(t: ArrayLike, r: ArrayLike, origin: ArrayLike | None = None, start: ArrayLike | None = None) -> tuple[Array, Array]:
+def chain(
+    t: ArrayLike, r: ArrayLike, origin: ArrayLike | None = None, start: ArrayLike | None = None
+) -> tuple[Array, Array]:
     """Points and frames along a chain of n segments (Eq. 6.1, 6.2, 6.4).
 
     Args:
@@ -78,7 +80,10 @@ def chain(t: ArrayLike, r: ArrayLike, origin: ArrayLike | None = None, start: Ar
         (..., n + 1, 3) points P_0 to P_n and (..., n + 1, 3, 3) frames R_0 to R_n.
     """
     t, r = np.asarray(t, dtype=float), np.asarray(r, dtype=float)
-    points, frames = np.empty((*t.shape[:-2], t.shape[-2] + 1, 3)), np.empty((*t.shape[:-2], t.shape[-2] + 1, 3, 3))
+    points, frames = (
+        np.empty((*t.shape[:-2], t.shape[-2] + 1, 3)),
+        np.empty((*t.shape[:-2], t.shape[-2] + 1, 3, 3)),
+    )
     points[..., 0, :] = 0.0 if origin is None else origin
     frames[..., 0, :, :] = np.eye(3) if start is None else start
     for i in range(t.shape[-2]):  # over segments, never over designs
