@@ -45,7 +45,7 @@ _SUBMODULES = {
     "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
     "pinching": "bh.applications.pinching", "plotting": "bh.plotting", "scan": "bh.scan",
     "sensitivities": "bh.analysis.sensitivities",
-    "stiffness_probe": "bh.analysis.stiffness_probe",
+    "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",
 }  # fmt: skip
 
 __all__ = [

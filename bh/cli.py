@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
+    "segments": "Make the data set of pinched segments for inverse design.",
+    "sweep": "Solve a scene for many parameters into a labelled data set.",
     "verify": "Check the solvers against theory and published numbers.",
     "report": "Run the verification cases and write the report page.",
 }

@@ -141,8 +141,23 @@ def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Sce
         raise SceneError(one_line(f"{name}: {error}")) from error
 
 
+def scene_from_tables(tables: dict[str, Any], folder: str | Path = ".", name: str = "scene") -> Scene:
+    """A scene from its tables as `tomllib` reads them: what a sweep changes between points.
+
+    Raises:
+        SceneError: as `parse_scene`.
+    """
+    try:
+        return replace(_from_tables(tables, Path(folder)), name=name)
+    except InputError as error:
+        raise SceneError(one_line(f"{name}: {error}")) from error
+
+
 def _scene(text: str, folder: Path) -> Scene:
-    data = read_toml(text)
+    return _from_tables(read_toml(text), folder)
+
+
+def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
     check_keys("", data, SECTIONS)
     for key in ("pattern", "sheet", "steps"):
         if key not in data:

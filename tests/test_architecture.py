@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 HOUSE = ("meshes", "bh", "fem", "verification", "reports")
 LONGEST_MODULE, LONGEST_FUNCTION = 450, 80
-HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "pymoo")
+HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "distributed", "pymoo", "xarray", "h5py")
 
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.program", "bh.observables",
