@@ -152,3 +152,55 @@ def zone(line: Chain, name: str, at: float, length: float | None) -> float:
             f"{whole:.4g} mm); {mend}"
         )
     return length
+
+
+def pinched_creases(mesh: SheetMesh, crease: str) -> list[str]:
+    """Names of the creases that a pinch is about: one, or with "all" every mountain and valley that is one line."""
+    if crease != "all":
+        return [crease]
+    names = [name for name in mesh.creases if mesh.folds.get(name) != "flat" and is_chain(mesh, name)]
+    if not names:
+        raise ModelError("pinch of crease 'all': the sheet has no mountain or valley crease")
+    return names
+
+
+def edge_parts(
+    mesh: SheetMesh, crease: str, at: float, length: float | None, profile: str
+) -> tuple[Array, Array]:
+    """Parts (k,) of the edges of a crease in a pinch, in order, and (k, 2) at their lower and their higher node."""
+    line = chain(mesh, crease)
+    part, ends = parts(line, at, zone(line, crease, at, length), profile)
+    pairs = mesh.crease_edges(crease)
+    return part, np.where((pairs[:, 0] > pairs[:, 1])[:, None], ends[:, ::-1], ends)
+
+
+def check_side(crease: str, now: Array, target: Array) -> None:
+    """A pinch goes on the way that the crease is folded.
+
+    Raises:
+        ModelError: the angles to come (k,) lie on the other side of flat than the present ones.
+    """
+    other = (now - np.pi) * (target - np.pi) < 0.0
+    if other.any():
+        angle = float(target[int(np.argmax(other))])
+        raise ModelError(
+            f"pinch of crease '{crease}' to {angle:.4g} rad would fold it to its other side; "
+            f"give {2.0 * np.pi - angle:.4g}, or by"
+        )
+
+
+def claim(
+    claimed: dict[int, tuple[float, float]], crease: str, at: float, rows: NDArray[np.int64], angles: Array
+) -> None:
+    """Enter the angles (k,) that a pinch at `at` wants of some hinges into those of the step.
+
+    Raises:
+        ModelError: another pinch of the step wants another angle of one of them.
+    """
+    for row, angle in zip(rows.tolist(), angles.tolist(), strict=True):
+        known, other = claimed.setdefault(row, (angle, at))
+        if abs(known - angle) > 1e-9:
+            raise ModelError(
+                f"two pinches of crease '{crease}' overlap and contradict each other (at {other:g} and "
+                f"{at:g}); keep their zones apart, or pinch one after the other"
+            )

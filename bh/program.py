@@ -16,7 +16,7 @@ from bh.actuation import Actuation, Array, Bar, Displace, Fold, Force, Moment, P
 from bh.errors import ModelError
 from bh.model import CreaseLaw, Model
 from bh.observables import Until
-from bh.pinch_zone import Pinched, chain, is_chain, parts, zone
+from bh.pinch_zone import Pinched, check_side, claim, edge_parts, pinched_creases
 from bh.supports import AXES, Constraints, Prescribed, resolve, select
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -113,7 +113,7 @@ class _Builder:
         self.pinch = Pinched.none(hinges)
         self.pinched = np.zeros(hinges, dtype=bool)  # held at an angle that follows from a solved state
         self.folded = np.zeros(hinges, dtype=bool)  # in this step
-        self.claimed: dict[int, tuple[float, Pinch]] = {}  # pinches of this step
+        self.claimed: dict[int, tuple[float, float]] = {}  # pinches of this step
         self.force = np.zeros((nodes, 3))
         self.displaced: dict[tuple[int, tuple[float, float, float]], float] = {}
         self.now: dict[tuple[int, tuple[float, float, float]], float] = {}  # of this step
@@ -245,46 +245,26 @@ class _Builder:
 
     def _pinch(self, item: Pinch, before: Array) -> None:
         """`before` (m,) angles that the pinches of this step go from, rad."""
-        names = [item.crease]
-        if item.crease == "all":
-            names = [
-                name
-                for name in self.mesh.creases
-                if self.mesh.folds.get(name) != "flat" and is_chain(self.mesh, name)
-            ]
-            if not names:
-                raise ModelError("pinch of crease 'all': the sheet has no mountain or valley crease")
-        for name in names:
-            self._pinch_one(name, item, before)
+        for name in pinched_creases(self.mesh, item.crease):
+            hinges, sense, _ = self.creases(name)
+            part, ends = edge_parts(self.mesh, name, item.at, item.length, item.profile)
+            inside = np.flatnonzero(part > 0.0)
+            rows, part, ends = hinges[inside], part[inside], ends[inside]
+            now, target = before[rows], item.target(sense)[inside]
+            self._check_pinch(name, item, rows)
+            check_side(name, now, target)
+            nominal = now + part * (target - now)
+            claim(self.claimed, name, item.at, rows, nominal)
+            if item.how == "rest":
+                self.rest[rows] = nominal
+                self.rest_ends[rows] += ends * (target[:, None] - self.rest_ends[rows])
+                continue
+            self.law[rows], self.held[rows] = HELD, nominal
+            self.pinch.toward[rows], self.pinch.part[rows], self.pinch.ends[rows] = target, part, ends
+            self.pinch.base[rows] = np.where(self.folded[rows], now, np.nan)
+            self.pinched[rows] = True
 
-    def _pinch_one(self, name: str, item: Pinch, before: Array) -> None:
-        hinges, sense, _ = self.creases(name)
-        line = chain(self.mesh, name)
-        part, ends = parts(line, item.at, zone(line, name, item.at, item.length), item.profile)
-        turned = self.mesh.crease_edges(name)
-        ends = np.where((turned[:, 0] > turned[:, 1])[:, None], ends[:, ::-1], ends)
-        inside = np.flatnonzero(part > 0.0)
-        rows, part, ends = hinges[inside], part[inside], ends[inside]
-        now, target = before[rows], item.target(sense)[inside]
-        self._check_pinch(name, item, rows, now, target)
-        nominal = now + part * (target - now)
-        for row, angle in zip(rows.tolist(), nominal.tolist(), strict=True):
-            known, other = self.claimed.setdefault(row, (angle, item))
-            if abs(known - angle) > 1e-9:
-                raise ModelError(
-                    f"two pinches of crease '{name}' overlap and contradict each other (at {other.at:g} and "
-                    f"{item.at:g}); keep their zones apart, or pinch one after the other"
-                )
-        if item.how == "rest":
-            self.rest[rows] = nominal
-            self.rest_ends[rows] += ends * (target[:, None] - self.rest_ends[rows])
-            return
-        self.law[rows], self.held[rows] = HELD, nominal
-        self.pinch.toward[rows], self.pinch.part[rows], self.pinch.ends[rows] = target, part, ends
-        self.pinch.base[rows] = np.where(self.folded[rows], now, np.nan)
-        self.pinched[rows] = True
-
-    def _check_pinch(self, name: str, item: Pinch, rows: Ints, now: Array, target: Array) -> None:
+    def _check_pinch(self, name: str, item: Pinch, rows: Ints) -> None:
         law = self.law[rows]
         if (law == SHEET).any():
             raise ModelError(
@@ -294,13 +274,6 @@ class _Builder:
             raise ModelError(
                 f"pinch of crease '{name}' by rest angles: its angle is imposed there and no spring acts; "
                 "use how = 'imposed'"
-            )
-        other = (now - math.pi) * (target - math.pi) < 0.0
-        if other.any():
-            angle = float(target[int(np.argmax(other))])
-            raise ModelError(
-                f"pinch of crease '{name}' to {angle:.4g} rad would fold it to its other side; "
-                f"give {2.0 * math.pi - angle:.4g}, or by"
             )
 
     def _fold(self, item: Fold) -> None:
