@@ -109,7 +109,10 @@ class Pinch:
         length: of the zone along the crease, mm; a fifth of the crease if not given.
         how: "imposed" holds the angles of the zone exactly. "rest" only sets the rest angles of the crease's spring,
             which the sheet resists: with the source's L* of 0.5 and 2 mm such a pinch stops far above its angle.
+            "couple" lets closing couples act over the zone, spread by the profile, which grow until the angle is
+            reached somewhere in it (`Model.pinch`; alone, or without such an `Until`, they grow to their end).
         profile: "cosine", or "grip" for the pinched angle all over the zone.
+        couple: with "couple" the largest one a length in the middle, N mm / mm; more than the pinch needs.
     """
 
     crease: str
@@ -117,8 +120,9 @@ class Pinch:
     to: float | None = None
     by: float | None = None
     length: float | None = None
-    how: Literal["imposed", "rest"] = "imposed"
+    how: Literal["imposed", "rest", "couple"] = "imposed"
     profile: Profile = "cosine"
+    couple: float | None = None
 
     def __post_init__(self) -> None:
         what = f"pinch of crease '{self.crease}'"
@@ -137,18 +141,31 @@ class Pinch:
             )
         if self.length is not None and not (math.isfinite(self.length) and self.length > 0.0):
             raise ModelError(f"{what}: length = {self.length} cannot be; give a positive length in mm")
-        for key, known in (("how", ("imposed", "rest")), ("profile", tuple(PROFILES))):
+        for key, known in (("how", ("imposed", "rest", "couple")), ("profile", tuple(PROFILES))):
             if getattr(self, key) not in known:
                 raise ModelError(
                     f"{what}: {key} = '{getattr(self, key)}' is not known; use {' or '.join(known)}"
                 )
 
+        if (self.how == "couple") != (self.couple is not None):
+            raise ModelError(
+                f"{what}: couple goes with how = 'couple', and only with it; give both or neither"
+            )
+        if self.couple is not None and not (math.isfinite(self.couple) and self.couple > 0.0):
+            raise ModelError(f"{what}: couple = {self.couple} cannot be; give a positive number in N mm / mm")
+
     def target(self, sense: Array) -> Array:
         """(k,) dihedral angles in the middle, rad, for edges drawn as mountain (+1) or valley (-1)."""
         if self.to is not None:
             return np.full(len(sense), float(self.to))
-        by = math.pi - math.pi / 14.0 if self.by is None else self.by
-        return np.asarray(math.pi - sense * by)
+        return np.asarray(math.pi - sense * self.fold)
+
+    @property
+    def fold(self) -> float:
+        """Size of the fold angle in the middle, rad."""
+        if self.to is not None:
+            return abs(math.pi - self.to)
+        return math.pi - math.pi / 14.0 if self.by is None else self.by
 
 
 @dataclass(frozen=True)

@@ -231,9 +231,16 @@ class Model:
         """Add a step that folds a crease; arguments of `bh.Fold`."""
         return self.step(Fold(crease, **how), until=until)
 
-    def pinch(self, crease: str, **how: Any) -> Model:
-        """Add a step that pinches a crease that is folded already; arguments of `bh.Pinch`."""
-        return self.step(Pinch(crease, **how))
+    def pinch(self, crease: str, until: Until | None = None, **how: Any) -> Model:
+        """Add a step that pinches a crease that is folded already; arguments of `bh.Pinch`.
+
+        With how="couple" it ends where the angle is reached, on the first crease of the sheet if `crease` is "all".
+        """
+        item = Pinch(crease, **how)
+        if item.how == "couple" and until is None:
+            on = crease if crease != "all" else next(iter(self.mesh.creases), crease)
+            until = Until("largest_fold", item.fold, of=on)
+        return self.step(item, until=until)
 
     def moment(self, crease: str, to: float) -> Model:
         """Add a step with a couple a length on a crease; see `bh.Moment`."""

@@ -140,13 +140,14 @@ OBSERVABLES: dict[str, Observable] = {
     "bending": lambda state, of: state.energy.bending,
     "folding": lambda state, of: state.energy.folding,
     "fold_angle": lambda state, of: float(state.fold_angle(str(of)).mean()),
+    "largest_fold": lambda state, of: float(np.abs(state.fold_angle(str(of))).max()),
     "dihedral": lambda state, of: float(state.dihedral(str(of)).mean()),
     "moment": lambda state, of: float(state.crease_moment(str(of)).mean()),
     **{f"reaction_{axis}": _component(lambda s, of: s.reaction(of), k) for k, axis in enumerate("xyz")},
     **{f"displacement_{axis}": _component(_moved, k) for k, axis in enumerate("xyz")},
 }
 NEEDS = {
-    **dict.fromkeys(("fold_angle", "dihedral", "moment"), "the name of a crease"),
+    **dict.fromkeys(("fold_angle", "largest_fold", "dihedral", "moment"), "the name of a crease"),
     **{
         f"{what}_{axis}": "a place such as edge:start"
         for what in ("reaction", "displacement")

@@ -254,6 +254,10 @@ class _Builder:
             self._check_pinch(name, item, rows)
             check_side(name, now, target)
             nominal = now + part * (target - now)
+            if item.couple is not None:
+                claim(self.claimed, name, item.at, rows, part * item.couple)
+                self.moment[rows] = sense[inside] * part * item.couple
+                continue
             claim(self.claimed, name, item.at, rows, nominal)
             if item.how == "rest":
                 self.rest[rows] = nominal
@@ -270,9 +274,10 @@ class _Builder:
             raise ModelError(
                 f"pinch of crease '{name}': it is ordinary sheet there; fold it before, or in the same step"
             )
-        if item.how == "rest" and (law == HELD).any():
+        if item.how != "imposed" and (law == HELD).any():
+            by = "rest angles" if item.how == "rest" else "couples"
             raise ModelError(
-                f"pinch of crease '{name}' by rest angles: its angle is imposed there and no spring acts; "
+                f"pinch of crease '{name}' by {by}: its angle is imposed there and no spring acts; "
                 "use how = 'imposed'"
             )
 

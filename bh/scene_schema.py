@@ -170,10 +170,15 @@ class PinchTable(Table):
     length: Length | None = Field(
         None, description="the length of the zone along the crease in mm; a fifth of the crease unless given"
     )
-    how: Literal["imposed", "rest"] = Field(
-        "imposed", description='"imposed", or "rest" for the rest angles of the crease\'s spring'
+    how: Literal["imposed", "rest", "couple"] = Field(
+        "imposed",
+        description='"imposed", "rest" for the rest angles of the crease\'s spring, or "couple" for closing couples',
     )
     profile: Profile = Field("cosine", description='"cosine", or "grip" for the same angle all over the zone')
+    couple: Positive | None = Field(
+        None,
+        description='with how = "couple" the largest couple a length in the middle, a positive number in N mm / mm',
+    )
 
 
 class MomentTable(Table):

@@ -159,6 +159,30 @@ def test_rest_angles_alone_do_not_reach_the_angle() -> None:
     assert CLOSED + 0.1 < path[-1].dihedral("crease").min() < RIGHT - 0.5
 
 
+@pytest.mark.parametrize("formulation", BOTH)
+def test_couples_close_the_crease_until_the_angle_is_reached(formulation: str) -> None:
+    how = {"length": 20.0, "how": "couple", "couple": 600.0 if formulation == BOTH[0] else 150.0}
+    path = trace(folded(formulation).pinch("crease", to=CLOSED, **how))
+    assert path.outcome == "reached"
+    last = path[-1]
+    assert last.dihedral("crease").min() == pytest.approx(CLOSED, abs=2e-4)
+    assert 0.0 < last.lam < 1.0
+    assert last.dihedral("crease") == pytest.approx(last.dihedral("crease")[::-1], abs=1e-6)
+    # nothing is held: the angle goes back smoothly, and every edge is a spring still
+    assert (program(path.model)[1].law[crease_hinges(ONE, "crease")] == SPRING).all()
+
+
+def test_couples_of_a_pinch_follow_its_profile() -> None:
+    _, step = program(folded().pinch("crease", to=CLOSED, length=20.0, how="couple", couple=30.0))
+    mean, _ = parts(chain(ONE, "crease"), 0.5, 20.0, "cosine")
+    at = crease_hinges(ONE, "crease")
+    assert step.moment.end[at] == pytest.approx(30.0 * mean)
+    assert (step.moment.start == 0.0).all()
+    two = Model(TWO, PLATE).fold("all", by=RIGHT, Lstar=2.0)
+    _, step = program(two.pinch("all", length=20.0, how="couple", couple=30.0))
+    assert step.moment.end[crease_hinges(TWO, "crease-2")].min() == pytest.approx(-30.0)
+
+
 def test_energy_of_a_pinch_is_the_work_of_its_angles() -> None:
     """Fine increments: the change of energy is the integral of moment times angle over the zone."""
     from bh import LoadControl
@@ -239,7 +263,10 @@ def test_a_scene_says_the_same() -> None:
         ({"to": 1.0, "by": 1.0}, ["to and by"]),
         ({"length": -3.0}, ["positive length"]),
         ({"length": math.nan}, ["positive length"]),
-        ({"how": "force"}, ["imposed or rest"]),
+        ({"how": "force"}, ["imposed or rest or couple"]),
+        ({"how": "couple"}, ["give both or neither"]),
+        ({"couple": 3.0}, ["give both or neither"]),
+        ({"how": "couple", "couple": -1.0}, ["positive number in N mm / mm"]),
         ({"profile": "hat"}, ["cosine or grip"]),
         ({"at": 0.05, "length": 20.0}, ["leaves the crease", "give at from 0.1 to 0.9"]),
         ({"length": 200.0}, ["leaves the crease", "shorter length"]),
