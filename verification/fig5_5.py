@@ -53,6 +53,7 @@ def run(context: Context) -> CaseResult:
     _valley(result)
     _errors(result, context, found)
     _grip(result)
+    _couples(result)
     _flattening(result)
     _plots(result, found)
     _notes(result, found)
@@ -195,6 +196,44 @@ def _grip(result: CaseResult) -> None:
         )
         add(result, p, "reach of the pinch along the crease", reach(p), "mm", None, note, **params)
         add(result, p, "change of the bending angle", p.bend, "deg", exact.bend, note, **params)
+
+
+def _couples(result: CaseResult) -> None:
+    """Closed by couples over 10 mm until the angle is reached, nothing held, as the source's forces do it."""
+    ways = (
+        (Way("couples, consistent", "consistent", "grip", 10.0, (), couple=150.0), ((100, 2), (200, 4))),
+        (
+            Way("couples, bars and hinges", "bars-and-hinges", "grip", 10.0, (), couple=600.0),
+            ((100, 1), (200, 2)),
+        ),
+    )
+    for way, grids in ways:
+        for mesh in grids:
+            p = pinched(way, mesh, 0.01)
+            params: dict[str, Any] = {
+                "way": way.name,
+                "along": mesh[0],
+                "rows": mesh[1],
+                "kappa_0_per_mm": 0.01,
+            }
+            smallest = float(p.path[-1].dihedral("crease").min())
+            add(
+                result,
+                p,
+                "smallest dihedral angle",
+                smallest,
+                "rad",
+                PINCHED,
+                "reached by couples",
+                1e-3,
+                **params,
+            )
+            add(result, p, "total energy", p.path[-1].energy.total, "N mm", None, "by couples", **params)
+            add(
+                result, p, "reach of the pinch along the crease", reach(p), "mm", None, "by couples", **params
+            )
+            add(result, p, "change of the bending angle", p.bend, "deg", None, "by couples", **params)
+            add(result, p, "change of the twist angle", p.twist, "deg", None, "by couples", **params)
 
 
 def _flattening(result: CaseResult) -> None:

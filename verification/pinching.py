@@ -48,6 +48,9 @@ class Way:
     zone: float
     meshes: tuple[tuple[int, int], ...]
     judged: tuple[int, int] = (100, 1)  # the source's own mesh, or the finer one of a way that converges
+    couple: float | None = (
+        None  # N mm / mm, more than is needed, where couples close the crease and nothing is held
+    )
 
 
 AS_SOURCE = Way("as the source", "bars-and-hinges", "grip", 10.0, ((100, 1), (200, 2)))
@@ -131,7 +134,12 @@ def pinched(
     pattern = meshes.parallel_creases(curvature, LENGTH, spacing, creases, folds)  # type: ignore[arg-type]
     model = Model(meshes.structured(pattern, along=along, rows=rows), sheet, formulation=way.formulation)
     model = model.fold("all", by=FOLDED, Lstar=Lstar)
-    path = trace(model.pinch("all", by=math.pi - left, length=way.zone, profile=way.profile))
+    how = "imposed" if way.couple is None else "couple"
+    path = trace(
+        model.pinch(
+            "all", by=math.pi - left, length=way.zone, profile=way.profile, how=how, couple=way.couple
+        )
+    )
     return Pinched(path, way.zone)
 
 
