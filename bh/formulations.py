@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.model import Model
-from bh.program import StepProgram
 from bh.state import State
+from bh.step_program import StepProgram
 
 GROUP = "bh.formulations"
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bh.actuation import Actuation, Bar, Fold, Moment, Pinch, Tether
+from bh.actuation import Actuation, Displace, Force
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
@@ -393,14 +393,12 @@ def _check(model: Model) -> None:
                 select(mesh, support.at)
     for i, actuations in enumerate(model.steps):
         for item in actuations:
-            if isinstance(item, Until | Bar | Tether):
-                continue
             key = type(item).__name__.lower()
-            if isinstance(item, Fold | Moment | Pinch):
-                if item.crease != "all":
-                    with within(f"steps[{i}].{key}.crease"):
-                        mesh.crease_edges(item.crease)
-            else:
+            crease = getattr(item, "crease", "all")
+            if crease != "all":
+                with within(f"steps[{i}].{key}.crease"):
+                    mesh.crease_edges(crease)
+            if isinstance(item, Force | Displace):
                 with within(f"steps[{i}].{key}.at"):
                     select(mesh, item.at)
     try:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.model import Model
-from bh.program import StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation, grows_ahead
+from bh.step_program import StepProgram
 from bh.supports import TURNED, UNBALANCED
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
