@@ -97,7 +97,7 @@ class ShellSystem:
 
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
-        force = loads.forces(self.mesh, model, step, self.elements.lengths)
+        force = loads.forces(self.mesh, model, step, self.program.force, self.elements.lengths)
         couple = loads.edge_moments(self.elements, moments)
         none = np.zeros(self.elements.tables.rotations * len(self.creases))
         ends = [
