@@ -206,7 +206,7 @@ def _accuracy(data: Any) -> Goal:
 
 def _formulation(name: str) -> str:
     known = names()
-    if name not in known:
+    if name not in known and ":" not in name:
         listed = ", ".join(known) or "none; install the project with pip first"
         raise SceneError(
             f"model.formulation = {shown(name)} is not known{nearest(name, known)}; use one of {listed}"

@@ -58,8 +58,8 @@ def _plain(item: Actuation | Until) -> Actuation | Until:
 def forces(mesh: ElementMesh, model: Model, step: int, acting: Ramp, lengths: Array) -> Ramp:
     """Dead forces (n, 3) on all nodes, N, at the start and the end of step `step`.
 
-    They are those of `acting` (corners, 3), what the steps ask for, but that a `total` on a named set of edges is a uniform
-    line load a length of edge instead of equal shares.
+    They are those of `acting` (corners, 3), what the steps ask for, but that a `total` on a named set of edges is a
+    uniform line load a length of edge instead of equal shares.
     """
     for actuations in model.steps[
         :step
