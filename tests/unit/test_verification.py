@@ -31,6 +31,11 @@ SLOW = {
     "fig5_3",
     "hard_cases",
     "scan",
+    "fig5_5",
+    "fig5_9",
+    "fig5_10",
+    "fig5_11",
+    "pinch_shell",
 }  # over some five seconds on a slow machine
 
 
