@@ -35,7 +35,7 @@ _HOME = {
 
 _SUBMODULES = {
     "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
-    "plotting": "bh.plotting", "scan": "bh.scan",
+    "plotting": "bh.plotting", "polish": "bh.analysis.polish", "scan": "bh.scan",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip

@@ -215,6 +215,30 @@ class OfPoints:
 
 
 @dataclass(frozen=True)
+class OfNodes:
+    """A function of a few node positions (m, 3) that also takes complex ones: its gradient is a complex step, exact.
+
+    No absolute values or comparisons in it; `np.sqrt((d * d).sum())` rather than `np.linalg.norm(d)`.
+    """
+
+    nodes: Sequence[int]
+    function: Callable[[Any], Any]
+
+    def value(self, at: Situation) -> float:
+        return float(np.real(self.function(at.state.points[list(self.nodes)])))
+
+    def slope(self, at: Situation) -> Slope:
+        places = at.state.points[list(self.nodes)]
+        points = np.zeros_like(at.state.points)
+        for i, node in enumerate(self.nodes):
+            for axis in range(3):
+                moved = places.astype(complex)
+                moved[i, axis] += 1e-100j
+                points[node, axis] += float(np.imag(self.function(moved))) / 1e-100
+        return Slope(points, np.zeros(len(at.q) - at.moving), {})
+
+
+@dataclass(frozen=True)
 class Stiffness:
     """Stiffness of a place along a direction, N/mm: a force over the displacement along it.
 

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh.analysis import sensitivities
+from bh.analysis.polish import polish
 from bh.analysis.sensitivities import (
     Energy,
     FoldAngle,
     Observable,
+    OfNodes,
     OfPoints,
     Position,
     Situation,
@@ -193,6 +195,58 @@ def test_an_error_in_the_kernels_is_seen(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(BarHingeDesign, "residual_to_data", without)
     assert np.abs(of(path, build, p, [Energy("stretching")])[0].gradient / whole - 1.0).max() > 1e-3
+
+
+def test_a_function_of_nodes_by_complex_step() -> None:
+    build, p = held("consistent"), np.array(DESIGNS["held"][1])
+    path = bh.trace(build(p), strategy=EXACT)
+    a, b = 0, int(path.model.mesh.nodes(TIP)[0])
+
+    def distance(x: Array) -> Array:
+        return np.sqrt(((x[1] - x[0]) * (x[1] - x[0])).sum())
+
+    def whole(points: Array) -> tuple[float, Array]:
+        away = points[b] - points[a]
+        gradient = np.zeros_like(points)
+        gradient[b], gradient[a] = away / np.linalg.norm(away), -away / np.linalg.norm(away)
+        return float(np.linalg.norm(away)), gradient
+
+    one, two = of(path, build, p, [OfNodes([a, b], distance), OfPoints(whole)])
+    assert one.value == pytest.approx(two.value)
+    assert one.gradient == pytest.approx(two.gradient, rel=1e-9)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_polishing_meets_targets(formulation: str) -> None:
+    """Tip and energy of another design, from 5 % beside it, with fewer targets than parameters."""
+    build = held(formulation)
+    aim, start = np.array([100.0, 8.0, 0.2, 1.9]), np.array([104.0, 8.4, 0.19, 1.85])
+    targets: list[Observable] = [Position(TIP, "x"), Position(TIP, "y"), Energy()]
+    at = Situation(bh.trace(build(aim)), -1)
+    wanted = [(item, item.value(at)) for item in targets]
+    allowed = [1e-4, 1e-4, 1e-6]
+    found = polish(build, start, wanted, allowed, bounds=([90, 7, 0.1, 1.0], [110, 9, 0.3, 2.5]))
+    assert found.outcome == "reached"
+    assert found.solves <= 8
+    assert (np.abs(found.missed) <= allowed).all()
+    again = Situation(bh.trace(build(found.design)), -1)
+    assert [item.value(again) for item in targets] == pytest.approx([value for _, value in wanted], rel=1e-5)
+
+
+def test_polishing_says_where_it_stops() -> None:
+    build, p = held("bars-and-hinges"), np.array(DESIGNS["held"][1])
+    far = [(Position(TIP, "x"), 500.0)]
+    bounds = ([95, 7, 0.1, 1.5], [105, 9, 0.3, 2.2])
+    found = polish(build, p, far, 0.1, bounds=bounds)
+    assert found.outcome == "no descent"  # at the bounds
+    assert ((found.design == bounds[0]) | (found.design == bounds[1])).any()
+    assert polish(build, p, far, 0.1, bounds=bounds, most=2).outcome == "limit of solves"
+    with pytest.raises(InputError, match="outside its bounds"):
+        polish(build, p, far, 0.1, bounds=([0] * 4, [1] * 4))
+    with pytest.raises(InputError, match="at least one target and positive tolerances"):
+        polish(build, p, far, 0.0)
+    with pytest.raises(InputError, match="scale must be 4 positive numbers"):
+        polish(build, p, far, 0.1, scale=[1.0])
 
 
 def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
