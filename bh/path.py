@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path as FilePath
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,20 @@ from bh.describe import describe, fingerprint, rebuild
 from bh.errors import ModelError, PathFileError
 from bh.formulations import Formulation, formulation
 from bh.model import Model
-from bh.program import StepProgram, open_ends, program
+from bh.observables import until_of
+from bh.program import Ended, StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
+from bh.refinement import Goal
 from bh.solvers.automatic import Automatic
-from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
+from bh.solvers.increments import ARC, LOAD, CriticalPoint, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
 from bh.storage import CriticalRow, PathFile, StateRow, reading
 from bh.threads import one_blas_thread
 from meshes.mesh import count
+
+if TYPE_CHECKING:
+    from bh.accuracy import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -73,6 +78,9 @@ class Path:
     """The accepted states of a model, in order, and how each step ended.
 
     `path[i]` is the i-th `State` (read when asked for); `path[0]` is the state that the first step begins with.
+
+    Attributes:
+        accuracy: the estimate of its error, where an accuracy was asked for (`bh.accuracy.Accuracy`), else None.
     """
 
     def __init__(self, model: Model, provenance: dict[str, Any] | None = None) -> None:
@@ -80,6 +88,7 @@ class Path:
         self.provenance = provenance or _provenance(model)
         self.records: list[Record] = []
         self.steps: list[StepOutcome] = []
+        self.accuracy: Accuracy | None = None
         self._formulation: Formulation = formulation(model.formulation)
         self._programs: tuple[StepProgram, ...] = program(model)
         self._systems: dict[int, Any] = {}
@@ -122,6 +131,8 @@ class Path:
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
         ends = [line for step in self._programs for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
+        if self.accuracy is not None and not self.accuracy.met:
+            found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
@@ -237,8 +248,20 @@ class Path:
             if step > 0:
                 last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
                 start = None if last is None else self[last]
+                if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
+                    self._programs = program(self.model, self._ended(step))
             self._systems[step] = self._formulation.system(self.model, self._programs[step], start)
         return self._systems[step]
+
+    def _ended(self, before: int) -> dict[int, Ended]:
+        """Steps before `before` that ended early, by an `Until`."""
+        last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
+        found = {}
+        for step, index in last.items():
+            if until_of(self.model.steps[step]) is not None and self.records[index].lam < 1.0:
+                state = self[index]
+                found[step] = Ended(state.lam, state.points, state.dihedral_angles)
+        return found
 
 
 def trace(
@@ -248,6 +271,8 @@ def trace(
     strategy: Strategy | None = None,
     file: str | FilePath | None = None,
     resume: bool = False,
+    accuracy: float | Goal | None = None,
+    after: Path | None = None,
 ) -> Path:
     """Follow the equilibrium of `model` through all its steps.
 
@@ -256,6 +281,10 @@ def trace(
         strategy: how increments are chosen; the default suits all scenes.
         file: write every accepted state to this file before the next increment begins.
         resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
+        accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
+            chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
+            see `bh.accuracy` and `path.accuracy`. The file is written when that is done.
+        after: a solved path of the same model with fewer steps, whose states this one begins with.
 
     Returns:
         the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
@@ -270,10 +299,16 @@ def trace(
         raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
+    if accuracy is not None:
+        return _trace_to(model, accuracy, progress, strategy, file, resume, after)
     strategy = strategy or Automatic()
-    path = Path(model)
+    path = Path(model) if after is None else _continued(after, model)
     target: PathFile | None = None
     if file is not None:
+        if after is not None:
+            raise ModelError(
+                "a path that goes on from another one cannot have a file; save it when it is solved"
+            )
         if resume:
             path, target = _resume(model, FilePath(file))
         else:
@@ -293,6 +328,28 @@ def trace(
         report.close(path.outcome)
         if target is not None:
             target.close()
+    return path
+
+
+def _trace_to(
+    model: Model,
+    accuracy: float | Goal,
+    progress: bool | ProgressMeter,
+    strategy: Strategy | None,
+    file: str | FilePath | None,
+    resume: bool,
+    after: Path | None,
+) -> Path:
+    from bh.accuracy import solve
+
+    if resume or after is not None:
+        raise ModelError(
+            "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
+        )
+    goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
+    path = solve(model, goal, progress=progress, strategy=strategy)
+    if file is not None:
+        path.save(file)
     return path
 
 
@@ -327,7 +384,8 @@ def _run_step(
             len(history) < 3 and step > 0 and not any(r.jumped for r in done)
         ):  # later steps do not store their start
             history.insert(0, origin)
-    for item in walk(Walk(system, strategy, tuple(history), increment, origin)):
+    goal, tolerance = _goal(path, step, system)
+    for item in walk(Walk(system, strategy, tuple(history), increment, origin, goal, tolerance)):
         now = time.perf_counter()
         if item.outcome != "reached":
             return StepOutcome(item.outcome, item.note, item.iterations)
@@ -344,6 +402,18 @@ def _run_step(
     return StepOutcome("reached")
 
 
+def _goal(path: Path, step: int, system: Any) -> tuple[Callable[[Point], float] | None, float]:
+    """What is zero where the step ends early, and to which tolerance; None if nothing ends it early."""
+    until = until_of(path.model.steps[step])
+    if until is None:
+        return None, 0.0
+
+    def missed(at: Point) -> float:
+        return until.measure(path._formulation.observe(path.model, system, at.q, at.lam, step)) - until.value
+
+    return missed, until.tolerance
+
+
 def _recent(done: list[Record]) -> list[Record]:
     """Records that a resumed step needs: three since the last jump, and all of a run by arc length that goes on."""
     jumps = [index for index, record in enumerate(done) if record.jumped]
@@ -351,6 +421,20 @@ def _recent(done: list[Record]) -> list[Record]:
     while arc > 0 and done[arc - 1].mode != LOAD:
         arc -= 1
     return done[max(arc - 3, jumps[-1] if jumps else 0, 0) :]
+
+
+def _continued(after: Path, model: Model) -> Path:
+    """A path of `model` that begins with all that `after` has."""
+    if after.outcome != "reached":
+        raise ModelError(f"the path to go on from ended early ({after.outcome}); solve it first")
+    if fingerprint(replace(model, steps=model.steps[: len(after.steps)])) != after.provenance["input"]:
+        raise ModelError(
+            "the path to go on from is of another model; add steps to its own: path.model.step(...)"
+        )
+    path = Path(model)
+    path.records, path.steps = list(after.records), list(after.steps)
+    path._states = dict(after._states)
+    return path
 
 
 def _new_file(path: Path, file: FilePath) -> PathFile:
