@@ -92,6 +92,14 @@ class BarHingeDesign:
             return f, turned[held] - system._compliance * w
         return f, np.zeros(0)
 
+    def imposed(self, by_data: Data) -> Array:
+        """(m,) derivatives to the imposed angles of hinges of the mesh, of derivatives to the data; zero elsewhere."""
+        e = self.system.elements
+        out = np.zeros(len(self.system.mesh.topology.hinges))
+        if e.held:
+            out[e.source[-e.held :]] = by_data["rest"][-e.held :]
+        return out
+
     # ------------------------------------------------------------------------------- derivatives to data
 
     def residual_to_data(self, v: Array, w: Array) -> Data:

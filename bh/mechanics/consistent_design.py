@@ -115,6 +115,14 @@ class ConsistentDesign:
             closings.lock_force_rates(x, v, system.hinges, e.lock, self.L, f)
         return f, r
 
+    def imposed(self, by_data: Data) -> Array:
+        """(m,) derivatives to the imposed angles of hinges of the mesh, of derivatives to the data; zero elsewhere."""
+        e = self.system.elements
+        out = np.array(by_data.get("held", np.zeros(len(e.held.end))))
+        here = self.turning & (e.patches.hinge >= 0)
+        np.add.at(out, e.patches.hinge[here], by_data["rest"][here])
+        return np.where(np.isnan(e.held.end), 0.0, out)
+
     # ------------------------------------------------------------------------------- derivatives to data
 
     def residual_to_data(self, v: Array, w: Array) -> Data:

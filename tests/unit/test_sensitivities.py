@@ -76,10 +76,21 @@ def displaced(formulation: str) -> Build:
     return build
 
 
+def pinched(formulation: str) -> Build:
+    """Width, thickness, L*, rest angle, pinched angle: the pinch goes on from the angles that the fold came to."""
+
+    def build(p: Array) -> bh.Model:
+        model = supported(formulation, 100.0, p[0], p[1]).fold("crease", rest=p[3], Lstar=p[2])
+        return model.pinch("crease", to=p[4], length=30.0).force(TIP, each=[0.0, 0.0, 1e-3])
+
+    return build
+
+
 DESIGNS: dict[str, tuple[Callable[[str], Build], list[float]]] = {
     "held": (held, [100.0, 8.0, 0.2, 1.9]),
     "spring": (spring, [8.0, 0.2, 10.0, 1.6]),
     "displaced": (displaced, [0.6, 2.0, 0.15]),
+    "pinched": (pinched, [8.0, 0.2, 10.0, 1.9, 1.2]),
 }
 
 
@@ -284,6 +295,15 @@ def test_bad_input() -> None:
 
     with pytest.raises(InputError, match="keep the number of cells fixed"):
         of(path, finer, p, [Energy()])
+
+    def until(q: Array) -> bh.Model:
+        step = bh.Fold("crease", to=1.0), bh.Until("fold_angle", 1.0, "crease")
+        return supported("bars-and-hinges", q[0], q[1], q[2]).step(*step)
+
+    ended = bh.trace(until(p))
+    assert ended.outcome == "reached"
+    with pytest.raises(InputError, match="has no sensitivities; give it its end"):
+        of(ended, until, p, [Energy()])
     shell = bh.trace(replace(build(p), formulation="shell"))
     with pytest.raises(InputError, match="formulation 'shell' has no sensitivities"):
         of(shell, lambda q: replace(build(q), formulation="shell"), p, [Energy()])
