@@ -29,6 +29,7 @@ ALL_CASES = {
     "fig5_3": "verification.fig5_3",
     "appendix_a": "verification.appendix_a",
     "pinch_shell": "verification.pinch_shell",
+    "gradients": "verification.gradients",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",

@@ -54,6 +54,7 @@ def polish(
     scale: ArrayLike | None = None,
     bounds: tuple[ArrayLike, ArrayLike] | None = None,
     most: int = 20,
+    steps: ArrayLike | None = None,
     strategy: Strategy | None = None,
 ) -> Polished:
     """Change a design until observables of its solved model are what they are to be.
@@ -66,6 +67,7 @@ def polish(
         scale: (k,) typical changes of the parameters, by default their sizes at the start.
         bounds: least and largest values of the parameters.
         most: solves of the model at most.
+        steps: of the differences, see `bh.sensitivities.of`.
         strategy: of `bh.trace`.
 
     Raises:
@@ -89,7 +91,7 @@ def polish(
         raise ModelError(f"the start cannot be solved ({path.outcome}): {path.reason}")
     solves, history, trust = 1, [], FIRST
     while True:
-        found = of(path, build, p, observables)
+        found = of(path, build, p, observables, steps=steps)
         missed = np.array([item.value for item in found]) - wanted
         history.append(float((np.abs(missed) / allowed).max()))
         outcome = "reached" if history[-1] <= 1.0 else ""
