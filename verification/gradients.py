@@ -226,7 +226,8 @@ def _targets(result: CaseResult, context: Context, count: int) -> None:
              "Problem C with two segments, one or both pinched, on the bar-and-hinge model.", log="y")
     )  # fmt: skip
     result.notes.append(
-        "Random designs of two segments; the target is where the surrogate has its tip, so that the design is its exact "
-        f"answer. {np.mean(solves):.1f} solves on average bring the solved model there. The mesh keeps its number of cells "
-        "meanwhile; how far off the tip is on meshes with edges of 1 mm, made anew for polished designs, is the last check."
+        "Random designs of two segments; the target is where the surrogate has its tip, so that the design is its "
+        f"exact answer. {np.mean(solves):.1f} solves on average bring the solved model there. The mesh keeps its "
+        "number of cells meanwhile; how far off the tip is on meshes with edges of 1 mm, made anew for polished "
+        "designs, is the last check."
     )
