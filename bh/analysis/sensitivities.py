@@ -400,6 +400,11 @@ def _data(at: Situation, model: Model) -> Data:
     system = formulation(model.formulation).system(model, program(model)[at.step], at.start)
     if system.size != at.system.size:
         raise ModelError("the unknowns change with the design; keep supports and creases fixed")
+    here, there = at.system.constraints, system.constraints
+    if here.frames.shape != there.frames.shape or not np.allclose(
+        here.frames, there.frames, rtol=0.0, atol=1e-12
+    ):
+        raise ModelError("the directions of oblique supports change with the design; keep them fixed")
     data: Data = system.design(at.q, at.lam).data()
     return data
 

@@ -296,6 +296,18 @@ def test_bad_input() -> None:
     with pytest.raises(InputError, match="keep the number of cells fixed"):
         of(path, finer, p, [Energy()])
 
+    def turning(q: Array) -> bh.Model:
+        mesh = meshes.structured(meshes.annulus_sector(100.0, 8.0, 0.6), along=8)
+        model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.2)).support("corner:inner-start", "xyz")
+        model = model.support("corner:outer-start", [[q[0], 1, 0], [0, 0, 1]]).support(
+            "corner:inner-end", "z"
+        )
+        return model.fold("crease", to=2.0)
+
+    oblique = bh.trace(turning(np.array([0.3])))
+    with pytest.raises(InputError, match="directions of oblique supports change"):
+        of(oblique, turning, [0.3], [Energy()])
+
     def until(q: Array) -> bh.Model:
         step = bh.Fold("crease", to=1.0), bh.Until("fold_angle", 1.0, "crease")
         return supported("bars-and-hinges", q[0], q[1], q[2]).step(*step)
