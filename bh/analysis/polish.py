@@ -32,7 +32,7 @@ class Polished:
         design: (k,) the best parameters that were found; path: its solved model.
         values: (m,) of the observables there; missed: (m,) values less targets.
         solves: of the model, failed ones included.
-        history: (rounds + 1,) the largest miss over its tolerance, from the start on.
+        history: the largest miss over its tolerance, at the start and after each step that was taken.
         outcome: "reached", "limit of solves", or "no descent" where no step helps.
     """
 
@@ -89,12 +89,13 @@ def polish(
     path = trace(build(p), strategy=strategy)
     if path.outcome != "reached":
         raise ModelError(f"the start cannot be solved ({path.outcome}): {path.reason}")
-    solves, history, trust = 1, [], FIRST
-    while True:
+    missed = _values(path, observables) - wanted
+    solves, history, trust, outcome = 1, [float((np.abs(missed) / allowed).max())], FIRST, ""
+    while not outcome:
+        if history[-1] <= 1.0:
+            outcome = "reached"
+            break
         found = of(path, build, p, observables, steps=steps)
-        missed = np.array([item.value for item in found]) - wanted
-        history.append(float((np.abs(missed) / allowed).max()))
-        outcome = "reached" if history[-1] <= 1.0 else ""
         J = np.array([item.gradient for item in found]) / allowed[:, None] * sizes
         better = None
         while not outcome and better is None:
@@ -105,12 +106,13 @@ def polish(
             elif trust < SHORTEST or np.abs(step).max() < SHORTEST:
                 outcome = "no descent"
             else:
-                better = _try(build, p + step * sizes, observables, wanted, allowed, missed, strategy)
+                better = _better(build, p + step * sizes, observables, wanted, allowed, missed, strategy)
                 solves += 1
                 trust *= 2.0 if better else 0.25
-        if better is None:
-            return Polished(p, path, missed + wanted, missed, solves, tuple(history), outcome)
-        path, p = better
+        if better is not None:
+            path, p, missed = better
+            history.append(float((np.abs(missed) / allowed).max()))
+    return Polished(p, path, missed + wanted, missed, solves, tuple(history), outcome)
 
 
 def _step(J: Array, missed: Array, room: tuple[Array, Array]) -> Array:
@@ -126,7 +128,12 @@ def _step(J: Array, missed: Array, room: tuple[Array, Array]) -> Array:
     return np.asarray(found.x)
 
 
-def _try(
+def _values(path: Path, observables: Sequence[Observable]) -> Array:
+    at = Situation(path, -1)
+    return np.array([observable.value(at) for observable in observables])
+
+
+def _better(
     build: Build,
     p: Array,
     observables: Sequence[Observable],
@@ -134,14 +141,13 @@ def _try(
     allowed: Array,
     missed: Array,
     strategy: Strategy | None,
-) -> tuple[Path, Array] | None:
-    """The solved model of a design if it is better than what is missed now, else None."""
+) -> tuple[Path, Array, Array] | None:
+    """The solved model of a design, the design and what it misses; None if that is no less than what is missed now."""
     try:
         path = trace(build(p), strategy=strategy)
     except InputError:
         return None
     if path.outcome != "reached":
         return None
-    at = Situation(path, -1)
-    off = np.array([observable.value(at) for observable in observables]) - wanted
-    return (path, p) if ((off / allowed) ** 2).sum() < ((missed / allowed) ** 2).sum() else None
+    off = _values(path, observables) - wanted
+    return (path, p, off) if ((off / allowed) ** 2).sum() < ((missed / allowed) ** 2).sum() else None
