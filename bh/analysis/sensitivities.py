@@ -343,13 +343,7 @@ def _sensitivity(at: Situation, observable: Observable, around: _Around) -> Sens
 
 def _gradient(at: Situation, slope: Slope, value: float, around: _Around) -> tuple[Array, Array]:
     """(k,) derivatives to the parameters and their measured errors."""
-    adjoint = at.solve(at.load(slope.points, slope.other), value)
-    v, w = at.system.vectors(adjoint), adjoint[at.moving :]
-    by_data = {key: -part for key, part in at.design.residual_to_data(v, w).items()}
-    # nodes that supports hold move with them
-    by_data["places"] = slope.points - at.design.second_variation(v, w)[0]
-    for key, part in slope.data.items():
-        by_data[key] = by_data[key] + part if key in by_data else part
+    by_data = derivatives_to_data(at, slope, value)
     rates = around.rates(at)
     gradient = np.array(
         [sum(float(np.vdot(by_data[key], rate[key])) for key in by_data) for rate, _ in rates]
@@ -367,6 +361,18 @@ def _gradient(at: Situation, slope: Slope, value: float, around: _Around) -> tup
     earlier = Slope(*at.previous.design.angle_gradient(follows, weights[follows]))
     more = _gradient(at.previous, earlier, float(np.abs(weights).sum()), around)
     return gradient + more[0], error + more[1]
+
+
+def derivatives_to_data(at: Situation, slope: Slope, value: float) -> Data:
+    """Derivatives of an observable to element data at equilibrium: its own, and by way of the state (the adjoint)."""
+    adjoint = at.solve(at.load(slope.points, slope.other), value)
+    v, w = at.system.vectors(adjoint), adjoint[at.moving :]
+    by_data = {key: -part for key, part in at.design.residual_to_data(v, w).items()}
+    # nodes that supports hold move with them
+    by_data["places"] = slope.points - at.design.second_variation(v, w)[0]
+    for key, part in slope.data.items():
+        by_data[key] = by_data[key] + part if key in by_data else part
+    return by_data
 
 
 class _Around:
@@ -389,13 +395,13 @@ class _Around:
         """For each parameter derivatives of the element data of a situation, and their measured errors."""
         if at.step not in self._known:
             self._known[at.step] = [
-                _differences([_data(at, model) for model in row], h)
+                differences([data_of(at, model) for model in row], h)
                 for row, h in zip(self.models, self.steps, strict=True)
             ]
         return self._known[at.step]
 
 
-def _data(at: Situation, model: Model) -> Data:
+def data_of(at: Situation, model: Model) -> Data:
     """Element data of another model where a situation is."""
     system = formulation(model.formulation).system(model, program(model)[at.step], at.start)
     if system.size != at.system.size:
@@ -409,7 +415,7 @@ def _data(at: Situation, model: Model) -> Data:
     return data
 
 
-def _differences(around: list[Data], h: float) -> tuple[Data, Data]:
+def differences(around: list[Data], h: float) -> tuple[Data, Data]:
     rates, errors = {}, {}
     for key in around[0]:
         samples = np.array([data[key] for data in around])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh.analysis import sensitivities
+from bh.analysis.node_sensitivities import of_nodes
 from bh.analysis.polish import polish
 from bh.analysis.sensitivities import (
     Energy,
@@ -323,3 +324,41 @@ def test_bad_input() -> None:
     middle = next(i for i, record in enumerate(stepped.records) if record.step == 1 and record.lam < 1.0)
     with pytest.raises(InputError, match="depends on the step before; take its end"):
         of(stepped, lambda q: build(q).fold("crease", to=1.5), p, [Energy()], index=middle)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("name", ["held", "spring"])
+def test_all_nodes_at_once(formulation: str, name: str) -> None:
+    """The chain rule with any smooth move of the nodes gives what `of` gives for that move."""
+    make, start = DESIGNS[name]
+    base = make(formulation)(np.array(start))
+    flat = base.mesh.points
+
+    def moved(p: Array) -> bh.Model:
+        x, y = flat[:, 0], flat[:, 1]
+        shift = np.column_stack((p[0] * np.sin(y / 30.0), p[1] * x * y / 1000.0, 0.0 * x))
+        return replace(base, mesh=replace(base.mesh, points=flat + shift))
+
+    path = bh.trace(base, strategy=EXACT)
+    observables: list[Observable] = [
+        Position(TIP, "x"),
+        Energy(),
+        FoldAngle("crease", 2),
+        Stiffness(TIP, "z"),
+    ]
+    found = of_nodes(path, observables)
+    expected = of(path, moved, [0.0, 0.0], observables, steps=[1e-2, 1e-2])
+    x, y = flat[:, 0], flat[:, 1]
+    for item, known in zip(found, expected, strict=True):
+        mine = [float(item.gradient[:, 0] @ np.sin(y / 30.0)), float(item.gradient[:, 1] @ (x * y / 1000.0))]
+        scale = max(float(np.abs(known.gradient).max()), 1e-3 * abs(known.value))
+        assert np.abs(mine - known.gradient).max() < 1e-7 * scale
+    whole = found[1].gradient.sum(axis=0)  # to move the whole sheet changes no energy
+    assert np.abs(whole).max() < 1e-7 * np.abs(found[1].gradient).max()
+
+
+def test_nodes_of_pinched_sheets_are_refused() -> None:
+    build = pinched("bars-and-hinges")
+    path = bh.trace(build(np.array(DESIGNS["pinched"][1])))
+    with pytest.raises(InputError, match="a pinched zone depends on all nodes"):
+        of_nodes(path, [Energy()])
