@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.model import CreaseLaw, Model, Sheet
     from bh.observables import Until, depth
-    from bh.path import Path, trace
+    from bh.path import Path
     from bh.refinement import Goal
     from bh.scene import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from bh.solvers.newton import Newton
     from bh.state import Energy, State
     from bh.supports import RigidBody, Support
+    from bh.tracing import trace
 
 _HOME = {
     "Accuracy": "bh.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
@@ -37,7 +38,7 @@ _HOME = {
     "Path": "bh.path", "PathFileError": "bh.errors", "Pinch": "bh.actuation",
     "RigidBody": "bh.supports", "SceneError": "bh.errors",
     "Sheet": "bh.model", "State": "bh.state", "Until": "bh.observables", "depth": "bh.observables",
-    "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.path",
+    "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.tracing",
 }  # fmt: skip
 
 _SUBMODULES = {

@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations import formulation, names
 from bh.model import Model
-from bh.path import Path, trace
+from bh.path import Path
 from bh.program import program
 from bh.progress import ProgressMeter
 from bh.refinement import Goal, Refinement, mesh_at, pattern_of, with_mesh
 from bh.solvers.trace import Strategy
+from bh.tracing import trace
 
 Array = NDArray[np.float64]
 LARGEST = 40_000  # triangles

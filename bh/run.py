@@ -23,10 +23,10 @@ from bh.errors import InputError
 from bh.export import FOLDED, write_flat, write_state
 from bh.model import Model
 from bh.path import Path as Trace
-from bh.path import trace
 from bh.progress import ProgressMeter
 from bh.scene import Scene
 from bh.storage import PathFile, reading
+from bh.tracing import trace
 from meshes.io.export import replacing
 
 FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")

@@ -22,7 +22,7 @@ DESCRIPTION = (
     "bh.describe", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state", "bh.formulations",
     "bh.refinement",
 )  # fmt: skip
-PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
+PATH = ("bh.path", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = (
     "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.offscreen", "bh.warm_up",

@@ -12,8 +12,9 @@ from scipy.optimize import linprog
 
 from bh.actuation import Bar, Tether
 from bh.errors import ModelError
-from bh.path import Path, trace
+from bh.path import Path
 from bh.solvers.continuation import LoadControl
+from bh.tracing import trace
 
 if TYPE_CHECKING:
     from bh.applications.corrugation import Folded

@@ -22,8 +22,9 @@ import meshes
 from bh.analysis.midplane import MidPlane, midplane
 from bh.errors import InputError, ModelError
 from bh.model import Model, Sheet
-from bh.path import Path, trace
+from bh.path import Path
 from bh.state import State
+from bh.tracing import trace
 from meshes import CreasePattern
 
 Array = NDArray[np.float64]
