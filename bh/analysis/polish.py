@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from bh.analysis.sensitivities import Build, Observable, Situation, of
 from bh.errors import InputError, ModelError
-from bh.path import Path, trace
+from bh.path import Path
 from bh.solvers.trace import Strategy
+from bh.tracing import trace
 
 Array = NDArray[np.float64]
 FIRST = 0.25  # longest first step, in units of the scale
