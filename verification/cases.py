@@ -64,6 +64,7 @@ STUDIES = (
     Study("speed_error", "solver", long=True),
     Study("honesty", "solver", long=True),
     Study("campaign", "solver", long=True),
+    Study("gradients", "solver"),
 )
 BY_NAME = {study.name: study for study in STUDIES}
 ALL_CASES = tuple(BY_NAME)

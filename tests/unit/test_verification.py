@@ -29,6 +29,7 @@ SLOW = {
     "fig3_8",
     "fig3_10",
     "fig5_3",
+    "gradients",
     "hard_cases",
     "scan",
     "fig5_5",
