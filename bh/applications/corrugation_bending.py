@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from bh.actuation import Bar, Tether
+from bh.actuation import Bar, Displace, Tether
 from bh.errors import ModelError
+from bh.observables import crease_nodes
 from bh.path import Path, trace
 from bh.solvers.continuation import LoadControl
 
@@ -33,7 +34,8 @@ class Rig:
 
     Attributes:
         span: between the inner edges of the supports, mm; bar: its width, mm; travel: of the bar, mm.
-        tape: stiffness along x and y of what holds the sheet over the supports, N/mm in all; 0 is free of friction.
+        tape: 0 is a sheet that lies free, without friction. Else valley creases over the supports are first pulled down
+            onto them and stay there, held along x and y by this stiffness, N/mm in all (double-sided tape, 4.5.1).
         gap, stiffness: of the contact (`bh.actuation.Bar`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
         largest: displacement between two states, mm.
@@ -120,17 +122,42 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
         bar("bar", 0.0, height + depth, rig.bar, rig.travel, math.atan(slope)),
         Tether("all", (CRADLE, CRADLE, CRADLE)),
     ]
+    start = moved_to(folded.path, points)
+    model = start.model
     if rig.tape > 0.0:
-        over = np.flatnonzero((np.abs(points @ across) >= 0.5 * rig.span) & (points[:, 2] < 0.5))
-        items.append(Tether(over.tolist(), (rig.tape, rig.tape, 0.0)))
-    from bh.applications.corrugation import moved
-
-    start = moved(folded.path, points)
+        valleys = crease_nodes(folded.mesh, "valley")
+        taped = valleys[np.abs(points[valleys] @ across) >= 0.5 * rig.span].tolist()
+        if not taped:
+            raise ModelError("no valley crease lies over the supports, where tape could hold it")
+        items.append(Tether(taped, (rig.tape, rig.tape, 0.0)))
+        # the bar out of the way while the sheet is taped
+        still = [
+            replace(
+                item,
+                by=(0.0, 0.0, 0.0),
+                at=(item.at[0], item.at[1], item.at[2] + rig.travel * (item.name == "bar")),
+            )
+            if isinstance(item, Bar)
+            else item
+            for item in items
+        ]
+        model = model.step(*still, Displace(taped, "z", 0.0))  # flat sheets lie in z = 0, as the supports do
     # as on a test stand: where the sheet snaps it goes to the next stable state, and the bar goes on
     first, largest = min(0.1, 0.2 * rig.largest) / rig.travel, rig.largest / rig.travel
     snapping = LoadControl(first=first, largest=largest, work_mismatch=math.inf, smallest=1e-4)
-    path = trace(start.model.step(*items), after=start, strategy=snapping)
+    path = trace(model.step(*items), after=start, strategy=snapping)
     return _evaluate(path, azimuth, rig)
+
+
+def moved_to(path: Path, points: Array) -> Path:
+    """The path of a free sheet with its last state moved rigidly to `points` (n, 3)."""
+    system, record = path.solved()
+    q = record.q.copy()
+    q[: system.moving] = system.loads(points - path.model.mesh.points)[: system.moving]
+    other = Path(path.model, path.provenance)
+    other.records = [*path.records[:-1], replace(record, q=q)]
+    other.steps = list(path.steps)
+    return other
 
 
 def _evaluate(path: Path, azimuth: float, rig: Rig) -> BendingTest:
