@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 
 from bh.actuation import Bar, Displace, Tether
 from bh.errors import ModelError
-from bh.observables import crease_nodes
+from bh.observables import crease_nodes, depth_of
 from bh.path import Path, trace
 from bh.solvers.continuation import LoadControl
 
@@ -25,6 +25,7 @@ SUPPORT = 200.0  # mm, width of a support: the sheet never hangs over its far ed
 TRIGGER = 0.1  # N, from which displacement counts (4.5.1)
 WINDOW = (0.2, 0.7)  # of the first peak of the load: the second stage
 DROP = 0.15  # of the load, behind a peak
+REACH = 0.75  # of the depth: further down mountains flatten
 CRADLE = 1e-3  # N/mm on the whole sheet along every axis: keeps it in place where nothing touches it
 
 
@@ -39,6 +40,7 @@ class Rig:
         gap, stiffness: of the contact (`bh.actuation.Bar`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
         largest: displacement between two states, mm.
+        offset: of the sheet's middle from the bar, along the span, mm.
     """
 
     span: float = 50.0
@@ -49,6 +51,7 @@ class Rig:
     stiffness: float = 50.0
     level: bool = False
     largest: float = 0.5
+    offset: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("span", "bar", "travel", "gap", "stiffness", "largest"):
@@ -101,7 +104,7 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     rig = rig or Rig()
     along = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     across = np.array([-along[1], along[0], 0.0])
-    points = settle(folded, along, across, rig.span)
+    points = settle(folded, along, across, rig.span, rig.offset)
     slope, height = lid(folded, points, along, across, 0.5 * rig.bar)
     slope, height = (0.0, _highest(folded, points, across, 0.5 * rig.bar)) if rig.level else (slope, height)
     half = 0.5 * rig.span + 0.5 * SUPPORT
@@ -174,20 +177,22 @@ def _evaluate(path: Path, azimuth: float, rig: Rig) -> BendingTest:
     x, y = moved_by[touched:] - zero, load[touched:]
     if len(x) == 0 or x[0] > 0.0:
         x, y = np.concatenate(([0.0], x)), np.concatenate(([min(TRIGGER, load.max())], y))
-    slope, r2, window, peak = second_stage(x, y)
+    slope, r2, window, peak = second_stage(x, y, REACH * depth_of(path[0 if step == 0 else states[0] - 1])[0])
     return BendingTest(azimuth, x, y, slope, r2, window, peak, path.outcome, path.reason, path)
 
 
-def second_stage(x: Array, y: Array) -> tuple[float, float, tuple[float, float], float]:
+def second_stage(x: Array, y: Array, reach: float = math.inf) -> tuple[float, float, tuple[float, float], float]:
     """Slope (N/mm) and R^2 of a line through the second stage of a curve, its ends (mm) and the first peak (N).
 
-    The stage goes from 20 to 70 % of the first peak of the load, behind which the load drops by 15 % (else of the
-    load at the end): the bar has found its mountains and no crease has flattened yet. The line is fitted
+    The stage goes from 20 to 70 % of the first peak of the load, behind which the load drops by 15 %, or of the largest
+    load before the displacement `reach` (mm) if there is none: the bar has found its mountains and no crease has flattened yet. The line is fitted
     to 101 points evenly spaced along the curve, as a test stand samples it.
     """
+    if x[-1] > reach:
+        x, y = np.append(x[x < reach], reach), np.append(y[x < reach], np.interp(reach, x, y))
     highest = np.maximum.accumulate(y)
     fallen = np.flatnonzero(y < (1.0 - DROP) * highest)
-    top = int(np.argmax(y[: fallen[0] + 1])) if len(fallen) else len(y) - 1
+    top = int(np.argmax(y[: fallen[0] + 1] if len(fallen) else y))
     peak = float(y[top])
     if top < 2 or peak <= 0.0:
         return math.nan, math.nan, (math.nan, math.nan), peak
@@ -201,7 +206,7 @@ def second_stage(x: Array, y: Array) -> tuple[float, float, tuple[float, float],
     return float(slope), 1.0 - left / max(spread, 1e-300), (ends[0], ends[1]), peak
 
 
-def settle(folded: Folded, along: Array, across: Array, span: float) -> Array:
+def settle(folded: Folded, along: Array, across: Array, span: float, offset: float = 0.0) -> Array:
     """(n, 3) nodes of the rigid sheet as it lies on two supports (z = 0) under a load over the origin.
 
     Of all positions in which nothing over the supports is below them that of the lowest origin: a linear program for
@@ -211,7 +216,7 @@ def settle(folded: Folded, along: Array, across: Array, span: float) -> Array:
     edges = folded.mesh.topology.edges
     for _ in range(12):
         a, b = _about(points, along, across)
-        points = points - a * along - b * across
+        points = points - a * along - (b - offset) * across
         over = _over(points, edges, across, 0.5 * span)
         if len(over) == 0 or not ((over @ across).min() < 0.0 < (over @ across).max()):
             raise ModelError(f"the corrugation does not reach both supports {span:g} mm apart")
