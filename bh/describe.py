@@ -11,28 +11,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Bar, Displace, Fold, Force, Moment, Tether
+from bh.actuation import Actuation, Bar, Displace, Fold, Force, Moment, Pinch, Tether
 from bh.errors import PathFileError
 from bh.model import CreaseLaw, ElementStiffness, Model, Sheet
 from bh.observables import Until
 from bh.supports import RigidBody, Support
-from meshes import Arc, Line, Polyline, SheetMesh
+from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
 AnyArray = NDArray[Any]
 ACTUATIONS: dict[str, type[Actuation]] = {
     "fold": Fold,
+    "pinch": Pinch,
     "moment": Moment,
     "force": Force,
     "displace": Displace,
 }
+CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 STEP_ITEMS: dict[str, type[Actuation | Until]] = {
     **ACTUATIONS,
     "bar": Bar,
     "tether": Tether,
     "until": Until,
 }
-CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "polyline": Polyline}
 FORMAT = 1
 
 
@@ -126,7 +127,7 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
     rest = {key: value for key, value in data.items() if key != "kind"}
     if data["kind"] == "polyline":
         rest["vertices"] = np.asarray(rest["vertices"])
-    for key in ("start", "end", "centre"):
+    for key in ("start", "end", "centre", "curvatures", "lengths"):
         if isinstance(rest.get(key), list):
             rest[key] = tuple(rest[key])
     return kinds[data["kind"]](**rest)

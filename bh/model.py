@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.actuation import Actuation, Displace, Fold, Force, Moment
+from bh.actuation import Actuation, Displace, Fold, Force, Moment, Pinch
 from bh.errors import ModelError
 from bh.observables import Until
 from bh.supports import RigidBody, Support
@@ -222,7 +222,7 @@ class Model:
         if until is not None:
             actuations = (*actuations, until)
         if all(isinstance(item, Until) for item in actuations):
-            raise ModelError("a step needs at least one actuation (fold, moment, force or displace)")
+            raise ModelError("a step needs at least one actuation (fold, pinch, moment, force or displace)")
         if sum(isinstance(item, Until) for item in actuations) > 1:
             raise ModelError("a step has two targets to end at (until); give it one")
         return replace(self, steps=(*self.steps, actuations))
@@ -230,6 +230,10 @@ class Model:
     def fold(self, crease: str, until: Until | None = None, **how: Any) -> Model:
         """Add a step that folds a crease; arguments of `bh.Fold`."""
         return self.step(Fold(crease, **how), until=until)
+
+    def pinch(self, crease: str, **how: Any) -> Model:
+        """Add a step that pinches a crease that is folded already; arguments of `bh.Pinch`."""
+        return self.step(Pinch(crease, **how))
 
     def moment(self, crease: str, to: float) -> Model:
         """Add a step with a couple a length on a crease; see `bh.Moment`."""

@@ -13,18 +13,24 @@ from typing import Any
 
 import numpy as np
 
-from bh.actuation import Actuation, Bar, Fold, Moment, Tether
+from bh.actuation import Actuation, Bar, Fold, Moment, Pinch, Tether
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
 from bh.observables import Until
 from bh.program import program
+from bh.refinement import Goal, pattern_of
+from bh.scene_patterns import (
+    LIBRARY,
+    DrawingPattern,
+    FilePattern,
+)
 from bh.scene_schema import (
     ACTUATIONS,
-    LIBRARY,
+    AccuracyTable,
     CreaseTable,
-    FilePattern,
+    DrawnTable,
     GmshTable,
     MeshTable,
     ModelTable,
@@ -32,6 +38,8 @@ from bh.scene_schema import (
     SheetTable,
     SupportTable,
     UntilTable,
+)
+from bh.scene_tables import (
     as_table,
     as_tables,
     check_keys,
@@ -44,22 +52,23 @@ from bh.scene_schema import (
     within,
 )
 from bh.supports import RigidBody, Support, directions, select
-from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip, structured
-from meshes.corrugations import KINDS as CORRUGATIONS
-from meshes.corrugations import corrugation, curved_corrugation
+from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
+SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
+COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet (FOLD)."""
+    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet, the flat pattern."""
 
     pictures: bool = False
     vtu: bool = False
     fold: bool = False
+    folded: tuple[str, ...] = ()
+    flat: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,7 @@ class Scene:
     Attributes:
         model: checked; its steps can be programmed (`bh.program`), nothing is solved.
         outputs: what a run is to write.
+        accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -77,6 +87,7 @@ class Scene:
     outputs: Outputs
     name: str = "scene"
     source: Path | None = None
+    accuracy: Goal | None = None
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -130,8 +141,23 @@ def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Sce
         raise SceneError(one_line(f"{name}: {error}")) from error
 
 
+def scene_from_tables(tables: dict[str, Any], folder: str | Path = ".", name: str = "scene") -> Scene:
+    """A scene from its tables as `tomllib` reads them: what a sweep changes between points.
+
+    Raises:
+        SceneError: as `parse_scene`.
+    """
+    try:
+        return replace(_from_tables(tables, Path(folder)), name=name)
+    except InputError as error:
+        raise SceneError(one_line(f"{name}: {error}")) from error
+
+
 def _scene(text: str, folder: Path) -> Scene:
-    data = read_toml(text)
+    return _from_tables(read_toml(text), folder)
+
+
+def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
     check_keys("", data, SECTIONS)
     for key in ("pattern", "sheet", "steps"):
         if key not in data:
@@ -142,8 +168,12 @@ def _scene(text: str, folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
+    accuracy = _accuracy(data["accuracy"]) if "accuracy" in data else None
+    how_meshed = data.get("mesh")
+    if accuracy is not None and how_meshed is None and "file" not in as_table(data["pattern"], "pattern"):
+        how_meshed = COARSEST  # only to check the scene on
     model = Model(
-        mesh=_mesh(data["pattern"], data.get("mesh"), folder),
+        mesh=_mesh(data["pattern"], how_meshed, folder),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
@@ -152,7 +182,22 @@ def _scene(text: str, folder: Path) -> Scene:
         hinge_lock=how.hinge_lock,
     )
     _check(model)
-    return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold))
+    if accuracy is not None:
+        with within("accuracy"):
+            pattern_of(model)
+            if accuracy.at is not None:
+                model.mesh.nodes(accuracy.at)
+    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy)
+
+
+def _accuracy(data: Any) -> Goal:
+    """A number, or a table."""
+    with within("accuracy"):
+        if not isinstance(data, dict):
+            return Goal(data)
+        table = read_table(AccuracyTable, data, "accuracy")
+        direction = None if table.direction is None else tuple(table.direction)
+        return Goal(table.within, table.of, table.at, direction)  # type: ignore[arg-type]
 
 
 # --- from tables to descriptions ----------------------------------------------------------------------------
@@ -171,7 +216,7 @@ def _formulation(name: str) -> str:
 def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
     table = as_table(pattern, "pattern")
     if "file" in table:
-        return _mesh_from_file(read_table(FilePattern, table, "pattern"), mesh, folder)
+        return _mesh_from_file(table, mesh, folder)
     kind = table.get("kind")
     listed = ", ".join(LIBRARY)
     if kind is None:
@@ -186,21 +231,35 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
             "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
         )
     how = _mesh_table(as_table(mesh, "mesh"))
-    flat = _pattern(drawn)
+    if isinstance(how, DrawnTable):
+        raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
+    with within("pattern"):
+        pattern = drawn.draw()
+    return _meshed(pattern, how)
+
+
+def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
     if isinstance(how, GmshTable):
         from meshes.unstructured import sheet_area, unstructured
 
         _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
         with within("mesh"):
-            return unstructured(flat, size=how.size, seed=how.seed)
+            return unstructured(flat, size=how.size, near=how.near, growth=how.growth, seed=how.seed)
+    if not flat.rails:
+        raise SceneError(
+            f'mesh.kind = "{how.kind}" is for creases that run across the sheet side by side, or round a hole; '
+            'these do not: use kind = "gmsh" with size'
+        )
     _check_size(flat, how)
     with within("mesh"):
         return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
 
 
-def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable:
+def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable | DrawnTable:
     if table.get("kind") == "gmsh":
         return read_table(GmshTable, table, "mesh")
+    if table.get("kind") == "drawn":
+        return read_table(DrawnTable, table, "mesh")
     if "size" in table:
         raise SceneError(
             f'mesh.size = {shown(table["size"])} is for kind = "gmsh"; use along or aspect_ratio, or add that kind'
@@ -208,30 +267,37 @@ def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable:
     return read_table(MeshTable, table, "mesh")
 
 
-def _pattern(table: Any) -> CreasePattern:
-    with within("pattern"):
-        if table.kind == "strip":
-            return strip(table.length, table.width, table.creases, table.fold)
-        if table.kind == "annulus_sector":
-            return annulus_sector(table.radius, table.width, table.angle, table.fold)
-        if table.kind in CORRUGATIONS:
-            return corrugation(table.kind, table.width, table.height, table.panels, table.fold)
-        if table.kind == "curved-corrugation":
-            shape = (table.exponent, table.root, table.spread)
-            return curved_corrugation(*shape, table.width, table.height, table.panels, table.fold)
-        return full_annulus(table.radius, table.width, table.fold)
-
-
-def _mesh_from_file(table: FilePattern, mesh: Any, folder: Path) -> SheetMesh:
-    name = shown(table.file)
-    if Path(table.file).suffix.lower() != ".fold":
-        raise SceneError(f"pattern.file = {name} is not a .fold file; this version reads no other yet")
+def _mesh_from_file(table: dict[str, Any], mesh: Any, folder: Path) -> SheetMesh:
+    name = shown(table["file"])
+    suffix = Path(str(table["file"])).suffix.lower()
+    if suffix in (".svg", ".dxf"):
+        return _mesh_from_drawing(read_table(DrawingPattern, table, "pattern"), mesh, folder)
+    stored = read_table(FilePattern, table, "pattern")
+    if suffix != ".fold":
+        raise SceneError(f"pattern.file = {name} is no file of a pattern; give .svg, .dxf or .fold")
     if mesh is not None:
         raise SceneError(f"mesh: {name} brings its own faces, and they are the mesh; remove [mesh]")
     from meshes.io import read_fold
 
     with within("pattern.file"):
-        return read_fold(folder / table.file, table.frame)
+        return read_fold(folder / stored.file, stored.frame)
+
+
+def _mesh_from_drawing(table: DrawingPattern, mesh: Any, folder: Path) -> SheetMesh:
+    from meshes.io import read_drawn, read_pattern
+
+    if mesh is None:
+        raise SceneError(
+            'mesh is missing; add a table [mesh] with kind = "gmsh" and size, along or aspect_ratio (creases side by '
+            'side), or kind = "drawn" (the faces of the drawing)'
+        )
+    how = _mesh_table(as_table(mesh, "mesh"))
+    options = {name: value for name, value in table if name != "file"}
+    with within("pattern.file"):
+        if isinstance(how, DrawnTable):
+            return read_drawn(folder / table.file, **options)
+        drawn = read_pattern(folder / table.file, **options)
+    return _meshed(drawn, how)
 
 
 def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
@@ -276,8 +342,6 @@ def _crease(item: Any, at: str) -> CreaseLaw:
 
 def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
     step = as_table(item, at)
-    if "pinch" in step:
-        raise SceneError(f"{at}.pinch: this version cannot pinch yet; use fold, moment, force or displace")
     check_keys(at, step, (*ACTUATIONS, "until"))
     if not set(step) - {"until"}:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
@@ -332,7 +396,7 @@ def _check(model: Model) -> None:
             if isinstance(item, Until | Bar | Tether):
                 continue
             key = type(item).__name__.lower()
-            if isinstance(item, Fold | Moment):
+            if isinstance(item, Fold | Moment | Pinch):
                 if item.crease != "all":
                     with within(f"steps[{i}].{key}.crease"):
                         mesh.crease_edges(item.crease)

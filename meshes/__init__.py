@@ -1,7 +1,7 @@
 """Flat geometry: crease patterns, meshes of them, and their file formats."""
 
 from meshes.corrugations import corrugation, corrugation_table, curved_corrugation
-from meshes.curves import Arc, Line, Polyline
+from meshes.curves import Arc, ArcChain, Line, Polyline
 from meshes.errors import FileFormatError, InputError, MeshError, PatternError
 from meshes.library import (
     annulus_sector,
@@ -13,12 +13,14 @@ from meshes.library import (
     two_arcs,
 )
 from meshes.mesh import SheetMesh
+from meshes.parallel import parallel_creases
 from meshes.pattern import Crease, CreasePattern
 from meshes.structured import structured
 from meshes.unstructured import unstructured
 
 __all__ = [
     "Arc",
+    "ArcChain",
     "Crease",
     "CreasePattern",
     "FileFormatError",
@@ -35,6 +37,7 @@ __all__ = [
     "full_annulus",
     "opposite_parabolas",
     "parabolic_canopy",
+    "parallel_creases",
     "sine_tessellation",
     "strip",
     "structured",

@@ -19,8 +19,8 @@ import numpy as np
 
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
-from meshes.mesh import SheetMesh
-from meshes.pattern import CreasePattern
+from meshes.mesh import Origin, SheetMesh
+from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.tapered import tapered_mesh, tapers
 from meshes.topology import Ints, build
 
@@ -85,13 +85,15 @@ def structured(
     return SheetMesh(
         points=points,
         triangles=triangles,
-        edge_sets=edge_sets,
+        edge_sets=with_groups(pattern, edge_sets),
         corners=corners,
         folds=pattern.folds,
+        fold_angles=drawn_angles(pattern, edge_sets),
         curves=curves,
         spans=spans,
         kind=kind,
         aspect_ratio=alpha,
+        origin=Origin.of(pattern, points, triangles),
     )
 
 

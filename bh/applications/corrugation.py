@@ -28,8 +28,9 @@ from bh.applications.corrugation_sections import bottom_up, section_moments, top
 from bh.errors import ModelError
 from bh.model import Model, Sheet
 from bh.observables import depth, depth_of
-from bh.path import Path, trace
+from bh.path import Path
 from bh.solvers.trace import Strategy
+from bh.tracing import trace
 from meshes import CreasePattern, SheetMesh, corrugation, structured
 
 __all__ = [

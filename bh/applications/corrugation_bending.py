@@ -13,8 +13,9 @@ from scipy.optimize import linprog
 from bh.actuation import Bar, Displace, Tether
 from bh.errors import ModelError
 from bh.observables import crease_nodes, depth_of
-from bh.path import Path, trace
+from bh.path import Path
 from bh.solvers.continuation import LoadControl
+from bh.tracing import trace
 
 if TYPE_CHECKING:
     from bh.applications.corrugation import Folded
@@ -185,8 +186,8 @@ def second_stage(x: Array, y: Array, reach: float = math.inf) -> tuple[float, fl
     """Slope (N/mm) and R^2 of a line through the second stage of a curve, its ends (mm) and the first peak (N).
 
     The stage goes from 20 to 70 % of the first peak of the load, behind which the load drops by 15 %, or of the largest
-    load before the displacement `reach` (mm) if there is none: the bar has found its mountains and no crease has flattened yet. The line is fitted
-    to 101 points evenly spaced along the curve, as a test stand samples it.
+    load before the displacement `reach` (mm) if there is none: the bar has found its mountains and no crease has
+    flattened yet. The line is fitted to 101 points evenly spaced along the curve, as a test stand samples it.
     """
     if x[-1] > reach:
         x, y = np.append(x[x < reach], reach), np.append(y[x < reach], np.interp(reach, x, y))

@@ -16,6 +16,7 @@ from bh.mechanics.assembly import (
     tangent_times,
     tangent_values,
 )
+from bh.mechanics.bar_hinge_design import BarHingeDesign
 from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.supported import SupportedSheet
@@ -225,6 +226,10 @@ class BarsAndHingesSystem(SupportedSheet):
             total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
             total += 2.0 * float((e.couple.rate - e.hinge_stiffness * e.rest.rate) @ turn)
         return total if self.touching is None else total + self.touching.control_stiffness(x, lam)
+
+    def design(self, q: Array, lam: float) -> BarHingeDesign:
+        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
+        return BarHingeDesign(self, q, lam)
 
     def _tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
         """Tangent of all elements times v (n, 3), in global axes and with no support left out."""

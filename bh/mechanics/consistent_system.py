@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bh.mechanics import closing as closings
 from bh.mechanics import consistent_kernels as kernels
 from bh.mechanics import consistent_setup as setup
+from bh.mechanics.consistent_design import ConsistentDesign
 from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent_pattern import rotation_pattern
 from bh.mechanics.hinge_lock import lock_terms
@@ -331,3 +332,7 @@ class ConsistentSystem(SupportedSheet):
         v = self.displacements.prescribed_motion
         more = 0.0 if self.touching is None else self.touching.control_stiffness(self.positions(q, lam), lam)
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more
+
+    def design(self, q: Array, lam: float) -> ConsistentDesign:
+        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
+        return ConsistentDesign(self, q, lam)
