@@ -25,6 +25,7 @@ from bh.applications.corrugation_bending import (
     three_point,
 )
 from bh.applications.corrugation_sections import bottom_up, section_moments, top_down
+from bh.applications.corrugation_tangent import Directional, tangent_bending
 from bh.errors import ModelError
 from bh.model import Model, Sheet
 from bh.observables import depth, depth_of
@@ -34,8 +35,8 @@ from bh.tracing import trace
 from meshes import CreasePattern, SheetMesh, corrugation, structured
 
 __all__ = [
-    "DIRECTIONS", "POLYESTER", "BendingTest", "Folded", "Rig", "all_directions", "bottom_up", "fold", "laid",
-    "section_moments", "three_point", "top_down",
+    "DIRECTIONS", "POLYESTER", "BendingTest", "Directional", "Folded", "Rig", "all_directions", "bottom_up", "fold",
+    "laid", "section_moments", "tangent_bending", "three_point", "top_down",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]

@@ -182,7 +182,9 @@ def _evaluate(path: Path, azimuth: float, rig: Rig) -> BendingTest:
     return BendingTest(azimuth, x, y, slope, r2, window, peak, path.outcome, path.reason, path)
 
 
-def second_stage(x: Array, y: Array, reach: float = math.inf) -> tuple[float, float, tuple[float, float], float]:
+def second_stage(
+    x: Array, y: Array, reach: float = math.inf
+) -> tuple[float, float, tuple[float, float], float]:
     """Slope (N/mm) and R^2 of a line through the second stage of a curve, its ends (mm) and the first peak (N).
 
     The stage goes from 20 to 70 % of the first peak of the load, behind which the load drops by 15 %, or of the largest
@@ -199,6 +201,8 @@ def second_stage(x: Array, y: Array, reach: float = math.inf) -> tuple[float, fl
         return math.nan, math.nan, (math.nan, math.nan), peak
     rising = np.maximum.accumulate(y[: top + 1])
     ends = [float(np.interp(part * peak, rising, x[: top + 1])) for part in WINDOW]
+    if not ends[1] > ends[0]:
+        return math.nan, math.nan, (ends[0], ends[1]), peak
     at = np.linspace(ends[0], ends[1], 101)
     load = np.interp(at, x[: top + 1], y[: top + 1])
     slope, offset = np.polyfit(at, load, 1)
