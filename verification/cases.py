@@ -65,6 +65,9 @@ STUDIES = (
     Study("honesty", "solver", long=True),
     Study("campaign", "solver", long=True),
     Study("gradients", "solver"),
+    Study("top_down", "4"),
+    Study("bottom_up", "4"),
+    Study("three_point", "4"),
 )
 BY_NAME = {study.name: study for study in STUDIES}
 ALL_CASES = tuple(BY_NAME)
