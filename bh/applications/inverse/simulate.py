@@ -81,7 +81,12 @@ def model(
     strip = strip.fold("crease", rest=setting.fold, Lstar=setting.Lstar)
     middles = np.cumsum(lengths) - 0.5 * np.asarray(lengths)
     pinches: list[Actuation] = [
-        Pinch("crease", at=float(middle / whole), to=_middle(setting, middle, whole / along), length=setting.zone)
+        Pinch(
+            "crease",
+            at=float(middle / whole),
+            to=_middle(setting, middle, whole / along),
+            length=setting.zone,
+        )
         for middle, on in zip(middles, pinched, strict=True)
         if on
     ]
@@ -98,7 +103,9 @@ def _middle(setting: Setting, at: float, edge: float) -> float:
     phase = at / edge - math.floor(at / edge)
     edges = (np.array([-1.0, 0.0, 1.0]) - phase)[:, None] * edge + np.array([0.0, edge])
     width, slope = setting.zone, math.pi / setting.zone
-    mean = 0.5 + (np.sin(2.0 * slope * edges[:, 1]) - np.sin(2.0 * slope * edges[:, 0])) / (4.0 * slope * edge)
+    mean = 0.5 + (np.sin(2.0 * slope * edges[:, 1]) - np.sin(2.0 * slope * edges[:, 0])) / (
+        4.0 * slope * edge
+    )
     node = 0.5 + math.sin(2.0 * slope * edge) / (4.0 * slope * edge)
     assert edge < width
     return setting.fold - (setting.fold - setting.pinch) * float(mean.max()) / node
