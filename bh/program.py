@@ -6,14 +6,16 @@ Description only, shared by all formulations: no stiffness of the sheet, no unkn
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Array, Displace, Fold, Force, Moment, Pinch, Ramp
+from bh.actuation import Actuation, Array, Bar, Displace, Fold, Force, Moment, Pinch, Ramp, Tether
 from bh.errors import ModelError
 from bh.model import CreaseLaw, Model
+from bh.observables import Until
 from bh.pinch_zone import Pinched, chain, is_chain, parts, zone
 from bh.supports import AXES, Constraints, Prescribed, resolve, select
 from meshes import SheetMesh
@@ -38,6 +40,7 @@ class StepProgram:
         moment: couple a length that closes the dihedral angle below the sheet, N mm / mm.
         force: (n, 3) dead forces, N.
         constraints: supports and prescribed displacements.
+        bodies: bars and tethers that act in this step.
     """
 
     law: NDArray[np.int64]
@@ -49,6 +52,7 @@ class StepProgram:
     moment: Ramp
     force: Ramp
     constraints: Constraints
+    bodies: tuple[Bar | Tether, ...] = ()
 
     def held_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""
@@ -75,6 +79,21 @@ class StepProgram:
         return float(change.max(initial=0.0))
 
 
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """Where a step ended before its actuations were complete.
+
+    Attributes:
+        lam: its control parameter there.
+        points: (n, 3) node positions, mm.
+        dihedral_angles: (m,) rad.
+    """
+
+    lam: float
+    points: Array
+    dihedral_angles: Array
+
+
 class _Builder:
     """Walks through the steps and remembers what the last one left behind."""
 
@@ -84,8 +103,8 @@ class _Builder:
         hinges, nodes = len(topology.hinges), len(model.mesh.points)
         self.law = np.zeros(hinges, dtype=np.int64)
         self.stiffness = np.zeros(hinges)
-        self.rest = np.full(hinges, math.pi)
-        self.made = np.full(hinges, math.pi)  # rest angles of the laws; they come in during the first step
+        self.rest = stress_free_angles(model.mesh)
+        self.made = self.rest.copy()  # rest angles of the laws; they come in during the first step
         self.held = np.full(hinges, np.nan)
         self.moment = np.zeros(hinges)
         self.steps = 0
@@ -98,6 +117,7 @@ class _Builder:
         self.force = np.zeros((nodes, 3))
         self.displaced: dict[tuple[int, tuple[float, float, float]], float] = {}
         self.now: dict[tuple[int, tuple[float, float, float]], float] = {}  # of this step
+        self.given = np.full((2, hinges), np.nan)  # angles and moments of this step
         for name, crease in model.creases.items():
             self._spring(self.hinges(name), crease)
             self.made[self.hinges(name)] = crease.rest
@@ -149,7 +169,20 @@ class _Builder:
             joined = np.concatenate(hinges)[first]
         return joined, np.concatenate(sense)[first], np.concatenate(drawn)[first]
 
-    def step(self, actuations: tuple[Actuation, ...]) -> StepProgram:
+    def stop(self, step: StepProgram, end: Ended) -> None:
+        """What the next step begins with where `step` ended early."""
+        self.rest, self.rest_ends, self.moment, self.force = (
+            ramp.at(end.lam) for ramp in (step.rest, step.rest_ends, step.moment, step.force)
+        )
+        if np.isnan(self.rest).any():
+            raise ModelError(
+                "a held crease is released in a step that ends early (until); release it in a step before"
+            )
+        self.held = np.where(self.law == HELD, end.dihedral_angles, np.nan)
+        moved = end.points - self.mesh.points
+        self.displaced = {(node, axis): float(moved[node] @ axis) for node, axis in self.displaced}
+
+    def step(self, actuations: tuple[Actuation | Until, ...]) -> StepProgram:
         before = (self.rest.copy(), self.held.copy(), self.moment.copy(), self.force.copy())
         ends = self.rest_ends.copy()
         self.steps += 1
@@ -160,6 +193,7 @@ class _Builder:
         self._begin_pinches(before[1])
         displaced = dict(self.displaced)
         self.now = {}
+        self.given[:] = np.nan
         for item in actuations:
             if isinstance(item, Pinch):
                 continue
@@ -167,15 +201,17 @@ class _Builder:
                 self._fold(item)
             elif isinstance(item, Moment):
                 hinges, sense, _ = self.creases(item.crease)
+                self._once(1, hinges, sense * item.to, "N mm / mm")
                 self.moment[hinges] = sense * item.to
             elif isinstance(item, Force):
                 self._force(item)
-            else:
+            elif isinstance(item, Displace):
                 self._displace(item)
         angles = self._present()
         for item in actuations:  # a pinch goes from where the fold of its step ends
             if isinstance(item, Pinch):
                 self._pinch(item, angles)
+        bodies = tuple(item for item in actuations if isinstance(item, Bar | Tether))
         rest, held, moment, force = before
         rest[self.released] = np.nan
         ends[self.released] = np.nan
@@ -188,7 +224,10 @@ class _Builder:
             pinch=self.pinch,
             moment=Ramp(moment, self.moment.copy()),
             force=Ramp(force, self.force.copy()),
-            constraints=resolve(self.mesh, self.model.supports, self._prescribed(displaced)),
+            constraints=resolve(
+                self.mesh, self.model.supports, self._prescribed(displaced), touching=bool(bodies)
+            ),
+            bodies=bodies,
         )
 
     def _begin_pinches(self, held: Array) -> None:
@@ -282,6 +321,7 @@ class _Builder:
             value = item.to if item.to is not None else item.rest
             assert value is not None
             angle = self._per_edge(item, value, len(hinges))
+        self._once(0, hinges, angle, "rad")
         if not spring:
             inside = (angle > 0.0) & (angle < 2.0 * math.pi)
             if not inside.all():
@@ -298,6 +338,18 @@ class _Builder:
             raise ModelError(f"fold of crease '{item.crease}' by its rest angle needs Lstar or stiffness")
         self.rest[hinges] = angle
         self.rest_ends[hinges] = angle[:, None]
+
+    def _once(self, kind: int, hinges: Ints, value: Array, unit: str) -> None:
+        """Refuse two different values for one crease in one step."""
+        known = self.given[kind, hinges]
+        other = ~np.isnan(known) & ~np.isclose(known, value, rtol=1e-12, atol=0.0)
+        if other.any():
+            row = int(np.argmax(other))
+            raise ModelError(
+                f"{hinge_name(self.mesh, int(hinges[row]))} is given {known[row]:g} and {value[row]:g} {unit} in one "
+                f"step ({self.steps}); give it one, or the second in a step of its own"
+            )
+        self.given[kind, hinges] = value
 
     @staticmethod
     def _per_edge(item: Fold, value: float | object, count: int) -> Array:
@@ -333,14 +385,32 @@ class _Builder:
         ]
 
 
-def program(model: Model) -> tuple[StepProgram, ...]:
-    """The ramps of every step of `model`, in order; nothing is solved.
+def stress_free_angles(mesh: SheetMesh) -> Array:
+    """(m,) dihedral angles of the mesh as it is made, rad: there springs are at rest before the first step."""
+    hinges = mesh.topology.hinges
+    if mesh.flat:
+        return np.full(len(hinges), math.pi)
+    wing, tail, head, other = (mesh.points[hinges[:, k]] for k in range(4))
+    edge = head - tail
+    one, two = np.cross(edge, wing - tail), np.cross(other - tail, edge)
+    length = np.linalg.norm(edge, axis=1)
+    turn = np.arctan2(length * np.einsum("mi,mi->m", one, other - tail), np.einsum("mi,mi->m", one, two))
+    return np.asarray(np.mod(math.pi + turn, 2.0 * math.pi))
+
+
+def program(model: Model, ended: Mapping[int, Ended] | None = None) -> tuple[StepProgram, ...]:
+    """The ramps of every step of `model`, in order; nothing is solved. `ended` tells of steps that ended early.
 
     Raises:
         ModelError, MeshError: an actuation or support that the sheet cannot take; the message names it.
     """
     builder = _Builder(model)
-    return tuple(builder.step(actuations) for actuations in model.steps)
+    steps = []
+    for number, actuations in enumerate(model.steps):
+        steps.append(builder.step(actuations))
+        if ended is not None and number in ended:
+            builder.stop(steps[-1], ended[number])
+    return tuple(steps)
 
 
 def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:

@@ -1,5 +1,6 @@
 """Flat geometry: crease patterns, meshes of them, and their file formats."""
 
+from meshes.corrugations import corrugation, corrugation_table, curved_corrugation
 from meshes.curves import Arc, ArcChain, Line, Polyline
 from meshes.errors import FileFormatError, InputError, MeshError, PatternError
 from meshes.library import (
@@ -30,6 +31,9 @@ __all__ = [
     "Polyline",
     "SheetMesh",
     "annulus_sector",
+    "corrugation",
+    "corrugation_table",
+    "curved_corrugation",
     "full_annulus",
     "opposite_parabolas",
     "parabolic_canopy",

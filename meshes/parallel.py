@@ -22,8 +22,8 @@ def parallel_creases(
 ) -> CreasePattern:
     """One crease, or several at equal distances on its left, on a strip that goes as far beyond the outer ones.
 
-    The first crease begins at the origin along x and turns to the left (towards y) where its curvature is positive; with
-    curvature 0 the pattern is that of `strip`. One curvature gives concentric arcs, of which the first crease has the
+    The first crease begins at the origin along x and turns to the left (towards y) where its curvature is positive;
+    with curvature 0 the pattern is that of `strip`. One curvature gives concentric arcs, of which the first has the
     lowest curvature if that is positive (the source's annulus sectors); a list gives pieces that run into one another.
 
     Args:

@@ -107,7 +107,12 @@ class CreaseProfile:
     def generator_angles(self) -> tuple[Array, Array]:
         """(gamma_L, gamma_R) that isometric theory expects from the crease alone (A.12), (k,) each, rad."""
         return relations.generator_angles(
-            self.signed_curvature, self.torsion, self.dihedral, self.fold_rate, self.curve.speed
+            self.signed_curvature,
+            self.torsion,
+            self.dihedral,
+            self.fold_rate,
+            self.curve.speed,
+            STRAIGHT / self.u[-1],
         )
 
 

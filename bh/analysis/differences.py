@@ -1,13 +1,13 @@
-"""Derivatives of sampled functions: finite differences of fourth order, or a smoothing spline.
+"""Derivatives of sampled functions: finite differences of fourth order, smoothing splines, interpolating splines.
 
-Both are strategies with one method, `derivatives(u, values, at, highest)`; what uses them need not know which it has.
+All are strategies with one method, `derivatives(u, values, at, highest)`; what uses them need not know which it has.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,10 +122,36 @@ class SmoothingSpline:
         out = np.empty((highest + 1, len(at), values.shape[1]))
         for column in range(values.shape[1]):
             noise = deviation_of(values[:, column]) if self.deviation is None else self.deviation
+            noise = noise if noise > 1e-10 * float(np.abs(values[:, column]).max()) else 0.0  # rounding
             made = splrep((u - u[0]) / scale, values[:, column], k=5, s=len(u) * noise**2)
             for order in range(highest + 1):
                 out[order, :, column] = splev((at - u[0]) / scale, made, der=order) / scale**order
         return out
+
+
+@dataclass(frozen=True)
+class InterpolatingSpline:
+    """The spline through the samples, for samples without noise; derivatives of order m err by h^(degree + 1 - m).
+
+    Attributes:
+        degree: odd; 7 gives third derivatives of fifth order in the step.
+    """
+
+    degree: int = 7
+
+    def derivatives(self, u: Array, values: Array, at: Array, highest: int) -> Array:
+        made = self.through(u, values)
+        return np.array([made(at, order) for order in range(highest + 1)])
+
+    def through(self, u: Array, values: Array) -> Any:
+        """The spline itself, of arrays (k, ...) along their first axis (`scipy.interpolate.BSpline`)."""
+        from scipy.interpolate import make_interp_spline
+
+        if len(u) <= self.degree:
+            raise InputError(
+                f"{len(u)} points are too few for a spline of degree {self.degree}; give at least {self.degree + 1}"
+            )
+        return make_interp_spline(u, values, k=self.degree)
 
 
 def deviation_of(values: Array) -> float:

@@ -73,6 +73,7 @@ def generator_angles(
     dihedral: ArrayLike,
     fold_rate: ArrayLike,
     speed: ArrayLike = 1.0,
+    smallest: float = 0.0,
 ) -> tuple[Array, Array]:
     """(gamma_L, gamma_R) of a folded crease (Eq. A.12, signs above), (k,) each, rad in [0, pi].
 
@@ -83,22 +84,23 @@ def generator_angles(
     Args:
         curvature: (k,) signed, 1/mm; torsion: (k,) 1/mm; dihedral: (k,) rad; fold_rate: (k,) rad a unit of u.
         speed: |c'|, mm a unit of u.
+        smallest: curvatures and torsions up to this one count as zero, 1/mm.
     """
     bend, twist, half_rate = np.broadcast_arrays(
         np.asarray(curvature, dtype=float) * np.cos(0.5 * np.asarray(dihedral, dtype=float)),
         np.asarray(torsion, dtype=float),
         0.5 * np.asarray(fold_rate, dtype=float) / np.asarray(speed, dtype=float),
     )
-    scale = max(float(np.abs(np.concatenate((bend.ravel(), twist.ravel(), half_rate.ravel()))).max()), 1e-300)
-    scale = max(scale, float(np.abs(np.asarray(curvature, dtype=float)).max(initial=0.0)))
-    return _angle(bend, twist + half_rate, scale), _angle(bend, twist - half_rate, scale)
+    largest = max(float(np.abs(part).max(initial=0.0)) for part in (curvature, bend, twist, half_rate))
+    none = max(VANISHING * largest, smallest, 1e-300)
+    return _angle(bend, twist + half_rate, none), _angle(bend, twist - half_rate, none)
 
 
-def _angle(bend: Array, twist: Array, scale: float) -> Array:
+def _angle(bend: Array, twist: Array, none: float) -> Array:
     """arccot(-twist / bend) with 0 / 0 interpolated."""
     sign = np.where(bend < 0.0, -1.0, 1.0)
     angle = np.arctan2(np.abs(bend), -sign * twist)
-    known = np.hypot(bend, twist) > VANISHING * scale
+    known = np.hypot(bend, twist) > none
     if not known.any():
         return np.full_like(angle, 0.5 * np.pi)
     places = np.arange(len(angle))

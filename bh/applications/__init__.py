@@ -1,1 +1,1 @@
-"""Studies of the chapters on applications, each a folder or module; they know the solver, it does not know them."""
+"""What sheets folded along curved creases are used for (Ch. 4 to 6 of the source)."""

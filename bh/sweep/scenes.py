@@ -13,13 +13,13 @@ from typing import Any
 
 from bh.errors import InputError
 from bh.path import Path as Trace
-from bh.path import trace
 from bh.scene import Scene, scene_from_tables
-from bh.scene_schema import read_toml
+from bh.scene_tables import read_toml
 from bh.supports import select
 from bh.sweep.dataset import Label
 from bh.sweep.points import SweepError, Value
 from bh.sweep.task import Measured
+from bh.tracing import trace
 
 TOKEN = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 ENERGIES = ("stretching", "bending", "folding", "total")

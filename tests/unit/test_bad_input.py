@@ -237,7 +237,7 @@ def test_fold_file_is_refused(tmp_path, content, words):
 FILE_CASES = [
     ("missing", 'file = "other.fold"', "", ["pattern.file", "other.fold", "cannot be read"]),
     ("folder", 'file = "sub.fold"', "", ["pattern.file", "sub.fold", "folder"]),
-    ("other format", 'file = "sheet.svg"', "", ["pattern.file", "sheet.svg", "no other yet"]),
+    ("other format", 'file = "sheet.stl"', "", ["pattern.file", "sheet.stl", ".svg, .dxf or .fold"]),
     ("no name", 'file = ""', "", ['pattern.file = ""']),
     ("frame", 'file = "sheet.fold"\nframe = 3', "", ["no frame 3"]),
     ("odd frame", 'file = "sheet.fold"\nframe = -1', "", ["pattern.frame = -1"]),

@@ -16,8 +16,9 @@ from bh.actuation import Actuation, Pinch
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.transforms import angles, frame, relative
 from bh.model import Model, Sheet
-from bh.path import Path, trace
+from bh.path import Path
 from bh.state import State
+from bh.tracing import trace
 from meshes import SheetMesh, parallel_creases, structured
 
 Array = NDArray[np.float64]
