@@ -29,6 +29,10 @@ ALL_CASES = {
     "fig5_3": "verification.fig5_3",
     "appendix_a": "verification.appendix_a",
     "pinch_shell": "verification.pinch_shell",
+    "forward": "verification.inverse_forward",
+    "problem_a": "verification.problem_a",
+    "problem_b": "verification.problem_b",
+    "problem_c": "verification.problem_c",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
@@ -42,7 +46,7 @@ ALL_CASES = {
     "campaign": "verification.campaign",
 }
 # run only when named: minutes, not seconds; `records` keeps a run of each
-LONG = {"campaign", "speed_error", "honesty", "fig3_8", "fig3_10"}
+LONG = {"campaign", "speed_error", "honesty", "fig3_8", "fig3_10", "problem_c"}
 LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
 CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
 # run with the case by `bh verify`

@@ -1,11 +1,11 @@
-"""Case `problem_c` (source 6.3.1.3, 6.4.3): 605 points near the start of the crease, each reached by a simulated strip."""
+"""Case `problem_c` (source 6.3.1.3, 6.4.3): 605 points near the start of the crease, reached by simulated strips."""
 
 from __future__ import annotations
 
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ MOST = 4
 class ReachTask:
     """A target with y >= 0, and its mirror image where y > 0: the mirrored design is simulated, too."""
 
-    reach: Reach = Reach()
+    reach: Reach = field(default_factory=Reach)
 
     def __call__(self, point: Mapping[str, Any]) -> dict[str, Any]:
         target = np.array([point["x"], point["y"], point["z"]], dtype=float)
@@ -91,7 +91,16 @@ def run(context: Context) -> CaseResult:
 def _claims(result: CaseResult, data: Any, seconds: float, quick: bool) -> None:
     def add(quantity: str, value: float, unit: str, reference: float | None, tolerance: float | None) -> None:
         result.checks.append(
-            Check("problem_c", quantity, {"targets": int(data.sizes["point"])}, value, unit, reference, SOURCE, tolerance)
+            Check(
+                "problem_c",
+                quantity,
+                {"targets": int(data.sizes["point"])},
+                value,
+                unit,
+                reference,
+                SOURCE,
+                tolerance,
+            )
         )
 
     reached = data["outcome"].values == "reached"
@@ -108,10 +117,22 @@ def _claims(result: CaseResult, data: Any, seconds: float, quick: bool) -> None:
     ), "mm", 0.0, 1e-6)  # fmt: skip
     flat = data["z"].values == 0.0
     pinched = np.nan_to_num(data["pinched"].values).sum(axis=-1)
-    add("points off the plane z = 0: every design is pinched", float((pinched[~flat & reached] > 0).all()), "", 1.0, 0.0)
+    add(
+        "points off the plane z = 0: every design is pinched",
+        float((pinched[~flat & reached] > 0).all()),
+        "",
+        1.0,
+        0.0,
+    )
     add("points in the plane: share of designs without a pinch", float((pinched[flat & reached] == 0).mean()), "",
         None, None)  # fmt: skip
-    add("strips that clear themselves in space, share", float(np.nanmean(data["clear"].values)), "", None, None)
+    add(
+        "strips that clear themselves in space, share",
+        float(np.nanmean(data["clear"].values)),
+        "",
+        None,
+        None,
+    )
     add("wall time of all targets", seconds, "s", None if quick else 0.0, None if quick else 600.0)
 
 
@@ -124,12 +145,16 @@ def _maps(result: CaseResult, context: Context, data: Any) -> None:
         axes = figure.subplots(1, len(Z), sharey=True)
         values = {
             (x, y, z): v
-            for x, y, z, v in zip(data["x"].values, data["y"].values, data["z"].values, data[name].values, strict=True)
+            for x, y, z, v in zip(
+                data["x"].values, data["y"].values, data["z"].values, data[name].values, strict=True
+            )
         }
         top = max(values.values())
         for ax, z in zip(axes, Z, strict=True):
             grid = np.array([[values[x, abs(y), z] for x in X] for y in Y])
-            shown = ax.pcolormesh(X, Y, grid, vmin=100.0 if name == "total" else 1, vmax=top, shading="nearest")
+            shown = ax.pcolormesh(
+                X, Y, grid, vmin=100.0 if name == "total" else 1, vmax=top, shading="nearest"
+            )
             ax.set(title=f"z = {z:g} mm", xlabel="x, mm", aspect="equal")
         axes[0].set_ylabel("y, mm")
         figure.colorbar(shown, ax=axes, label=label, shrink=0.9)
@@ -137,13 +162,19 @@ def _maps(result: CaseResult, context: Context, data: Any) -> None:
         figure.savefig(context.folder / file, dpi=100)
         result.pictures.append(
             {"file": file, "alt": f"{label} of the designs for all targets",
-             "caption": f"{label.capitalize()} of the designs, each cell a target. The source's maps are symmetric in y, too."}
+             "caption": f"{label.capitalize()} of the designs, each cell a target."}
         )  # fmt: skip
 
 
 def _optimisers(result: CaseResult, context: Context) -> None:
     """The library against a genetic algorithm and differential evolution on five targets."""
-    some = [(-80.0, 100.0, 0.0), (0.0, 100.0, -10.0), (60.0, 60.0, -5.0), (-60.0, 60.0, 10.0), (-100.0, 0.0, -5.0)]
+    some = [
+        (-80.0, 100.0, 0.0),
+        (0.0, 100.0, -10.0),
+        (60.0, 60.0, -5.0),
+        (-60.0, 60.0, 10.0),
+        (-100.0, 0.0, -5.0),
+    ]
     ways: dict[str, Optimiser] = {
         "genetic algorithm (pymoo)": Genetic(100, 100),
         "the same, polished": Polished(Genetic(100, 100)),
@@ -155,7 +186,8 @@ def _optimisers(result: CaseResult, context: Context) -> None:
         missed = []
         for target in some[: 2 if context.quick else None]:
             found = [
-                way.minimise(ReachPoint(shipped(), n, target=np.array(target)), seed=1, enough=1.0) for n in (1, 2, 3)
+                way.minimise(ReachPoint(shipped(), n, target=np.array(target)), seed=1, enough=1.0)
+                for n in (1, 2, 3)
             ]
             missed.append(min(f.value for f in found if f.allowed))
         result.checks.append(
@@ -169,14 +201,15 @@ def _notes(result: CaseResult, data: Any, seconds: float) -> None:
     n = data["n"].values
     counts = ", ".join(f"{int((n == i).sum())} with {i}" for i in range(1, MOST + 1))
     result.notes.append(
-        f"Designs for targets with y >= 0: {counts} segments; {seconds:.0f} s on {os.cpu_count()} cores. Each is simulated whole, by "
-        "the bars and hinges of the data set, and aimed again where it misses by more than 0.5 mm. Points off the plane are reached "
-        "by what pinches do out of the plane in that model; the consistent formulation hardly leaves it (docs/inverse_design.md)."
+        f"Designs for targets with y >= 0: {counts} segments; {seconds:.0f} s on {os.cpu_count()} cores. Each is "
+        "simulated whole, by the bars and hinges of the data set, and aimed again where it misses by more than 0.5 mm. "
+        "Points off the plane are reached by what pinches do out of the plane in that model; the consistent "
+        "formulation hardly leaves it (docs/inverse_design.md)."
     )
     unclear = int((data["clear"].values == 0.0).sum())
     result.notes.append(
-        f"The source's rule (chords that do not cross in the plane) lets {unclear} of these strips touch themselves in space: their points "
-        "lie on or next to the strip itself."
+        f"The source's rule (chords that do not cross in the plane) lets {unclear} of these strips touch themselves in "
+        "space: their points lie on or next to the strip itself."
     )
     lengths = np.sort(data["total"].values)
     result.plots.append(
@@ -184,5 +217,3 @@ def _notes(result: CaseResult, data: Any, seconds: float) -> None:
              [line("all", np.linspace(0.0, 1.0, len(lengths)).tolist(), lengths.tolist())],
              "Sorted. As in the source nothing asks for short creases; segments are added until a point is reached.")
     )  # fmt: skip
-
-

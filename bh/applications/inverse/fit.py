@@ -57,7 +57,10 @@ def _cut(x: Array) -> Iterator[Array]:
     theta, length = np.split(x, 2)
     for i in range(len(theta)):
         for part in (0.5, 0.1, 0.9):
-            parts = [np.concatenate((v[:i], [part * v[i], (1.0 - part) * v[i]], v[i + 1 :])) for v in (theta, length)]
+            parts = [
+                np.concatenate((v[:i], [part * v[i], (1.0 - part) * v[i]], v[i + 1 :]))
+                for v in (theta, length)
+            ]
             yield np.concatenate(parts)
 
 
@@ -100,7 +103,7 @@ def arc_length(points: ArrayLike) -> float:
 
 
 def curvature(curve: ArrayLike) -> tuple[Array, Array]:
-    """(arc length mm, curvature 1/mm) along a fine polygon (k, 2): the turn at each vertex over the mean edge length."""
+    """(arc length, curvature), mm and 1/mm, of a fine polygon (k, 2): turns at vertices over mean edge lengths."""
     points = np.asarray(curve, dtype=float)
     steps = np.diff(points, axis=0)
     size = np.linalg.norm(steps, axis=1)
