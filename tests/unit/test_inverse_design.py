@@ -102,7 +102,7 @@ def test_strips_in_space() -> None:
     s = shipped()
     k = 0.0105
     assert Swept().meets(s, np.full(3, k), np.full(3, 200.0), np.zeros(3, dtype=bool))
-    helix = np.array([0.0043, 0.0106, 0.0024]), np.array([234.0, 167.0, 214.0]), np.array([True, True, False])
+    helix = np.array([0.0027, 0.0084, 0.0047]), np.array([215.0, 122.0, 284.0]), np.ones(3, dtype=bool)
     assert Projected().measure(s, *(x[None] for x in helix)).tolist() == [1.0]
     assert not Swept().meets(s, *helix)
     points = s.forward(*helix)[0]
@@ -222,7 +222,7 @@ def test_variables_are_the_domain() -> None:
 def test_a_point_is_reached(target: tuple[float, float, float]) -> None:
     """By the whole simulated strip, and its mirror image by the mirrored design."""
     found = Reach()(target)
-    assert found.missed_simulated <= 0.5
+    assert found.missed_simulated <= 1.0
     assert found.clear
     mirrored = found.design.mirrored()
     strip = simulate(mirrored.k0.tolist(), mirrored.length.tolist(), mirrored.pinched.tolist())
