@@ -27,7 +27,7 @@ PATH = ("bh.path", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = (
     "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.offscreen", "bh.warm_up",
-    "bh.accuracy", "bh.advice", "bh.check", "bh.example", "bh.export", "bh.schema",
+    "bh.accuracy", "bh.advice", "bh.check", "bh.design", "bh.example", "bh.export", "bh.schema",
 )  # fmt: skip
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,

@@ -68,6 +68,10 @@ STUDIES = (
     Study("top_down", "4"),
     Study("bottom_up", "4"),
     Study("three_point", "4"),
+    Study("forward", "6"),
+    Study("problem_a", "6"),
+    Study("problem_b", "6"),
+    Study("problem_c", "6", long=True),
 )
 BY_NAME = {study.name: study for study in STUDIES}
 ALL_CASES = tuple(BY_NAME)
