@@ -9,15 +9,22 @@ Profiles of a pinch of length b about its middle (s = 0), as parts of the way fr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.laws import HELD, SHEET
 from meshes import SheetMesh
+from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.actuation import Pinch
+    from bh.ramps import Ramps
 
 Array = NDArray[np.float64]
 Profile = Literal["cosine", "grip"]
@@ -154,53 +161,65 @@ def zone(line: Chain, name: str, at: float, length: float | None) -> float:
     return length
 
 
-def pinched_creases(mesh: SheetMesh, crease: str) -> list[str]:
-    """Names of the creases that a pinch is about: one, or with "all" every mountain and valley that is one line."""
-    if crease != "all":
-        return [crease]
-    names = [name for name in mesh.creases if mesh.folds.get(name) != "flat" and is_chain(mesh, name)]
-    if not names:
-        raise ModelError("pinch of crease 'all': the sheet has no mountain or valley crease")
-    return names
+def pinch(ramps: Ramps, item: Pinch) -> None:
+    """Ask for a pinch, from the angles that the other actuations of its step lead to."""
+    names = [item.crease]
+    if item.crease == "all":
+        folds, mesh = ramps.mesh.folds, ramps.mesh
+        names = [name for name in mesh.creases if folds.get(name) != "flat" and is_chain(mesh, name)]
+        if not names:
+            raise ModelError("pinch of crease 'all': the sheet has no mountain or valley crease")
+    for name in names:
+        _pinch_one(ramps, name, item)
 
 
-def edge_parts(
-    mesh: SheetMesh, crease: str, at: float, length: float | None, profile: str
-) -> tuple[Array, Array]:
-    """Parts (k,) of the edges of a crease in a pinch, in order, and (k, 2) at their lower and their higher node."""
-    line = chain(mesh, crease)
-    part, ends = parts(line, at, zone(line, crease, at, length), profile)
-    pairs = mesh.crease_edges(crease)
-    return part, np.where((pairs[:, 0] > pairs[:, 1])[:, None], ends[:, ::-1], ends)
+def _pinch_one(ramps: Ramps, name: str, item: Pinch) -> None:
+    hinges, sense, _ = ramps.creases(name)
+    line = chain(ramps.mesh, name)
+    part, ends = parts(line, item.at, zone(line, name, item.at, item.length), item.profile)
+    turned = ramps.mesh.crease_edges(name)
+    ends = np.where((turned[:, 0] > turned[:, 1])[:, None], ends[:, ::-1], ends)
+    inside = np.flatnonzero(part > 0.0)
+    rows, part, ends = hinges[inside], part[inside], ends[inside]
+    now, target = ramps.before[rows], item.target(sense)[inside]
+    _check(ramps, name, item, rows, now, target)
+    nominal = now + part * (target - now)
+    wanted = nominal if item.couple is None else part * item.couple
+    for row, angle in zip(rows.tolist(), wanted.tolist(), strict=True):
+        known, other = ramps.claimed.setdefault(row, (angle, item.at))
+        if abs(known - angle) > 1e-9:
+            raise ModelError(
+                f"two pinches of crease '{name}' overlap and contradict each other (at {other:g} and "
+                f"{item.at:g}); keep their zones apart, or pinch one after the other"
+            )
+    if item.couple is not None:
+        ramps.moment[rows] = sense[inside] * wanted
+        return
+    if item.how == "rest":
+        ramps.rest[rows] = nominal
+        ramps.rest_ends[rows] += ends * (target[:, None] - ramps.rest_ends[rows])
+        return
+    ramps.law[rows], ramps.held[rows] = HELD, nominal
+    ramps.pinch.toward[rows], ramps.pinch.part[rows], ramps.pinch.ends[rows] = target, part, ends
+    ramps.pinch.base[rows] = np.where(ramps.folded[rows], now, np.nan)
+    ramps.pinched[rows] = True
 
 
-def check_side(crease: str, now: Array, target: Array) -> None:
-    """A pinch goes on the way that the crease is folded.
-
-    Raises:
-        ModelError: the angles to come (k,) lie on the other side of flat than the present ones.
-    """
-    other = (now - np.pi) * (target - np.pi) < 0.0
+def _check(ramps: Ramps, name: str, item: Pinch, rows: Ints, now: Array, target: Array) -> None:
+    law = ramps.law[rows]
+    if (law == SHEET).any():
+        raise ModelError(
+            f"pinch of crease '{name}': it is ordinary sheet there; fold it before, or in the same step"
+        )
+    if item.how != "imposed" and (law == HELD).any():
+        by = "rest angles" if item.how == "rest" else "couples"
+        raise ModelError(
+            f"pinch of crease '{name}' by {by}: its angle is imposed there and no spring acts; use how = 'imposed'"
+        )
+    other = (now - math.pi) * (target - math.pi) < 0.0
     if other.any():
         angle = float(target[int(np.argmax(other))])
         raise ModelError(
-            f"pinch of crease '{crease}' to {angle:.4g} rad would fold it to its other side; "
-            f"give {2.0 * np.pi - angle:.4g}, or by"
+            f"pinch of crease '{name}' to {angle:.4g} rad would fold it to its other side; "
+            f"give {2.0 * math.pi - angle:.4g}, or by"
         )
-
-
-def claim(
-    claimed: dict[int, tuple[float, float]], crease: str, at: float, rows: NDArray[np.int64], angles: Array
-) -> None:
-    """Enter the angles (k,) that a pinch at `at` wants of some hinges into those of the step.
-
-    Raises:
-        ModelError: another pinch of the step wants another angle of one of them.
-    """
-    for row, angle in zip(rows.tolist(), angles.tolist(), strict=True):
-        known, other = claimed.setdefault(row, (angle, at))
-        if abs(known - angle) > 1e-9:
-            raise ModelError(
-                f"two pinches of crease '{crease}' overlap and contradict each other (at {other:g} and "
-                f"{at:g}); keep their zones apart, or pinch one after the other"
-            )
