@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,9 @@ from bh.supports import RigidBody, Support
 from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.advice import Remark
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,6 +203,13 @@ class Model:
             if letters:
                 model = model.support([node], letters)
         return model
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What the mesh does to the answer with this formulation (`bh.advice`); empty where there is nothing to say."""
+        from bh.advice import remarks
+
+        return remarks(self)
 
     def support(
         self, at: str | Sequence[int], fix: str | Sequence[Sequence[float]] = "xyz", clamp: bool = False

@@ -36,6 +36,7 @@ class SheetMesh:
             None where the mesh has no such directions.
         kind: how it was meshed ("staggered", "alternating", "one-way", "mirrored", "gmsh", "imported", ...).
         aspect_ratio: mean panel height across the crease over width along it (alpha = H / W), or nan.
+        remarks: what was taken for granted when the pattern was read, one line each.
 
     Raises:
         MeshError: indices out of range, degenerate triangles, non-manifold edges, sets that are no edges.
@@ -51,6 +52,7 @@ class SheetMesh:
     spans: Array | None = None
     kind: str = "imported"
     aspect_ratio: float = float("nan")
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=float)

@@ -89,6 +89,7 @@ def structured(
         spans=spans,
         kind=kind,
         aspect_ratio=alpha,
+        remarks=pattern.remarks,
     )
 
 

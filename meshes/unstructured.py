@@ -66,6 +66,7 @@ def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> Sheet
         fold_angles=drawn_angles(pattern, chains),
         curves=curves,
         kind="gmsh",
+        remarks=pattern.remarks,
     )
 
 

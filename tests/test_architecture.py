@@ -19,12 +19,11 @@ HEAVY = ("gmsh", "pyvista", "matplotlib", "skfem", "dask", "pymoo")
 
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.program", "bh.scene", "bh.scene_schema",
-    "bh.describe", "bh.state", "bh.formulations",
+    "bh.advice", "bh.describe", "bh.state", "bh.formulations",
 )  # fmt: skip
 PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = (
-    "bh.advice",
     "bh.check",
     "bh.example",
     "bh.export",
