@@ -23,10 +23,10 @@ from bh.errors import InputError
 from bh.export import FOLDED, write_flat, write_state
 from bh.model import Model
 from bh.path import Path as Trace
-from bh.path import trace
 from bh.progress import ProgressMeter
 from bh.scene import Scene
 from bh.storage import PathFile, reading
+from bh.tracing import trace
 from meshes.io.export import replacing
 
 FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
@@ -63,7 +63,7 @@ def solve(
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
         (folder / names[1]).unlink(missing_ok=True)
     try:
-        path = trace(scene.model, progress=progress, file=file, resume=resume)
+        path = trace(scene.model, progress=progress, file=file, resume=resume, accuracy=scene.accuracy)
     except (InputError, KeyboardInterrupt):
         if not resume and not holds_states(file):
             _take_back(file, made)
@@ -189,10 +189,11 @@ def _move(file: Path, place: Path) -> None:
 
 def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, Any]:
     """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact."""
-    mesh, last = scene.model.mesh, path[-1]
+    model = path.model
+    mesh, last = model.mesh, path[-1]
     folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
     steps = []
-    for number in range(len(scene.model.steps)):
+    for number in range(len(model.steps)):
         records = [record for record in path.records if record.step == number]
         tried = number < len(path.steps)
         steps.append(
@@ -235,7 +236,8 @@ def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, Any]
             "triangles": len(mesh.triangles),
             "aspect_ratio": _number(mesh.aspect_ratio),
         },
-        "formulation": scene.model.formulation,
+        "formulation": model.formulation,
+        "accuracy": path.accuracy.as_dict() if path.accuracy is not None else None,
         "versions": path.provenance["versions"],
         "input": path.provenance["input"],
         "scene": str(scene.source),
@@ -293,7 +295,7 @@ def extras(
     def fold() -> None:
         from meshes.io import write_fold
 
-        mesh, last = scene.model.mesh, path[-1]
+        mesh, last = path.model.mesh, path[-1]
         angles = np.zeros(len(mesh.topology.edges))
         angles[mesh.topology.hinge_edges] = np.pi - last.dihedral_angles
         frame = ("folded", last.points, angles)

@@ -6,7 +6,6 @@ Every error is a `SceneError` of one line. Keys are told as dotted paths; entrie
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,26 +13,33 @@ from typing import Any
 
 import numpy as np
 
-import meshes
-from bh.actuation import Actuation, Fold, Moment
+from bh.actuation import Actuation, Bar, Fold, Moment, Pinch, Tether
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
+from bh.observables import Until
 from bh.program import program
+from bh.refinement import Goal, pattern_of
+from bh.scene_patterns import (
+    LIBRARY,
+    DrawingPattern,
+    FilePattern,
+)
 from bh.scene_schema import (
     ACTUATIONS,
-    LIBRARY,
+    AccuracyTable,
     CreaseTable,
-    DrawingPattern,
     DrawnTable,
-    FilePattern,
     GmshTable,
     MeshTable,
     ModelTable,
     OutputsTable,
     SheetTable,
     SupportTable,
+    UntilTable,
+)
+from bh.scene_tables import (
     as_table,
     as_tables,
     check_keys,
@@ -48,8 +54,9 @@ from bh.scene_schema import (
 from bh.supports import RigidBody, Support, directions, select
 from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
+SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
+COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
 
 
@@ -71,6 +78,7 @@ class Scene:
     Attributes:
         model: checked; its steps can be programmed (`bh.program`), nothing is solved.
         outputs: what a run is to write.
+        accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -79,6 +87,7 @@ class Scene:
     outputs: Outputs
     name: str = "scene"
     source: Path | None = None
+    accuracy: Goal | None = None
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -132,8 +141,23 @@ def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Sce
         raise SceneError(one_line(f"{name}: {error}")) from error
 
 
+def scene_from_tables(tables: dict[str, Any], folder: str | Path = ".", name: str = "scene") -> Scene:
+    """A scene from its tables as `tomllib` reads them: what a sweep changes between points.
+
+    Raises:
+        SceneError: as `parse_scene`.
+    """
+    try:
+        return replace(_from_tables(tables, Path(folder)), name=name)
+    except InputError as error:
+        raise SceneError(one_line(f"{name}: {error}")) from error
+
+
 def _scene(text: str, folder: Path) -> Scene:
-    data = read_toml(text)
+    return _from_tables(read_toml(text), folder)
+
+
+def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
     check_keys("", data, SECTIONS)
     for key in ("pattern", "sheet", "steps"):
         if key not in data:
@@ -144,8 +168,12 @@ def _scene(text: str, folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
+    accuracy = _accuracy(data["accuracy"]) if "accuracy" in data else None
+    how_meshed = data.get("mesh")
+    if accuracy is not None and how_meshed is None and "file" not in as_table(data["pattern"], "pattern"):
+        how_meshed = COARSEST  # only to check the scene on
     model = Model(
-        mesh=_mesh(data["pattern"], data.get("mesh"), folder),
+        mesh=_mesh(data["pattern"], how_meshed, folder),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
@@ -154,7 +182,22 @@ def _scene(text: str, folder: Path) -> Scene:
         hinge_lock=how.hinge_lock,
     )
     _check(model)
-    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}))
+    if accuracy is not None:
+        with within("accuracy"):
+            pattern_of(model)
+            if accuracy.at is not None:
+                model.mesh.nodes(accuracy.at)
+    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy)
+
+
+def _accuracy(data: Any) -> Goal:
+    """A number, or a table."""
+    with within("accuracy"):
+        if not isinstance(data, dict):
+            return Goal(data)
+        table = read_table(AccuracyTable, data, "accuracy")
+        direction = None if table.direction is None else tuple(table.direction)
+        return Goal(table.within, table.of, table.at, direction)  # type: ignore[arg-type]
 
 
 # --- from tables to descriptions ----------------------------------------------------------------------------
@@ -190,7 +233,9 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
     how = _mesh_table(as_table(mesh, "mesh"))
     if isinstance(how, DrawnTable):
         raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
-    return _meshed(_pattern(drawn), how)
+    with within("pattern"):
+        pattern = drawn.draw()
+    return _meshed(pattern, how)
 
 
 def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
@@ -199,7 +244,7 @@ def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
 
         _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
         with within("mesh"):
-            return unstructured(flat, size=how.size, seed=how.seed)
+            return unstructured(flat, size=how.size, near=how.near, growth=how.growth, seed=how.seed)
     if not flat.rails:
         raise SceneError(
             f'mesh.kind = "{how.kind}" is for creases that run across the sheet side by side, or round a hole; '
@@ -220,14 +265,6 @@ def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable | DrawnTable:
             f'mesh.size = {shown(table["size"])} is for kind = "gmsh"; use along or aspect_ratio, or add that kind'
         )
     return read_table(MeshTable, table, "mesh")
-
-
-def _pattern(table: Any) -> CreasePattern:
-    """Of the library: by the function of `meshes` that has the name of the kind."""
-    given = {name: value for name, value in table if name != "kind"}
-    with within("pattern"):
-        drawn: CreasePattern = getattr(meshes, table.kind)(folds=given.pop("fold"), **given)
-        return drawn
 
 
 def _mesh_from_file(table: dict[str, Any], mesh: Any, folder: Path) -> SheetMesh:
@@ -269,8 +306,9 @@ def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
     along = float(how.along or 0)
     if how.aspect_ratio is not None:
         length = max(rail.length for rail in pattern.rails)
-        inner, outer = (rail.point(np.zeros(1))[0] for rail in (pattern.rails[0], pattern.rails[-1]))
-        height = math.dist(inner, outer) / panels
+        # at one end and in the middle: panels can taper
+        inner, outer = (rail.point(np.array([0.0, 0.5])) for rail in (pattern.rails[0], pattern.rails[-1]))
+        height = float(np.linalg.norm(outer - inner, axis=1).max()) / panels
         along = how.aspect_ratio * length / height * how.rows
     _check_triangles(2.0 * along * how.rows * panels)
 
@@ -302,18 +340,29 @@ def _crease(item: Any, at: str) -> CreaseLaw:
         return CreaseLaw(table.Lstar, table.stiffness, table.rest)
 
 
-def _step(item: Any, at: str) -> tuple[Actuation, ...]:
+def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
     step = as_table(item, at)
-    if "pinch" in step:
-        raise SceneError(f"{at}.pinch: this version cannot pinch yet; use fold, moment, force or displace")
-    check_keys(at, step, ACTUATIONS)
-    if not step:
+    check_keys(at, step, (*ACTUATIONS, "until"))
+    if not set(step) - {"until"}:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
-    found: list[Actuation] = []
+    found: list[Actuation | Until] = []
     for key, value in step.items():
+        if key == "until":
+            found.append(_until(value, f"{at}.until"))
+            continue
         for where, each in one_or_more(value, f"{at}.{key}"):
             found.append(_actuation(key, each, where))
     return tuple(found)
+
+
+def _until(item: Any, at: str) -> Until:
+    table = read_table(UntilTable, item, at)
+    with within(at):
+        if table.depth is not None:
+            return Until("depth", table.depth, tolerance=table.tolerance)
+        assert table.observable is not None
+        assert table.value is not None
+        return Until(table.observable, table.value, table.of, table.tolerance)
 
 
 def _actuation(key: str, item: Any, at: str) -> Actuation:
@@ -344,8 +393,10 @@ def _check(model: Model) -> None:
                 select(mesh, support.at)
     for i, actuations in enumerate(model.steps):
         for item in actuations:
+            if isinstance(item, Until | Bar | Tether):
+                continue
             key = type(item).__name__.lower()
-            if isinstance(item, Fold | Moment):
+            if isinstance(item, Fold | Moment | Pinch):
                 if item.crease != "all":
                     with within(f"steps[{i}].{key}.crease"):
                         mesh.crease_edges(item.crease)

@@ -6,13 +6,15 @@ from collections.abc import Iterable
 from typing import Any
 
 from bh import scene_schema as tables
+from bh.scene_patterns import LIBRARY, DrawingPattern, FilePattern
+from bh.scene_tables import Table
 
-SINGLE: dict[str, type[tables.Table]] = {
+SINGLE: dict[str, type[Table]] = {
     "sheet": tables.SheetTable,
     "model": tables.ModelTable,
     "outputs": tables.OutputsTable,
 }
-MESHES: tuple[type[tables.Table], ...] = (tables.MeshTable, tables.GmshTable, tables.DrawnTable)
+MESHES: tuple[type[Table], ...] = (tables.MeshTable, tables.GmshTable, tables.DrawnTable)
 
 
 def schema() -> dict[str, Any]:
@@ -21,13 +23,15 @@ def schema() -> dict[str, Any]:
     What only fits together with other values (places, widths and radii, one of two keys) is told by `bh check`.
     """
     found: dict[str, Any] = {}
-    patterns: list[type[tables.Table]] = [*tables.LIBRARY.values(), tables.FilePattern, tables.DrawingPattern]
+    patterns: list[type[Table]] = [*LIBRARY.values(), FilePattern, DrawingPattern]
     steps = {key: _one_or_more(_table(found, kind)) for key, kind in tables.ACTUATIONS.items()}
+    steps["until"] = _table(found, tables.UntilTable)
     scene = {
         "pattern": _any(found, patterns),
         **{name: _table(found, kind) for name, kind in SINGLE.items()},
         "mesh": _any(found, MESHES),
         "supports": {"type": "array", "items": _table(found, tables.SupportTable)},
+        "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
         "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},
         "steps": {
             "type": "array",
@@ -51,7 +55,7 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _table(found: dict[str, Any], kind: type[tables.Table]) -> dict[str, Any]:
+def _table(found: dict[str, Any], kind: type[Table]) -> dict[str, Any]:
     """A reference to the schema of a table, which is put into `found`."""
     if kind.__name__ not in found:
         own = kind.model_json_schema(ref_template="#/$defs/{model}")
@@ -60,7 +64,7 @@ def _table(found: dict[str, Any], kind: type[tables.Table]) -> dict[str, Any]:
     return {"$ref": f"#/$defs/{kind.__name__}"}
 
 
-def _any(found: dict[str, Any], kinds: Iterable[type[tables.Table]]) -> dict[str, Any]:
+def _any(found: dict[str, Any], kinds: Iterable[type[Table]]) -> dict[str, Any]:
     return {"anyOf": [_table(found, kind) for kind in kinds]}
 
 

@@ -1,4 +1,4 @@
-"""The fixed pattern that element matrices of the shell are added into; see `fem.components` for their 30 components."""
+"""The fixed pattern that element matrices of the shell are added into; see `fem.components` for theirs."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from numpy.typing import NDArray
 from bh.solvers.matrices import Storage, reverse_cuthill_mckee
 from bh.solvers.sparse import SparsePattern, band_is_cheaper
 from fem.points import OPTIONS
-from meshes.curved import QuadraticMesh
+from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
-LOWER = np.tril_indices(30)
 
 
 @njit(**OPTIONS)
 def turn_blocks(K, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
-    """Rows and columns of nodes with local axes into those axes; K (t, 24, 24)."""
+    """Rows and columns of nodes with local axes into those axes; K (t, w, w)."""
     row = np.empty(3)
+    width = K.shape[1]
     for e in range(len(nodes)):
-        for i in range(6):
+        for i in range(nodes.shape[1]):
             f = frame_of[nodes[e, i]]
             if f < 0:
                 continue
-            for j in range(24):
+            for j in range(width):
                 for a in range(3):
                     row[a] = 0.0
                     for b in range(3):
                         row[a] += frames[f, a, b] * K[e, 3 * i + b, j]
                 for a in range(3):
                     K[e, 3 * i + a, j] = row[a]
-            for j in range(24):
+            for j in range(width):
                 for a in range(3):
                     row[a] = 0.0
                     for b in range(3):
@@ -45,17 +45,18 @@ def turn_blocks(K, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def scatter(K, sides, slots, data):  # type: ignore[no-untyped-def]
-    """Add element matrices (t, 24, 24) by positions and gamma = +-alpha + beta / 2 to the values `data`."""
-    source = np.empty(30, dtype=np.int64)
-    factor = np.ones(30)
-    for i in range(30):
-        source[i] = i if i < 24 else i - 6
+    """Add element matrices (t, w, w) by positions and gamma = +-alpha + beta / 2 to `data`; sides (t, 3 r)."""
+    width, turns = K.shape[1], sides.shape[1]
+    source = np.empty(width + turns, dtype=np.int64)
+    factor = np.ones(width + turns)
+    for i in range(width + turns):
+        source[i] = i if i < width else i - turns
     for e in range(len(K)):
-        for i in range(6):
-            factor[18 + i] = sides[e, i // 2]
-            factor[24 + i] = 0.5
+        for i in range(turns):
+            factor[width - turns + i] = sides[e, i]
+            factor[width + i] = 0.5
         at = 0
-        for i in range(30):
+        for i in range(width + turns):
             for j in range(i + 1):
                 slot = slots[e, at]
                 if slot >= 0:
@@ -65,12 +66,12 @@ def scatter(K, sides, slots, data):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Pattern(Storage):
-    """Where the lower entries of all element matrices (t, 465) go; -1 in `slots` where a component is prescribed."""
+    """Where the lower entries of all element matrices go; -1 in `slots` where a component is prescribed."""
 
     slots: Ints
 
 
-def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
+def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
     """Pattern of the unknowns `number` (all components, -1 if prescribed); unknowns of a node and of its edge stay
     together.
 
@@ -78,8 +79,8 @@ def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints, banded: b
     """
     owner = _owners(mesh, components, number)
     free = np.flatnonzero(number >= 0)
-    sizes = np.bincount(owner[free], minlength=len(mesh.nodes))
-    used = np.flatnonzero(sizes)  # nodes with unknowns
+    sizes = np.bincount(owner[free], minlength=len(mesh.places))
+    used = np.flatnonzero(sizes)  # places with unknowns
     vertex = np.full(len(sizes), -1, dtype=np.int64)
     vertex[used] = np.arange(len(used))
     by_node = free[np.argsort(owner[free], kind="stable")]  # components node by node
@@ -91,27 +92,30 @@ def build_pattern(mesh: QuadraticMesh, components: Ints, number: Ints, banded: b
         inside = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
         return number[by_node[np.repeat(starts[nodes], length) + inside]]
 
-    high, low = _pairs(vertex[mesh.triangles], len(used))
+    high, low = _pairs(vertex[mesh.carriers], len(used))
     order = unknowns(reverse_cuthill_mckee(high, low, len(used))[0])
     rows = _rows(components, number, order)
     reach = rows.max(axis=1) - np.where(rows >= 0, rows, len(order)).min(axis=1)
     bandwidth = int(reach.max(initial=0))
     if band_is_cheaper(len(order), bandwidth) if banded is None else banded:
-        a, b = rows[:, LOWER[0]], rows[:, LOWER[1]]
+        lower = np.tril_indices(rows.shape[1])
+        a, b = rows[:, lower[0]], rows[:, lower[1]]
         column = np.minimum(a, b)
         slots = np.where(column >= 0, np.abs(a - b) + column * (bandwidth + 1), -1)
         return Pattern(order, bandwidth, (bandwidth + 1) * len(order), None, slots)
-    sparse, _ = SparsePattern.dissected(high, low, sizes[used], mesh.nodes[used, :2], unknowns)
+    sparse, _ = SparsePattern.dissected(high, low, sizes[used], mesh.places[used, :2], unknowns)
     slots = _sparse_slots(_rows(components, number, sparse.order), sparse.indptr, sparse.indices)
     return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, slots)
 
 
-def _owners(mesh: QuadraticMesh, components: Ints, number: Ints) -> Ints:
-    """Node that each component belongs to: rotations go with the middle node of their edge."""
+def _owners(mesh: ElementMesh, components: Ints, number: Ints) -> Ints:
+    """Place that each component belongs to, which is a node or, for rotations, an edge."""
     owner = np.zeros(len(number), dtype=np.int64)
-    local = np.concatenate((np.repeat(np.arange(6), 3), np.tile(np.repeat([3, 4, 5], 2), 2)))
+    nodes = mesh.triangles.shape[1]
+    turns = (components.shape[1] - 3 * nodes) // 6
+    local = np.concatenate((np.repeat(np.arange(nodes), 3), np.tile(np.repeat([3, 4, 5], turns), 2)))
     used = components >= 0
-    owner[components[used]] = mesh.triangles[:, local][used]
+    owner[components[used]] = mesh.carriers[:, local][used]
     return owner
 
 
@@ -125,7 +129,7 @@ def _pairs(triangles: Ints, count: int) -> tuple[Ints, Ints]:
 
 
 def _rows(components: Ints, number: Ints, order: Ints) -> Ints:
-    """(t, 30) row of every component of an element, -1 if it is prescribed or missing."""
+    """(t, 3 n + 6 r) row of every component of an element, -1 if it is prescribed or missing."""
     position = np.empty(len(order) + 1, dtype=np.int64)
     position[order], position[-1] = np.arange(len(order)), -1
     return position[np.where(components >= 0, number[components], -1)]

@@ -1,9 +1,9 @@
 """All components of the shell in one vector, prescribed ones included, and what an element sees of them.
 
-Displacements of all nodes in local axes (mm), two rotations alpha an edge and two fold angles beta a creased edge
-(rad; at the lower and the higher node). An element sees 30 of them: 18 displacements, 6 alpha, 6 beta (-1 where its
-edge is not creased), and works with 24: its positions and the rotations gamma = +-alpha + beta / 2 of its side of its
-edges.
+Displacements of all nodes in local axes (mm), r rotations alpha an edge and r fold angles beta a creased edge (rad).
+r = 2 with quadratic positions: values at the lower and the higher node; r = 1 with linear positions: constant. An
+element of n nodes sees 3 n displacements, 3 r alpha and 3 r beta (-1 where its edge is not creased), and works with its
+positions and the rotations gamma = +-alpha + beta / 2 of its side of its edges.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Components:
         begin: (k,) their values in the state that the step begins with; prescribed: their values at lambda, where they
             are prescribed.
         free: (n,) components that are unknowns; number: (k,) unknown of each component, -1 if prescribed.
-        of_element: (t, 30) see the module.
-        sides: (t, 6) +-1 of alpha in gamma.
-        first_alpha, first_beta: where rotations and fold angles begin.
+        of_element: (t, 3 n + 6 r) see the module.
+        sides: (t, 3 r) +-1 of alpha in gamma.
+        first_alpha, first_beta: where rotations and fold angles begin; rotations: r.
     """
 
     reference: Array
@@ -48,6 +48,7 @@ class Components:
     sides: Array
     first_alpha: int
     first_beta: int
+    rotations: int
 
     @property
     def rate(self) -> Array:
@@ -63,12 +64,12 @@ class Components:
         return out
 
     def alpha(self, components: Array) -> Array:
-        """(e, 2) rotations of edges relative to the frames of the step."""
-        return components[self.first_alpha : self.first_beta].reshape(-1, 2)
+        """(e, r) rotations of edges relative to the frames of the step."""
+        return components[self.first_alpha : self.first_beta].reshape(-1, self.rotations)
 
     def beta(self, components: Array) -> Array:
-        """(c, 2) fold angles of creased edges."""
-        return components[self.first_beta :].reshape(-1, 2)
+        """(c, r) fold angles of creased edges."""
+        return components[self.first_beta :].reshape(-1, self.rotations)
 
     def moves(self, components: Array) -> Array:
         """(n, 3) displacements in global axes, mm."""
@@ -86,23 +87,30 @@ class Components:
     def to_local(self, vectors: Array) -> Array:
         return local_axes(self.constraints, vectors)
 
+    @property
+    def turns_of_element(self) -> tuple[Ints, Ints]:
+        """(t, 3 r) components alpha and beta of every element."""
+        first, size = 3 * self.nodes.shape[1], 3 * self.rotations
+        return self.of_element[:, first : first + size], self.of_element[:, first + size :]
+
     def gather(self, components: Array) -> Array:
-        """(t, 24) displacements in global axes and side rotations of every element."""
-        moves = self.moves(components)[self.nodes].reshape(-1, 18)
-        alpha, beta = self.of_element[:, 18:24], self.of_element[:, 24:]
+        """(t, 3 n + 3 r) displacements in global axes and side rotations of every element."""
+        moves = self.moves(components)[self.nodes].reshape(len(self.nodes), -1)
+        alpha, beta = self.turns_of_element
         gamma = components[alpha] * self.sides + 0.5 * np.where(beta >= 0, components[beta], 0.0)
         return np.hstack((moves, gamma))
 
     def spread(self, element: Array) -> Array:
-        """(k,) element vectors (t, 24) added up: the transposed of `gather`."""
+        """(k,) element vectors (t, 3 n + 3 r) added up: the transposed of `gather`."""
+        moves = 3 * self.nodes.shape[1]
         x = np.empty_like(self.reference)
         for axis in range(3):
-            pull = element[:, axis:18:3].ravel()
+            pull = element[:, axis:moves:3].ravel()
             x[:, axis] = np.bincount(self.nodes.ravel(), pull, minlength=len(x))
-        alpha, beta = self.of_element[:, 18:24], self.of_element[:, 24:]
+        alpha, beta = self.turns_of_element
         used = beta >= 0
         rows = np.concatenate((alpha.ravel(), beta[used]))
-        values = np.concatenate(((element[:, 18:] * self.sides).ravel(), 0.5 * element[:, 18:][used]))
+        values = np.concatenate(((element[:, moves:] * self.sides).ravel(), 0.5 * element[:, moves:][used]))
         out: Array = np.bincount(rows, values, minlength=len(self.number)).astype(float)
         out[: self.first_alpha] = self.to_local(x).ravel()
         return out
@@ -127,17 +135,18 @@ def lay_out(
     beta: Array,
     clamped: Ints,
 ) -> Components:
-    """Number the components of a step that begins at `positions` (n, 3) and fold angles `beta` (m, 2) of all hinges.
+    """Number the components of a step that begins at `positions` (n, 3) and fold angles `beta` (m, r) of all hinges.
 
     Raises:
         ModelError: nothing is free.
     """
     mesh = elements.mesh
     nodes, edges = len(mesh.nodes), len(elements.lengths)
-    still = np.zeros((edges, 2), dtype=bool)
+    turns = elements.tables.rotations
+    still = np.zeros((edges, turns), dtype=bool)
     still[clamped] = True
-    fixed = np.concatenate((constraints.fixed.ravel(), still.ravel(), np.repeat(creases.held, 2)))
-    none = np.zeros(2 * edges)
+    fixed = np.concatenate((constraints.fixed.ravel(), still.ravel(), np.repeat(creases.held, turns)))
+    none = np.zeros(turns * edges)
     displacement = local_axes(constraints, positions - mesh.nodes).ravel()
     begin = np.concatenate((displacement, none, beta[creases.hinges].ravel()))
     given = np.concatenate((constraints.start.ravel(), none, creases.angle.start.ravel()))
@@ -157,22 +166,28 @@ def lay_out(
         free=free,
         number=number,
         of_element=_of_element(elements, creases),
-        sides=np.repeat(elements.loops.sides, 2, axis=1),
+        sides=np.repeat(elements.loops.sides, turns, axis=1),
         first_alpha=3 * nodes,
-        first_beta=3 * nodes + 2 * edges,
+        first_beta=3 * nodes + turns * edges,
+        rotations=turns,
     )
 
 
 def _of_element(elements: ShellElements, creases: Connectors) -> Ints:
-    """(t, 30) components of every element; the two ends of edge j are corners j + 1 and j + 2."""
+    """(t, 3 n + 6 r) components of every element; the two ends of edge j are corners j + 1 and j + 2."""
     nodes, edges, sides = elements.mesh.triangles, elements.loops.edges, elements.loops.sides
-    x = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 18)
+    turns = elements.tables.rotations
+    x = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
     first = 3 * len(elements.mesh.nodes)
-    high = np.stack((sides < 0, sides > 0), axis=-1)  # is this end the higher node of the edge
-    alpha = first + 2 * edges[:, :, None] + high
+    # of two values on an edge: is this end its higher node
+    which = (
+        np.stack((sides < 0, sides > 0), axis=-1) if turns == 2 else np.zeros((*sides.shape, 1), dtype=int)
+    )
+    alpha = first + turns * edges[:, :, None] + which
     crease = creases.of_edge[edges][:, :, None]
-    beta = np.where(crease >= 0, first + 2 * len(creases.of_edge) + 2 * crease + high, -1)
-    return np.hstack((x, alpha.reshape(-1, 6), beta.reshape(-1, 6))).astype(np.int64)
+    beta = np.where(crease >= 0, first + turns * len(creases.of_edge) + turns * crease + which, -1)
+    size = 3 * turns
+    return np.hstack((x, alpha.reshape(-1, size), beta.reshape(-1, size))).astype(np.int64)
 
 
 def edge_set(mesh: SheetMesh, name: str) -> Ints:

@@ -1,4 +1,5 @@
-"""Creases of the shell: a fold angle beta between the two sides of an edge, linear along it.
+"""Creases of the shell: a fold angle beta between the two sides of an edge, linear along it (r = 2 values, at the lower
+and the higher node), or constant where positions are linear (r = 1).
 
 The side rotations of an edge are gamma = +-alpha + beta / 2 (+ for the triangle on its left), alpha the rotation of
 the edge and beta the fold angle pi - phi, positive where the sides drop away from the crease (a mountain). Ordinary
@@ -25,7 +26,7 @@ from bh.model import Model
 from bh.program import HELD, SHEET, SPRING, StepProgram
 from fem.shell import edge_tangents
 from fem.spaces import tables
-from meshes.curved import QuadraticMesh
+from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -33,14 +34,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Connectors:
-    """Creased edges of one step; c of them, two values of beta each (at the lower and the higher node), rad.
+    """Creased edges of one step; c of them, r values of beta each, rad.
 
     Attributes:
         hinges: (c,) rows of `mesh.topology.hinges`; edges: (c,) of `mesh.topology.edges`.
         of_edge: (e,) row of a creased edge, -1 elsewhere.
-        held: (c,) True where beta is imposed; `angle` (c, 2) what is imposed.
-        mass: (c, 2, 2) int of the products of beta's shape functions, mm.
-        stiffness: (c,) k_f a length, N mm / (mm rad); rest: (c, 2) beta_R; moment: (c,) couple a length, N.
+        held: (c,) True where beta is imposed; `angle` (c, r) what is imposed.
+        mass: (c, r, r) int of the products of beta's shape functions, mm.
+        stiffness: (c,) k_f a length, N mm / (mm rad); rest: (c, r) beta_R; moment: (c,) couple a length, N.
     """
 
     hinges: Ints
@@ -67,7 +68,7 @@ class Connectors:
         return -float(np.einsum("c,cij,cj->", self.moment.at(lam), self.mass, beta))
 
     def gradient(self, beta: Array, lam: float) -> Array:
-        """(c, 2) derivative of both by beta, N mm."""
+        """(c, r) derivative of both by beta, N mm."""
         turn = self.stiffness[:, None] * (beta - self.rest.at(lam)) - self.moment.at(lam)[:, None]
         out: Array = np.einsum("cij,cj->ci", self.mass, turn)
         return out
@@ -80,7 +81,7 @@ class Connectors:
         return float(max(spring, load))
 
     def gradient_rate(self) -> Array:
-        """(c, 2) derivative of `gradient` by lambda."""
+        """(c, r) derivative of `gradient` by lambda."""
         turn = -self.stiffness[:, None] * self.rest.rate - self.moment.rate[:, None]
         out: Array = np.einsum("cij,cj->ci", self.mass, turn)
         return out
@@ -93,9 +94,9 @@ class Connectors:
 
 
 def connectors(
-    mesh: QuadraticMesh, model: Model, program: StepProgram, beta: Array, couple: Array
+    mesh: ElementMesh, model: Model, program: StepProgram, beta: Array, couple: Array
 ) -> Connectors:
-    """Creased edges of a step that begins with fold angles beta (m, 2) and couples on them (m, 2), N mm / rad.
+    """Creased edges of a step that begins with fold angles beta (m, r) and couples on them (m, r), N mm / rad.
 
     Raises:
         ModelError: a couple acts where there is no crease to turn.
@@ -111,29 +112,27 @@ def connectors(
     edges = topology.hinge_edges[hinges]
     of_edge = np.full(len(topology.edges), -1, dtype=np.int64)
     of_edge[edges] = np.arange(len(edges))
-    table = tables()
-    shape = np.column_stack((1.0 - table.s, table.s))
+    table = tables(mesh.degree)
+    turns = table.rotations
     speed = np.linalg.norm(edge_tangents(mesh, mesh.nodes), axis=-1)
-    mass = np.einsum("p,cp,pi,pj->cij", table.edge_weights, speed[edges], shape, shape)
+    mass = np.einsum("p,cp,ip,jp->cij", table.edge_weights, speed[edges], table.turn, table.turn)
     held = program.law[hinges] == HELD
     stiffness = np.where(program.law == SPRING, program.stiffness, 0.0)[hinges]
 
     def fold(angles: Array) -> Array:
-        """(c, 2) fold angles of dihedral angles (m,)."""
-        return np.repeat(math.pi - angles[hinges], 2).reshape(-1, 2)
+        """(c, r) fold angles of dihedral angles (m, 2) at the ends of edges, or (m,) of whole edges."""
+        out: Array = (math.pi - angles[hinges]).reshape(-1, turns)
+        return out
 
     begin = beta[hinges]
-    angle = Ramp(
-        np.where(
-            held[:, None], np.where(np.isnan(fold(program.held.start)), begin, fold(program.held.start)), 0.0
-        ),
-        np.where(held[:, None], fold(program.held.end), 0.0),
-    )
+    imposed = program.held_angles(math.pi - (beta if turns == 2 else beta[:, 0]))
+    springs = program.rest_ends if turns == 2 else program.rest
+    angle = Ramp(*(np.where(held[:, None], fold(at), 0.0) for at in (imposed.start, imposed.end)))
     # a held crease that is released keeps its moment: k (rest - beta) is what the crease carried
     turn = np.linalg.solve(mass, couple[hinges][..., None])[..., 0]
     released = begin + turn / np.where(stiffness > 0.0, stiffness, np.inf)[:, None]
-    start = fold(program.rest.start)
-    rest = Ramp(np.where(np.isnan(start), released, start), fold(program.rest.end))
+    start = fold(springs.start)
+    rest = Ramp(np.where(np.isnan(start), released, start), fold(springs.end))
     load = Ramp(
         np.where(held, 0.0, program.moment.start[hinges]), np.where(held, 0.0, program.moment.end[hinges])
     )

@@ -31,10 +31,11 @@ class Frames(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """Arrays of the element loops; t triangles, q points inside, p points on an edge (tables: `fem.spaces.Tables`).
+    """Arrays of the element loops; t triangles of n nodes, q points inside, p points on an edge (tables:
+    `fem.spaces.Tables`). q is zero where the shapes are linear, which do not bend inside.
 
     Attributes:
-        nodes: (t, 6); edges: (t, 3) edge of the topology opposite each corner; sides: +1. where it runs
+        nodes: (t, n); edges: (t, 3) edge of the topology opposite each corner; sides: +1. where it runs
             counter-clockwise, else -1.
         inside: (t, q) weight over Jacobian; rim: (t, 3, p) weight over length of the edge's tangent.
     """
@@ -45,19 +46,19 @@ class Loops(NamedTuple):
     inside: Array
     rim: Array
     Q: Array
-    bary: Array
+    factors: Array
     slopes: Array
     bend: Array
     S: Array
     along: Array
     across: Array
-    s: Array
+    turn: Array
 
 
 @njit(**OPTIONS)
 def _gather(x, nodes, out):  # type: ignore[no-untyped-def]
     """Positions of an element relative to its first node, which keeps rounding off large coordinates."""
-    for i in range(6):
+    for i in range(len(nodes)):
         for c in range(3):
             out[i, c] = x[nodes[i], c] - x[nodes[0], c]
 
@@ -66,7 +67,7 @@ def _gather(x, nodes, out):  # type: ignore[no-untyped-def]
 def _edge_point(xe, loops, frames, e, j, q, tau, c, t, d):  # type: ignore[no-untyped-def]
     """Tangent, transversal and frame of point q on edge j of element e, as this side of the edge sees them."""
     sign, edge = loops.sides[e, j], loops.edges[e, j]
-    at = q if sign > 0.0 else len(loops.s) - 1 - q
+    at = q if sign > 0.0 else loops.turn.shape[1] - 1 - q
     combine(loops.along[j, q], xe, tau)
     combine(loops.across[j, q], xe, c)
     for i in range(3):
@@ -76,27 +77,27 @@ def _edge_point(xe, loops, frames, e, j, q, tau, c, t, d):  # type: ignore[no-un
 
 @njit(**OPTIONS)
 def measures(x, gamma, loops, frames, strain, curvature):  # type: ignore[no-untyped-def]
-    """Generalised strains (t, 9) and curvatures (t, 9) of all elements; see `fem.shell` for the arguments."""
-    xe, gram = np.empty((6, 3)), np.empty((6, 6))
+    """Generalised strains (t, 3 m) and curvatures (t, 3 m) of all elements; see `fem.shell` for the arguments."""
+    n, own, turns = loops.nodes.shape[1], loops.factors.shape[2], len(loops.turn)
+    xe, gram = np.empty((n, 3)), np.empty((n, n))
     p, r, N, second = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
     tau, c, t, d, g = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((2, 3))
-    s = loops.s
-    points = len(s)
+    points = loops.turn.shape[1]
     for e in range(len(loops.nodes)):
         _gather(x, loops.nodes[e], xe)
-        for i in range(6):
-            for j in range(6):
+        for i in range(n):
+            for j in range(n):
                 gram[i, j] = dot(xe[i], xe[j])
-        for k in range(9):
+        for k in range(3 * own):
             total = 0.0
-            for i in range(6):
-                for j in range(6):
+            for i in range(n):
+                for j in range(n):
                     total += loops.Q[k, i, j] * gram[i, j]
             strain[e, k] = 0.5 * total
             curvature[e, k] = 0.0
         for b in range(3):
             combine(loops.bend[:, b], xe, second[b])
-        for q in range(len(loops.bary)):
+        for q in range(loops.inside.shape[1]):
             combine(loops.slopes[q, :, 0], xe, p)
             combine(loops.slopes[q, :, 1], xe, r)
             cross(p, r, N)
@@ -105,36 +106,39 @@ def measures(x, gamma, loops, frames, strain, curvature):  # type: ignore[no-unt
                 bent = 0.0
                 for b in range(3):
                     bent += loops.S[j, b] * dot(N, second[b])
-                for k in range(3):
-                    curvature[e, 3 * j + k] += scale * bent * loops.bary[q, (j + 1 + k) % 3]
+                for k in range(own):
+                    curvature[e, own * j + k] += scale * bent * loops.factors[q, j, k]
         for j in range(3):
             for q in range(points):
                 _edge_point(xe, loops, frames, e, j, q, tau, c, t, d)
-                turn = edge_angle(tau, c, t, d, g) - (1.0 - s[q]) * gamma[e, j, 0] - s[q] * gamma[e, j, 1]
-                curvature[e, 3 * j] -= loops.rim[e, j, q] * (1.0 - s[q]) * turn
-                curvature[e, 3 * j + 1] -= loops.rim[e, j, q] * s[q] * turn
+                turn = edge_angle(tau, c, t, d, g)
+                for k in range(turns):
+                    turn -= loops.turn[k, q] * gamma[e, j, k]
+                for k in range(turns):
+                    curvature[e, own * j + k] -= loops.rim[e, j, q] * loops.turn[k, q] * turn
 
 
 @njit(**OPTIONS)
 def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
-    """B (t, 18, 24): derivatives of strains, then curvatures, by 18 positions and 6 side rotations gamma."""
-    xe = np.empty((6, 3))
+    """B (t, 6 m, 3 n + 3 r): derivatives of strains, then curvatures, by positions and side rotations gamma."""
+    n, own, turns = loops.nodes.shape[1], loops.factors.shape[2], len(loops.turn)
+    first = 3 * own
+    xe = np.empty((n, 3))
     p, r, N, second = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
     tau, c, t, d, g = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((2, 3))
-    by_p, by_r, y, rate = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 18))
-    s = loops.s
-    points = len(s)
+    by_p, by_r, y, rate = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3 * n))
+    points = loops.turn.shape[1]
     for e in range(len(loops.nodes)):
         B[e] = 0.0
         _gather(x, loops.nodes[e], xe)
-        for k in range(9):
-            for i in range(6):
-                for j in range(6):
+        for k in range(3 * own):
+            for i in range(n):
+                for j in range(n):
                     for b in range(3):
                         B[e, k, 3 * i + b] += loops.Q[k, i, j] * xe[j, b]
         for b in range(3):
             combine(loops.bend[:, b], xe, second[b])
-        for q in range(len(loops.bary)):
+        for q in range(loops.inside.shape[1]):
             combine(loops.slopes[q, :, 0], xe, p)
             combine(loops.slopes[q, :, 1], xe, r)
             cross(p, r, N)
@@ -145,7 +149,7 @@ def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
                     y[i] = (second[b, i] - lift * N[i]) / size
                 cross(r, y, by_p)  # y . (dp x r) = dp . (r x y)
                 cross(y, p, by_r)
-                for i in range(6):
+                for i in range(n):
                     for k in range(3):
                         rate[b, 3 * i + k] = loops.inside[e, q] * (
                             loops.bend[i, b] * N[k] / size
@@ -153,32 +157,32 @@ def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
                             + loops.slopes[q, i, 1] * by_r[k]
                         )
             for j in range(3):
-                for i in range(18):
+                for i in range(3 * n):
                     value = (
                         loops.S[j, 0] * rate[0, i] + loops.S[j, 1] * rate[1, i] + loops.S[j, 2] * rate[2, i]
                     )
-                    for k in range(3):
-                        B[e, 9 + 3 * j + k, i] += loops.bary[q, (j + 1 + k) % 3] * value
+                    for k in range(own):
+                        B[e, first + own * j + k, i] += loops.factors[q, j, k] * value
         for j in range(3):
             for q in range(points):
                 _edge_point(xe, loops, frames, e, j, q, tau, c, t, d)
                 edge_angle(tau, c, t, d, g)
-                for k in range(2):
-                    part = loops.rim[e, j, q] * (s[q] if k else 1.0 - s[q])
-                    for i in range(6):
+                for k in range(turns):
+                    part = loops.rim[e, j, q] * loops.turn[k, q]
+                    for i in range(n):
                         for b in range(3):
-                            B[e, 9 + 3 * j + k, 3 * i + b] -= part * (
+                            B[e, first + own * j + k, 3 * i + b] -= part * (
                                 loops.along[j, q, i] * g[0, b] + loops.across[j, q, i] * g[1, b]
                             )
-                    B[e, 9 + 3 * j + k, 18 + 2 * j] += part * (1.0 - s[q])
-                    B[e, 9 + 3 * j + k, 19 + 2 * j] += part * s[q]
+                    for m in range(turns):
+                        B[e, first + own * j + k, 3 * n + turns * j + m] += part * loops.turn[m, q]
 
 
 @njit(inline="always", **OPTIONS)
 def _add_block(K, a, b, H, symmetric_pair):  # type: ignore[no-untyped-def]
-    """K (18, 18) += a_i b_j H, and its transposed if the pair of arguments is not the same."""
-    for i in range(6):
-        for j in range(6):
+    """K (3 n, 3 n) += a_i b_j H, and its transposed if the pair of arguments is not the same."""
+    for i in range(len(a)):
+        for j in range(len(b)):
             w = a[i] * b[j]
             if w != 0.0:
                 for k in range(3):
@@ -190,35 +194,35 @@ def _add_block(K, a, b, H, symmetric_pair):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
-    """K (t, 24, 24) += sum over the 18 element forces (t, 18) of force times second derivatives of its measure."""
-    xe = np.empty((6, 3))
-    p, r, y, weights = np.empty(3), np.empty(3), np.empty(3), np.empty(6)
+    """K += sum over the element forces (t, 6 m) of force times second derivatives of its measure by positions."""
+    n, own, turns = loops.nodes.shape[1], loops.factors.shape[2], len(loops.turn)
+    xe = np.empty((n, 3))
+    p, r, y, weights = np.empty(3), np.empty(3), np.empty(3), np.empty(n)
     tau, c, t, d = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     H, G, T = np.empty((3, 3, 3, 3)), np.empty((2, 2, 3, 3)), np.empty((3, 3))
-    block = np.empty((18, 18))
-    s = loops.s
-    points = len(s)
+    block = np.empty((3 * n, 3 * n))
+    points = loops.turn.shape[1]
     for e in range(len(loops.nodes)):
         _gather(x, loops.nodes[e], xe)
         block[:] = 0.0
-        for i in range(6):
-            for j in range(6):
+        for i in range(n):
+            for j in range(n):
                 total = 0.0
-                for k in range(9):
+                for k in range(3 * own):
                     total += forces[e, k] * loops.Q[k, i, j]
                 for b in range(3):
                     block[3 * i + b, 3 * j + b] += total
-        for q in range(len(loops.bary)):
+        for q in range(loops.inside.shape[1]):
             combine(loops.slopes[q, :, 0], xe, p)
             combine(loops.slopes[q, :, 1], xe, r)
-            for i in range(6):
+            for i in range(n):
                 weights[i] = 0.0
             for j in range(3):
                 moment = 0.0
-                for k in range(3):
-                    moment += forces[e, 9 + 3 * j + k] * loops.bary[q, (j + 1 + k) % 3]
+                for k in range(own):
+                    moment += forces[e, (3 + j) * own + k] * loops.factors[q, j, k]
                 for b in range(3):
-                    for i in range(6):
+                    for i in range(n):
                         weights[i] += loops.inside[e, q] * moment * loops.S[j, b] * loops.bend[i, b]
             combine(weights, xe, y)
             curvature_hessian(p, r, y, H)
@@ -232,9 +236,9 @@ def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
             for q in range(points):
                 _edge_point(xe, loops, frames, e, j, q, tau, c, t, d)
                 edge_angle_hessian(tau, c, t, G)
-                force = -loops.rim[e, j, q] * (
-                    (1.0 - s[q]) * forces[e, 9 + 3 * j] + s[q] * forces[e, 10 + 3 * j]
-                )
+                force = 0.0
+                for k in range(turns):
+                    force -= loops.rim[e, j, q] * loops.turn[k, q] * forces[e, (3 + j) * own + k]
                 for a in range(2):
                     for b in range(a, 2):
                         for i in range(3):
@@ -243,27 +247,28 @@ def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
                         left = loops.along[j, q] if a == 0 else loops.across[j, q]
                         right = loops.along[j, q] if b == 0 else loops.across[j, q]
                         _add_block(block, left, right, T, a != b)
-        for i in range(18):
-            for j in range(18):
+        for i in range(3 * n):
+            for j in range(3 * n):
                 K[e, i, j] += block[i, j]
 
 
 @njit(**OPTIONS)
 def add_material(B, membrane, bending, K):  # type: ignore[no-untyped-def]
-    """K (t, 24, 24) += B^T diag(membrane, bending) B with (t, 9, 9) stiffness of either kind."""
-    CB = np.empty((18, 24))
+    """K += B^T diag(membrane, bending) B with (t, 3 m, 3 m) stiffness of either kind."""
+    count, width = membrane.shape[1], K.shape[1]
+    CB = np.empty((2 * count, width))
     for e in range(len(B)):
-        for k in range(9):
-            for j in range(24):
+        for k in range(count):
+            for j in range(width):
                 a, b = 0.0, 0.0
-                for m in range(9):
+                for m in range(count):
                     a += membrane[e, k, m] * B[e, m, j]
-                    b += bending[e, k, m] * B[e, 9 + m, j]
+                    b += bending[e, k, m] * B[e, count + m, j]
                 CB[k, j] = a
-                CB[9 + k, j] = b
-        for i in range(24):
-            for k in range(18):
+                CB[count + k, j] = b
+        for i in range(width):
+            for k in range(2 * count):
                 left = B[e, k, i]
                 if left != 0.0:
-                    for j in range(24):
+                    for j in range(width):
                         K[e, i, j] += left * CB[k, j]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.model import Model, Sheet
 from bh.program import StepProgram, program
+from bh.refinement import Refinement
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
 from bh.solvers.trace import Strategy, Walk, walk
@@ -21,7 +22,7 @@ from fem.observables import ShellState, observe
 from fem.shell import ShellElements, shell_elements
 from fem.system import ShellSystem
 from meshes import SheetMesh
-from meshes.curved import lift
+from meshes.curved import LinearMesh, lift
 
 Array = NDArray[np.float64]
 FREE = EdgeMoments()
@@ -32,6 +33,10 @@ class Shell:
 
     name = "shell"
     takes_nu = True
+    degree = 2
+    refinement: Refinement | None = Refinement(
+        "mirrored", ((0.5, 0.075), (1.0, 0.027), (2.0, 0.011), (4.0, 0.001)), 40.0, 1.95
+    )
 
     def system(
         self, model: Model, program: StepProgram, start: State | None, moments: EdgeMoments = FREE
@@ -45,7 +50,7 @@ class Shell:
             raise ModelError(
                 f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
             )
-        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet), moments)
+        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet, self.degree), moments)
 
     def observe(
         self,
@@ -60,10 +65,18 @@ class Shell:
         return observe(model, system, q, lam, step, stable)
 
 
+class LinearShell(Shell):
+    """Formulation "linear-shell": linear displacements, constant moments (HHJ) and strains; the cheap member."""
+
+    name = "linear-shell"
+    degree = 1
+    refinement = None  # it is the consistent formulation, at a higher price
+
+
 @lru_cache(maxsize=4)
-def _elements(mesh: SheetMesh, sheet: Sheet) -> ShellElements:
+def _elements(mesh: SheetMesh, sheet: Sheet, degree: int) -> ShellElements:
     """Elements are those of the sheet, whatever the step."""
-    return shell_elements(lift(mesh), sheet)
+    return shell_elements(lift(mesh) if degree == 2 else LinearMesh(mesh), sheet)
 
 
 def follow(

@@ -1,4 +1,4 @@
-"""Supports and dead forces of a model on the nodes of a second-order mesh."""
+"""Supports and dead forces of a model on the nodes of the shell's elements."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Fold, Force, Ramp
+from bh.actuation import Actuation, Displace, Fold, Force, Ramp
 from bh.errors import ModelError
 from bh.model import Model
+from bh.observables import Until
 from bh.program import program
 from bh.supports import Constraints, select
 from fem.components import edge_set
 from fem.shell import ShellElements
-from meshes.curved import QuadraticMesh
+from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ class EdgeMoments:
     at: tuple[tuple[str, float, float], ...] = ()
 
 
-def constraints(mesh: QuadraticMesh, model: Model, step: int) -> Constraints:
+def constraints(mesh: ElementMesh, model: Model, step: int) -> Constraints:
     """Supports and prescribed displacements in step `step` on all nodes, middle nodes of named edges included.
 
     A support of listed nodes holds just these corners.
@@ -41,7 +42,7 @@ def constraints(mesh: QuadraticMesh, model: Model, step: int) -> Constraints:
     return program(replace(model, mesh=mesh.linear, steps=steps))[step].constraints
 
 
-def _plain(item: Actuation) -> Actuation:
+def _plain(item: Actuation | Until) -> Actuation | Until:
     """Fold angles an edge do not fit the halved edges, and do not matter here."""
     if not isinstance(item, Fold):
         return item
@@ -54,12 +55,16 @@ def _plain(item: Actuation) -> Actuation:
     return item
 
 
-def forces(mesh: QuadraticMesh, model: Model, step: int, lengths: Array) -> Ramp:
+def forces(mesh: ElementMesh, model: Model, step: int, lengths: Array) -> Ramp:
     """Dead forces (n, 3) on all nodes, N, at the start and the end of step `step`.
 
     A `total` on a named set of edges is a uniform line load a length of edge; everything else acts on the corners
     named. A force stays until another one acts on the same place, as in `bh.program`.
     """
+    for actuations in model.steps[:step]:  # the builder of these does not know where such a step ended
+        moved = any(isinstance(item, Force | Displace) for item in actuations)
+        if moved and any(isinstance(item, Until) for item in actuations):
+            raise ModelError("the shell cannot go on after a force or displacement that `until` ended early")
     acting: dict[object, Array] = {}
     before: dict[object, Array] = {}
     for actuations in model.steps[: step + 1]:
@@ -72,7 +77,7 @@ def forces(mesh: QuadraticMesh, model: Model, step: int, lengths: Array) -> Ramp
     return Ramp(sum(before.values(), none), sum(acting.values(), none.copy()))
 
 
-def _force(mesh: QuadraticMesh, item: Force, lengths: Array) -> Array:
+def _force(mesh: ElementMesh, item: Force, lengths: Array) -> Array:
     out = np.zeros_like(mesh.nodes)
     if item.total is not None and isinstance(item.at, str) and item.at in mesh.sheet.edge_sets:
         total = np.asarray(item.total, dtype=float)
@@ -80,8 +85,11 @@ def _force(mesh: QuadraticMesh, item: Force, lengths: Array) -> Array:
         share = lengths[edges] / lengths[edges].sum()
         ends = mesh.sheet.topology.edges[edges]
         middle = len(mesh.sheet.points) + edges
-        for rows, part in ((ends[:, 0], 1.0), (ends[:, 1], 1.0), (middle, 4.0)):
-            np.add.at(out, rows, part / 6.0 * share[:, None] * total)  # Simpson's rule
+        rule: tuple[tuple[Ints, float], ...] = ((ends[:, 0], 0.5), (ends[:, 1], 0.5))
+        if mesh.degree == 2:
+            rule = ((ends[:, 0], 1.0 / 6.0), (ends[:, 1], 1.0 / 6.0), (middle, 2.0 / 3.0))  # Simpson's
+        for rows, part in rule:
+            np.add.at(out, rows, part * share[:, None] * total)
         return out
     nodes: Ints = select(mesh.sheet, item.at)
     if item.each is not None:
@@ -92,14 +100,15 @@ def _force(mesh: QuadraticMesh, item: Force, lengths: Array) -> Array:
 
 
 def edge_moments(elements: ShellElements, moments: EdgeMoments) -> Ramp:
-    """(e, 2) couples on the rotations alpha of edges, N mm / rad."""
+    """(e, r) couples on the rotations alpha of edges, N mm / rad."""
     sheet = elements.mesh.sheet
-    out = np.zeros((2, len(elements.lengths), 2))
+    turns = elements.tables.rotations
+    out = np.zeros((2, len(elements.lengths), turns))
     side = np.zeros(len(elements.lengths))
     side[elements.loops.edges] = elements.loops.sides
     for name, *couple in moments.at:
         chosen = edge_set(sheet, name)
         if (sheet.topology.edge_triangles[chosen, 1] >= 0).any():
             raise ModelError(f"edge moments act on boundary edges; '{name}' lies inside")
-        out[:, chosen] += 0.5 * np.reshape(couple, (2, 1, 1)) * (side * elements.lengths)[chosen, None]
+        out[:, chosen] += np.reshape(couple, (2, 1, 1)) / turns * (side * elements.lengths)[chosen, None]
     return Ramp(out[0], out[1])

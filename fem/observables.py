@@ -14,7 +14,7 @@ from bh.program import crease_hinges
 from bh.state import Energy, State
 from fem.kernels import Frames
 from fem.shell import ShellElements
-from fem.spaces import MOMENTS, STRAINS, gradients, local_order
+from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients
 
 if TYPE_CHECKING:
     from fem.system import Here, ShellSystem
@@ -31,10 +31,11 @@ class ShellState(State):
     jump of the normal at the middle of the edge, which vanishes under refinement.
 
     Attributes:
-        nodes: (n + e, 3) positions of corners and middle nodes, mm.
+        nodes: (n, 3) positions of corners and, with quadratic elements, (n + e, 3) of middle nodes too, mm.
         frames: frames of all edges, turned with them; the next step begins from here.
-        fold_angles: (m, 2) beta at the lower and the higher node of each hinge's edge, rad; zero off creases.
-        crease_couples: (m, 2) couples that the crease takes there, conjugate to fold_angles, N mm / rad.
+        fold_angles: (m, r) beta at the lower and the higher node of each hinge's edge, or one for both, rad; zero off
+            creases.
+        crease_couples: (m, r) couples that the crease takes there, conjugate to fold_angles, N mm / rad.
         membrane_forces, moments: (t, 3) components xx, yy, xy in the flat sheet's axes at the middle of each triangle
             (second Piola-Kirchhoff), N/mm and N; a moment is positive where it bends the sheet's edges up.
     """
@@ -50,18 +51,23 @@ class ShellState(State):
         """(k, 2) fold angles at both ends of every edge along a crease, in its order, rad; mountain positive."""
         hinges = crease_hinges(self.mesh, crease)
         pairs = self.mesh.crease_edges(crease)
-        beta = self.fold_angles[hinges]
+        beta = np.broadcast_to(self.fold_angles[hinges], (len(hinges), 2))
         turned = pairs[:, 0] > pairs[:, 1]
         out: Array = np.where(turned[:, None], beta[:, ::-1], beta)
         return out
 
     def crease_curve(self, crease: str, points: int = 5) -> Array:
-        """(k, 3) points on the deformed crease: `points` on every quadratic edge, in order, mm."""
+        """(k, 3) points on the deformed crease: `points` on every edge, in order, mm."""
         pairs = self.mesh.crease_edges(crease)
-        middle = len(self.mesh.points) + self.mesh.topology.find_edges(pairs)
+        low, high = self.nodes[pairs[:, 0]], self.nodes[pairs[:, 1]]
+        corners = len(self.mesh.points)
+        quadratic = len(self.nodes) > corners
+        middle = (
+            self.nodes[corners + self.mesh.topology.find_edges(pairs)] if quadratic else 0.5 * (low + high)
+        )
         s = np.linspace(0.0, 1.0, points)
         shape = np.stack(((1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)))
-        ends = np.stack((self.nodes[pairs[:, 0]], self.nodes[middle], self.nodes[pairs[:, 1]]))
+        ends = np.stack((low, middle, high))
         curve = np.einsum("kp,kec->epc", shape, ends)
         return np.vstack((curve[:, :-1].reshape(-1, 3), curve[-1, -1:]))
 
@@ -72,11 +78,10 @@ def observe(
     """Everything that can be read from the unknowns `q` at `lam`."""
     here = system.at(q, lam)
     e, mesh, creases = system.elements, model.mesh, system.creases
-    strain, curvature = e.measures(
-        here.x, system.components.gather(here.components)[:, 18:].reshape(-1, 3, 2), system.frames
-    )
-    stretching = 0.5 * np.einsum("tk,tk->t", here.forces[:, :9], strain)
-    bending = 0.5 * np.einsum("tk,tk->t", here.forces[:, 9:], curvature)
+    strain, curvature = e.measures(here.x, system.side_rotations(here.components), system.frames)
+    membrane_forces, moments = np.hsplit(here.forces, 2)
+    stretching = 0.5 * np.einsum("tk,tk->t", membrane_forces, strain)
+    bending = 0.5 * np.einsum("tk,tk->t", moments, curvature)
     beta = system.components.beta(here.components)
     folding = creases.energy(beta, lam)
     sides = mesh.topology.edge_triangles[creases.edges]
@@ -84,7 +89,7 @@ def observe(
     share = folding / e.areas[sides].sum(axis=1)
     for side in range(2):
         np.add.at(by_triangle, sides[:, side], share)
-    fold_angles, couples = np.zeros((2, len(mesh.topology.hinges), 2))
+    fold_angles, couples = np.zeros((2, len(mesh.topology.hinges), beta.shape[1]))
     fold_angles[creases.hinges] = beta
     couples[creases.hinges] = _couples(system, here)
     angles = np.mod(math.pi - _jumps(system, here), 2.0 * math.pi)
@@ -92,7 +97,7 @@ def observe(
     reactions = np.zeros_like(here.x)
     local = system.gradient(here)[: system.components.first_alpha].reshape(-1, 3)
     reactions[system.constraints.fixed] = local[system.constraints.fixed]
-    membrane, moments = stresses(e, model.sheet, here.forces, strain)
+    in_plane, bent = stresses(e, model.sheet, moments, strain)
     return ShellState(
         mesh=mesh, step=step, lam=lam, points=here.x[: len(mesh.points)],
         energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum())),
@@ -101,7 +106,7 @@ def observe(
         reactions=_to_corners(system, system.components.to_global(reactions)),
         crease_moments=_crease_moments(system, couples), stable=stable, nodes=here.x,
         frames=system.carried_frames(here.components), fold_angles=fold_angles, crease_couples=couples,
-        membrane_forces=membrane, moments=moments,
+        membrane_forces=in_plane, moments=bent,
     )  # fmt: skip
 
 
@@ -109,13 +114,15 @@ def _to_corners(system: ShellSystem, nodal: Array) -> Array:
     """Reactions of middle nodes halved to the ends of their edges, so that resultants are kept."""
     corners = len(system.mesh.sheet.points)
     out = nodal[:corners].copy()
+    if system.mesh.degree == 1:
+        return out
     for end in range(2):
         np.add.at(out, system.mesh.sheet.topology.edges[:, end], 0.5 * nodal[corners:])
     return out
 
 
 def _couples(system: ShellSystem, here: Here) -> Array:
-    """(c, 2) couples on the fold angles: a spring's own, and what an imposed angle takes, N mm / rad."""
+    """(c, r) couples on the fold angles: a spring's own, and what an imposed angle takes, N mm / rad."""
     creases = system.creases
     sheet = system.components.beta(system.components.spread(here.pull))
     turn = creases.rest.at(here.lam) - system.components.beta(here.components)
@@ -150,17 +157,18 @@ def _jumps(system: ShellSystem, here: Here) -> Array:
     return out
 
 
-def stresses(elements: ShellElements, sheet: Sheet, forces: Array, strain: Array) -> tuple[Array, Array]:
+def stresses(elements: ShellElements, sheet: Sheet, moments: Array, strain: Array) -> tuple[Array, Array]:
     """Membrane forces and moments (t, 3) at the middle of each triangle, components xx, yy, xy of the flat sheet."""
     X = elements.mesh.nodes[elements.mesh.triangles, :2]
-    F = np.einsum("tnc,nd->tcd", X, gradients(MIDDLE)[0])
-    order = local_order()
-    eps = np.einsum("tk,kab->tab", strain, STRAINS[order[:, 1]]) / 3.0
+    slopes = gradients(MIDDLE)[0] if elements.mesh.degree == 2 else SLOPES
+    F = np.einsum("tnc,nd->tcd", X, slopes)
+    middle = elements.tables.middle
+    eps = np.einsum("tjm,m,jab->tab", strain.reshape(len(X), 3, -1), middle, STRAINS)
     inverse = np.linalg.inv(F)
     eps = np.einsum("tac,tab,tbd->tcd", inverse, eps, inverse)
     trace = np.einsum("taa->t", eps)[:, None, None] * np.eye(2)
     N = sheet.E * sheet.t / (1.0 - sheet.nu**2) * ((1.0 - sheet.nu) * eps + sheet.nu * trace)
-    m = np.einsum("tk,kab->tab", forces[:, 9:], MOMENTS[order[:, 1]]) / 3.0
+    m = np.einsum("tjm,m,jab->tab", moments.reshape(len(X), 3, -1), middle, MOMENTS)
     m = np.einsum("tca,tab,tdb->tcd", F, m, F) / np.linalg.det(F)[:, None, None] ** 2
     pick = ([0, 1, 0], [0, 1, 1])
     return N[:, pick[0], pick[1]], m[:, pick[0], pick[1]]

@@ -48,7 +48,7 @@ def combine(weights, x, out):  # type: ignore[no-untyped-def]
     """out = sum_i weights[i] x[i]."""
     for c in range(3):
         total = 0.0
-        for i in range(6):
+        for i in range(len(x)):
             total += weights[i] * x[i, c]
         out[c] = total
 

@@ -9,7 +9,7 @@ from bh.supports import MOTIONS, free_motions, rigid_motions
 from fem.components import Components
 from fem.connectors import Connectors
 from fem.shell import ShellElements
-from meshes.curved import QuadraticMesh
+from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -18,20 +18,23 @@ Array = NDArray[np.float64]
 def free_rigid_motions(components: Components, elements: ShellElements, x: Array, B: Array) -> Array:
     """(n, r) orthonormal rates of the unknowns in the rigid motions left free at positions x (all nodes).
 
-    Edges turn such that no curvature arises, with B (t, 18, 24) the gradients there.
+    Edges turn such that no curvature arises, with B (t, 6 m, w) the gradients there.
     """
     motions = rigid_motions(x) @ free_motions(x, components.constraints)
     count = motions.shape[1]
     if count == 0:
         return np.zeros((len(components.free), 0))
     moves = motions.reshape(-1, 3, count)
-    element = moves[elements.mesh.triangles].reshape(-1, 18, count)
+    table, width = elements.tables, elements.moves
+    own, turns = table.measures // 3, table.rotations
+    element = moves[elements.mesh.triangles].reshape(-1, width, count)
     whole = np.zeros((len(components.number), count))
     for column in range(count):
         whole[: components.first_alpha, column] = components.to_local(moves[..., column]).ravel()
     for j in range(3):
-        rows, columns = slice(9 + 3 * j, 11 + 3 * j), slice(18 + 2 * j, 20 + 2 * j)
-        rate = -np.linalg.solve(B[:, rows, columns], B[:, rows, :18] @ element)
+        first, column = table.measures + own * j, width + turns * j
+        rows, columns = slice(first, first + turns), slice(column, column + turns)
+        rate = -np.linalg.solve(B[:, rows, columns], B[:, rows, :width] @ element)
         whole[components.of_element[:, columns]] = elements.loops.sides[:, j, None, None] * rate
     out: Array = np.linalg.qr(whole[components.free])[0]
     return out
@@ -41,26 +44,26 @@ def ground_triangle(components: Components, elements: ShellElements) -> int:
     """The triangle that is held against rigid motions: in the middle, with few supports of its own."""
     centres = elements.mesh.nodes[elements.mesh.triangles].mean(axis=1)
     distance = np.linalg.norm(centres - elements.mesh.nodes.mean(axis=0), axis=1)
-    held = (components.number[components.of_element[:, :18]] < 0).sum(axis=1)
+    held = (components.number[components.of_element[:, : elements.moves]] < 0).sum(axis=1)
     return int(np.lexsort((distance, held))[0])
 
 
 def ground_stiffness(
     components: Components, elements: ShellElements, triangle: int, Z: Array
 ) -> tuple[Ints, Array]:
-    """Unknowns (18,) of a triangle (-1 if prescribed) and a stiffness (18, 18) against its rigid motions Z."""
-    number = components.number[components.of_element[triangle, :18]]
+    """Unknowns (3 n,) of a triangle (-1 if prescribed) and a stiffness (3 n, 3 n) against its rigid motions Z."""
+    number = components.number[components.of_element[triangle, : elements.moves]]
     rows = np.where(number[:, None] >= 0, Z[np.maximum(number, 0)], 0.0)
     Q = np.linalg.qr(rows)[0]
-    size = float(elements.membrane[triangle].trace()) / (9.0 * elements.areas[triangle])
+    size = float(elements.membrane[triangle].trace()) / (elements.tables.measures * elements.areas[triangle])
     return number, size * (Q @ Q.T)
 
 
-def describe_motion(mesh: QuadraticMesh, creases: Connectors, x: Array, moves: Array, beta: Array) -> str:
+def describe_motion(mesh: ElementMesh, creases: Connectors, x: Array, moves: Array, beta: Array) -> str:
     """What moves, as a clause to be followed by how: the whole sheet, a crease, or a few nodes.
 
     Args:
-        x: (n, 3) positions of all nodes; moves: (n, 3) their motion; beta: (c, 2) that of fold angles.
+        x: (n, 3) positions of all nodes; moves: (n, 3) their motion; beta: (c, r) that of fold angles.
     """
     size = float(np.linalg.norm(moves))
     if size > 0.0:

@@ -1,6 +1,7 @@
 """Elements of the nonlinear Kirchhoff-Love shell: generalised strains and curvatures, and their stiffness.
 
-Weak form in docs/fem.md. An element has 18 measures and 18 forces conjugate to them, linear in each other:
+Weak form in docs/fem.md. An element with quadratic positions has 18 measures and 18 forces conjugate to them, linear in
+each other:
 
 - 9 membrane strains: Green's strain x_,a . x_,b / 2 - X_,a . X_,b / 2 of the quadratic positions, interpolated to the
   linear Regge space (Neunteufel and Schoeberl 2021), exactly quadratic in the nodes; forces N = membrane . strain;
@@ -12,6 +13,9 @@ Weak form in docs/fem.md. An element has 18 measures and 18 forces conjugate to 
 
 So the energy of the sheet is a plain minimum over positions and edge rotations, and keeping the forces as independent
 variables in Newton's method is the mixed method itself.
+
+With linear positions: 3 strains and 3 curvatures, all constant. Shapes below: n nodes, m functions with each of
+three tensors, r rotations an edge (`fem.spaces.Tables`); n = 6, m = 3, r = 2 or n = 3, m = 1, r = 1.
 """
 
 from __future__ import annotations
@@ -24,8 +28,8 @@ from numpy.typing import NDArray
 from bh.model import Sheet
 from fem import kernels
 from fem.kernels import Frames, Loops
-from fem.spaces import MOMENTS, STRAINS, Tables, local_order, tables
-from meshes.curved import QuadraticMesh
+from fem.spaces import MOMENTS, STRAINS, Tables, tables
+from meshes.curved import ElementMesh
 
 Array = NDArray[np.float64]
 
@@ -35,12 +39,12 @@ class ShellElements:
     """Elements of a flat sheet; t triangles, q points inside, p points on an edge.
 
     Attributes:
-        membrane, bending: (t, 9, 9) stiffness against generalised strains and curvatures.
-        strain0: (t, 9) strains that the metric of the flat sheet would have.
+        membrane, bending: (t, 3 m, 3 m) stiffness against generalised strains and curvatures.
+        strain0: (t, 3 m) strains that the metric of the flat sheet would have.
         lengths: (e,) lengths of the (curved) edges, mm; areas: (t,), mm^2.
     """
 
-    mesh: QuadraticMesh
+    mesh: ElementMesh
     tables: Tables
     loops: Loops
     membrane: Array
@@ -49,21 +53,30 @@ class ShellElements:
     lengths: Array
     areas: Array
 
+    @property
+    def moves(self) -> int:
+        """Coordinates of an element's nodes."""
+        return 3 * self.tables.nodes
+
+    @property
+    def width(self) -> int:
+        """Coordinates and side rotations of an element."""
+        return self.moves + 3 * self.tables.rotations
+
     def measures(self, x: Array, gamma: Array, frames: Frames) -> tuple[Array, Array]:
-        """Strains and curvatures, (t, 9) each, at positions x (n, 3) and side rotations gamma (t, 3, 2), rad."""
-        count = len(self.areas)
-        strain, curvature = np.empty((count, 9)), np.empty((count, 9))
+        """Strains and curvatures, (t, 3 m) each, at positions x (n, 3) and side rotations gamma (t, 3, r), rad."""
+        strain, curvature = np.empty_like(self.strain0), np.empty_like(self.strain0)
         kernels.measures(x, gamma, self.loops, frames, strain, curvature)
         return strain - self.strain0, curvature
 
     def gradients(self, x: Array, frames: Frames) -> Array:
-        """(t, 18, 24) derivatives of strains and curvatures by positions and side rotations."""
-        B = np.empty((len(self.areas), 18, 24))
+        """(t, 6 m, w) derivatives of strains and curvatures by positions and side rotations, w = `width`."""
+        B = np.empty((len(self.areas), 2 * self.tables.measures, self.width))
         kernels.gradients(x, self.loops, frames, B)
         return B
 
     def forces(self, strain: Array, curvature: Array) -> Array:
-        """(t, 18) forces conjugate to the measures."""
+        """(t, 6 m) forces conjugate to the measures."""
         return np.concatenate(
             (
                 (self.membrane @ strain[:, :, None])[..., 0],
@@ -73,16 +86,16 @@ class ShellElements:
         )
 
     def tangent(self, x: Array, forces: Array, B: Array, frames: Frames) -> Array:
-        """(t, 24, 24) element tangents with the given forces (t, 18) in their geometric part."""
-        K = np.zeros((len(self.areas), 24, 24))
+        """(t, w, w) element tangents with the given forces (t, 6 m) in their geometric part."""
+        K = np.zeros((len(self.areas), self.width, self.width))
         kernels.add_material(B, self.membrane, self.bending, K)
         kernels.add_geometric(x, forces, self.loops, frames, K)
         return K
 
 
-def shell_elements(mesh: QuadraticMesh, sheet: Sheet) -> ShellElements:
-    """Elements of a sheet on a second-order mesh."""
-    table = tables()
+def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
+    """Elements of a sheet; the mesh says of which degree."""
+    table = tables(mesh.degree)
     X = mesh.nodes[mesh.triangles, :2]
     F = np.einsum("tnc,qnd->tqcd", X, table.slopes)
     J = np.linalg.det(F)
@@ -94,28 +107,29 @@ def shell_elements(mesh: QuadraticMesh, sheet: Sheet) -> ShellElements:
     sides = np.where(np.roll(corners, -1, axis=1) < np.roll(corners, -2, axis=1), 1.0, -1.0)
     lengths = np.empty(len(mesh.sheet.topology.edges))
     lengths[edges] = speed @ table.edge_weights
+    inside = table.weights / J if mesh.degree > 1 else np.empty((len(edges), 0))  # linear shapes do not bend
     loops = Loops(
-        mesh.triangles, np.ascontiguousarray(edges), sides, table.weights / J, table.edge_weights / speed,
-        table.Q, table.bary, table.slopes, table.bend, table.S, table.along, table.across, table.s,
+        mesh.triangles, np.ascontiguousarray(edges), sides, inside, table.edge_weights / speed,
+        table.Q, table.factors, table.slopes, table.bend, table.S, table.along, table.across, table.turn,
     )  # fmt: skip
     elements = ShellElements(
         mesh, table, loops, membrane_stiffness(table, metric, J, sheet), bending_stiffness(table, metric, J, sheet),
-        np.zeros((len(edges), 9)), lengths, J @ table.weights,
+        np.zeros((len(edges), table.measures)), lengths, J @ table.weights,
     )  # fmt: skip
     frames = flat_frames(mesh)
-    strain0, _ = elements.measures(mesh.nodes, np.zeros((len(edges), 3, 2)), frames)
+    strain0, _ = elements.measures(mesh.nodes, np.zeros((len(edges), 3, table.rotations)), frames)
     elements.strain0[:] = strain0
     return elements
 
 
 def _basis(table: Tables, tensors: Array) -> Array:
-    """(q, 9, 2, 2) linear tensor functions at the points inside."""
-    order = local_order()
-    return np.stack([table.bary[:, i, None, None] * tensors[j] for i, j in order], axis=1)
+    """(q, 3 m, 2, 2) tensor functions at the points inside."""
+    out = table.factors[..., None, None] * tensors[:, None]
+    return out.reshape(len(out), -1, 2, 2)
 
 
 def membrane_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> Array:
-    """(t, 9, 9) of int C : eps : eps dA; eps covariant, C = E t / (1 - nu^2) [(1 - nu) eps : eps + nu tr(eps)^2]."""
+    """(t, 3 m, 3 m) of int C:eps:eps dA; eps covariant, C = E t / (1 - nu^2) [(1 - nu) eps : eps + nu tr(eps)^2]."""
     stiffness = sheet.E * sheet.t / (1.0 - sheet.nu**2)
     raised = np.linalg.inv(metric)
     eps = _basis(table, STRAINS)
@@ -128,7 +142,7 @@ def membrane_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> 
 
 
 def bending_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> Array:
-    """(t, 9, 9) inverse of int 12 / (E t^3) [(1 + nu) sigma : sigma - nu tr(sigma)^2] dA, sigma = F s F^T / J^2."""
+    """(t, 3 m, 3 m) inverse of int 12 / (E t^3) [(1 + nu) sigma : sigma - nu tr(sigma)^2] dA, sigma = F s F^T / J^2."""
     compliance = 12.0 / (sheet.E * sheet.t**3)
     lowered = np.einsum("tqab,qkbc->tqkac", metric, _basis(table, MOMENTS))
     trace = np.einsum("tqkaa->tqk", lowered)
@@ -139,11 +153,13 @@ def bending_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> A
     return 0.5 * (out + out.transpose(0, 2, 1))
 
 
-def edge_tangents(mesh: QuadraticMesh, x: Array) -> Array:
+def edge_tangents(mesh: ElementMesh, x: Array) -> Array:
     """(e, p, 3) derivatives of positions x (n, 3) along every edge, from its lower to its higher node, mm."""
-    s = tables().s
+    s = tables(mesh.degree).s
     edges = mesh.sheet.topology.edges
     low, high, middle = x[edges[:, 0]], x[edges[:, 1]], x[len(mesh.sheet.points) :]
+    if mesh.degree == 1:
+        return np.repeat((high - low)[:, None], len(s), axis=1)
     ds = np.stack((4.0 * s - 3.0, 4.0 - 8.0 * s, 4.0 * s - 1.0))
     return np.einsum("kp,kec->epc", ds, np.stack((low, middle, high)))
 
@@ -153,21 +169,20 @@ def unit(vectors: Array) -> Array:
     return out
 
 
-def flat_frames(mesh: QuadraticMesh) -> Frames:
+def flat_frames(mesh: ElementMesh) -> Frames:
     """Frames of the flat sheet: its own normal."""
     t0 = unit(edge_tangents(mesh, mesh.nodes))
     return Frames(t0, np.ascontiguousarray(np.broadcast_to([0.0, 0.0, 1.0], t0.shape)))
 
 
-def carried_frames(mesh: QuadraticMesh, frames: Frames, x: Array, alpha: Array) -> Frames:
-    """Frames that went with the edges to positions x and turned with their rotations alpha (e, 2).
+def carried_frames(mesh: ElementMesh, frames: Frames, x: Array, alpha: Array) -> Frames:
+    """Frames that went with the edges to positions x and turned with their rotations alpha (e, r).
 
     With them the same state has alpha = 0 and the same measures, exactly.
     """
-    s = tables().s
     t = unit(edge_tangents(mesh, x))
     along = np.einsum("epc,epc->ep", frames.d0, t) / (1.0 + np.einsum("epc,epc->ep", frames.t0, t))
     d = frames.d0 - along[..., None] * (frames.t0 + t)
-    angle = alpha[:, :1] * (1.0 - s) + alpha[:, 1:] * s
+    angle = alpha @ tables(mesh.degree).turn
     turned = np.cos(angle)[..., None] * d - np.sin(angle)[..., None] * np.cross(t, d)
     return Frames(t, unit(turned))

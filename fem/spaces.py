@@ -1,4 +1,4 @@
-"""Tables of the reference triangle: quadratic positions, linear moments (HHJ) and linear membrane strains (Regge).
+"""Tables of the reference triangle: positions of degree k, moments (HHJ) and membrane strains (Regge) of degree k - 1.
 
 Reference triangle with corners (0, 0), (1, 0), (0, 1) and barycentric coordinates l_0, l_1, l_2. Edge j lies opposite
 corner j and runs counter-clockwise, r_j = v_(j+2) - v_(j+1) its vector, n_j = (r_y, -r_x) its outward normal; both
@@ -12,6 +12,9 @@ l_i R_j with i = j + 1, j + 2, j for k = 0, 1, 2 and
 
 so that the first two of each three live on the edge and the third is zero on all edges. Both families are complete,
 local to the triangle, and are condensed there; how they are joined across edges is told in `fem.shell`.
+
+With linear positions (k = 1) there are no middle nodes, moments and strains are constant, S_j and R_j themselves, and
+what is linear along an edge above is constant there.
 """
 
 from __future__ import annotations
@@ -122,47 +125,93 @@ def edge_points(edge: int, s: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """What the element loops need; q points inside, p points on an edge.
+    """What the element loops need; n nodes, q points inside, p points on an edge, m functions with each of the tensors
+    S_j or R_j (3 m in all, number m j + k), r of which and of the rotations live on the edge.
 
     Attributes:
-        Q: (9, 6, 6) see `regge_interpolation`.
-        weights: (q,) of the points inside (their sum is 1/2); `bary` (q, 3); `slopes` (q, 6, 2) of the shapes.
-        bend: (6, 3) second derivatives 11, 22, 12 of the shapes.
+        Q: (3 m, n, n) the strain's coefficients are 1/2 sum_ij Q[c, i, j] x_i . x_j; see `regge_interpolation`.
+        weights: (q,) of the points inside (their sum is 1/2); `slopes` (q, n, 2) of the shapes.
+        factors: (q, 3, m) what tensor j is multiplied by; `middle` (m,) the same in the middle of the triangle.
+        bend: (n, 3) second derivatives 11, 22, 12 of the shapes.
         S: (3, 3) components 11, 22 and twice 12 of the tensors S_j, so that S . kappa is their double contraction.
-        s, edge_weights: (p,) points and weights on [0, 1].
-        along, across: (3, p, 6) derivatives of the shapes along r_j and toward the opposite corner.
+        s, edge_weights: (p,) points and weights on [0, 1]; `turn` (r, p) the functions of the edge there.
+        along, across: (3, p, n) derivatives of the shapes along r_j and toward the opposite corner.
     """
 
     Q: Array
     weights: Array
-    bary: Array
     slopes: Array
+    factors: Array
+    middle: Array
     bend: Array
     S: Array
     s: Array
     edge_weights: Array
+    turn: Array
     along: Array
     across: Array
 
+    @property
+    def nodes(self) -> int:
+        return len(self.bend)
+
+    @property
+    def measures(self) -> int:
+        """Strains, and as many curvatures, of an element."""
+        return len(self.Q)
+
+    @property
+    def rotations(self) -> int:
+        """Of an edge."""
+        return len(self.turn)
+
 
 @cache
-def tables(inside: int = 4, on_edge: int = 5) -> Tables:
-    """Tables with quadrature of the given polynomial degrees inside and on edges."""
+def tables(degree: int = 2) -> Tables:
+    """Tables of positions of degree 2, exact to degree 4 inside and 5 on edges, or of degree 1: all is constant."""
+    return _quadratic(4, 5) if degree == 2 else _linear()
+
+
+def _quadratic(inside: int, on_edge: int) -> Tables:
     points, weights = get_quadrature(RefTri, inside)
     line, edge_weights = get_quadrature(RefLine, on_edge)
     s = np.sort(line[0])
-    edge_weights = edge_weights[np.argsort(line[0])]
+    bary = barycentric(points.T)
     h = hessians()
     on_edges = [gradients(edge_points(j, s)) for j in range(3)]
     return Tables(
         Q=regge_interpolation(),
         weights=weights,
-        bary=barycentric(points.T),
         slopes=gradients(points.T),
+        factors=bary[:, local_order()[:, 0]].reshape(-1, 3, 3),
+        middle=np.full(3, 1.0 / 3.0),
         bend=np.column_stack((h[:, 0, 0], h[:, 1, 1], h[:, 0, 1])),
-        S=np.column_stack((MOMENTS[:, 0, 0], MOMENTS[:, 1, 1], 2.0 * MOMENTS[:, 0, 1])),
+        S=_double(MOMENTS),
         s=s,
-        edge_weights=edge_weights,
+        edge_weights=edge_weights[np.argsort(line[0])],
+        turn=np.stack((1.0 - s, s)),
         along=np.array([g @ EDGES[j] for j, g in enumerate(on_edges)]),
         across=np.array([g @ INWARD[j] for j, g in enumerate(on_edges)]),
     )
+
+
+def _linear() -> Tables:
+    s = np.array([0.5])
+    return Tables(
+        Q=np.einsum("ja,jb,ia,kb->jik", EDGES, EDGES, SLOPES, SLOPES),  # stretch of edge j
+        weights=np.array([0.5]),
+        slopes=SLOPES[None],
+        factors=np.ones((1, 3, 1)),
+        middle=np.ones(1),
+        bend=np.zeros((3, 3)),
+        S=_double(MOMENTS),
+        s=s,
+        edge_weights=np.ones(1),
+        turn=np.ones((1, 1)),
+        along=np.einsum("ja,ia->ji", EDGES, SLOPES)[:, None],
+        across=np.einsum("ja,ia->ji", INWARD, SLOPES)[:, None],
+    )
+
+
+def _double(tensors: Array) -> Array:
+    return np.column_stack((tensors[:, 0, 0], tensors[:, 1, 1], 2.0 * tensors[:, 0, 1]))

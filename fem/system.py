@@ -43,7 +43,7 @@ class Here:
     forces: Array
     energy: float
     B: Array
-    pull: Array  # (t, 24) element forces by positions and side rotations
+    pull: Array  # (t, 3 n + 3 r) element forces by positions and side rotations
 
 
 def root_mean_square(values: Array) -> float:
@@ -74,12 +74,16 @@ class ShellSystem:
             raise ModelError(
                 "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
             )
+        if program.bodies:
+            raise ModelError(
+                "the shell knows no bars and tethers; take formulation consistent or bars-and-hinges"
+            )
         self.program, self.elements = program, elements
         mesh = self.mesh = elements.mesh
         step = 0 if start is None else start.step + 1
         x = mesh.nodes if start is None else start.nodes
         self.frames = flat_frames(mesh) if start is None else start.frames
-        flat = np.zeros((len(model.mesh.topology.hinges), 2))
+        flat = np.zeros((len(model.mesh.topology.hinges), elements.tables.rotations))
         beta = flat if start is None else start.fold_angles
         couple = flat if start is None else start.crease_couples
         self.creases = connectors(mesh, model, program, beta, couple)
@@ -95,7 +99,7 @@ class ShellSystem:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
         force = loads.forces(self.mesh, model, step, self.elements.lengths)
         couple = loads.edge_moments(self.elements, moments)
-        none = np.zeros(2 * len(self.creases))
+        none = np.zeros(self.elements.tables.rotations * len(self.creases))
         ends = [
             np.concatenate((self.components.to_local(f).ravel(), m.ravel(), none))
             for f, m in ((force.start, couple.start), (force.end, couple.end))
@@ -119,7 +123,8 @@ class ShellSystem:
     @cached_property
     def energy_scale(self) -> float:
         """Moments against the rotations of all edges by one radian, N mm."""
-        B = self.elements.gradients(self.mesh.nodes, flat_frames(self.mesh))[:, 9:, 18:]
+        B = self.elements.gradients(self.mesh.nodes, flat_frames(self.mesh))
+        B = B[:, self.elements.tables.measures :, self.elements.moves :]
         return 0.5 * float(np.einsum("tki,tkl,tli->", B, self.elements.bending, B, optimize=True))
 
     def start(self) -> Array:
@@ -134,6 +139,20 @@ class ShellSystem:
         """(n, 3) positions of the corners, mm."""
         return self.node_positions(self.components.whole(q, lam))[: len(self.mesh.sheet.points)]
 
+    def vectors(self, dq: Array) -> Array:
+        """(n, 3) changes of the corners' positions, mm, for changes dq (size,) of the unknowns."""
+        change = np.zeros(len(self.components.number))
+        change[self.components.free] = dq
+        return self.components.moves(change)[: len(self.mesh.sheet.points)]
+
+    def loads(self, forces: Array) -> Array:
+        """(size,) what forces (n, 3) at the corners, N, are to the unknowns; their part along supports is left out."""
+        nodal = np.zeros_like(self.mesh.nodes)
+        nodal[: len(forces)] = forces
+        whole = np.zeros(len(self.components.number))
+        whole[: self.components.first_alpha] = self.components.to_local(nodal).ravel()
+        return whole[self.components.free]
+
     def carried_frames(self, components: Array) -> Frames:
         """Frames for a step that begins at this state."""
         x = self.node_positions(components)
@@ -147,14 +166,19 @@ class ShellSystem:
         e = self.elements
         components = self.components.whole(q, lam)
         x = self.node_positions(components)
-        gamma = self.components.gather(components)[:, 18:].reshape(-1, 3, 2)
+        gamma = self.side_rotations(components)
         strain, curvature = e.measures(x, gamma, self.frames)
         forces = e.forces(strain, curvature)
-        energy = 0.5 * float(np.vdot(forces[:, :9], strain) + np.vdot(forces[:, 9:], curvature))
+        energy = 0.5 * float(np.vdot(forces, np.hstack((strain, curvature))))
         B = e.gradients(x, self.frames)
         pull = np.einsum("tkj,tk->tj", B, forces)
         self._here = Here(q.copy(), lam, components, x, forces, energy, B, pull)
         return self._here
+
+    def side_rotations(self, components: Array) -> Array:
+        """(t, 3, r) rotations gamma of every triangle's side of its edges, rad."""
+        gamma = self.components.gather(components)[:, self.elements.moves :]
+        return gamma.reshape(len(gamma), 3, -1)
 
     def gradient(self, here: Here) -> Array:
         """Derivative of the potential by all components; at prescribed ones the reactions."""
@@ -186,10 +210,15 @@ class ShellSystem:
         load = self.load.at(here.lam)
         floors = (eps * self._stiffest[0], eps * self._stiffest[1])
         couples = self.creases.largest(self.components.beta(here.components), here.lam)
-        first = self.components.first_alpha
+        first, width = self.components.first_alpha, self.elements.moves
         groups = (
-            (residual[moves], here.pull[:, :18], float(np.abs(load[:first]).max()), floors[0]),
-            (residual[~moves], here.pull[:, 18:], max(couples, float(np.abs(load[first:]).max())), floors[1]),
+            (residual[moves], here.pull[:, :width], float(np.abs(load[:first]).max()), floors[0]),
+            (
+                residual[~moves],
+                here.pull[:, width:],
+                max(couples, float(np.abs(load[first:]).max())),
+                floors[1],
+            ),
         )
         worst = 0.0
         for part, inner, outer, floor in groups:
@@ -202,13 +231,17 @@ class ShellSystem:
     def _stiffest(self) -> tuple[float, float]:
         """Largest force, N, and moment on an edge, N mm, per mm of displacement of one node."""
         B = self.elements.gradients(self.mesh.nodes, flat_frames(self.mesh))
-        K = np.zeros((len(B), 24, 24))
-        for part, stiffness in ((B[:, :9], self.elements.membrane), (B[:, 9:], self.elements.bending)):
+        count, moves = self.elements.tables.measures, self.elements.moves
+        K = np.zeros((len(B), self.elements.width, self.elements.width))
+        for part, stiffness in (
+            (B[:, :count], self.elements.membrane),
+            (B[:, count:], self.elements.bending),
+        ):
             K += np.einsum("tki,tkl,tlj->tij", part, stiffness, part, optimize=True)
-        return float(np.abs(K[:, :18, :18]).max()), float(np.abs(K[:, 18:, :18]).max())
+        return float(np.abs(K[:, :moves, :moves]).max()), float(np.abs(K[:, moves:, :moves]).max())
 
     def element_tangents(self, here: Here, forces: Array) -> Array:
-        return self.elements.tangent(here.x, forces.reshape(-1, 18), here.B, self.frames)
+        return self.elements.tangent(here.x, forces.reshape(here.forces.shape), here.B, self.frames)
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
         here = self.at(q, lam)
@@ -217,7 +250,7 @@ class ShellSystem:
             turn_blocks(K, self.mesh.triangles, self.constraints.frame_of, self.constraints.frames)
         pattern = self._pattern
         data = np.zeros(pattern.size)
-        scatter(K, self.elements.loops.sides, pattern.slots, data)
+        scatter(K, self.components.sides, pattern.slots, data)
         slots, values = self._springs
         np.add.at(data, slots, values)
         if not self.constraints.rigid_body:
@@ -233,7 +266,7 @@ class ShellSystem:
         change = np.zeros(len(self.components.number))
         change[self.components.free] = dq
         measure = np.einsum("tkj,tj->tk", self._here.B, self.components.gather(change))
-        return forces + self.elements.forces(measure[:, :9], measure[:, 9:]).ravel()
+        return forces + self.elements.forces(*np.hsplit(measure, 2)).ravel()
 
     def control_rate(self, q: Array, lam: float) -> Array:
         out = self._times(self.at(q, lam), self.components.rate) - self.load.rate
@@ -305,10 +338,11 @@ class ShellSystem:
         triangle = self.mesh.sheet.topology.edge_triangles[c.edges, 0]
         local = np.argmax(self.elements.loops.edges[triangle] == c.edges[:, None], axis=1)
         swapped = self.elements.loops.sides[triangle, local] < 0
-        for i, j in ((0, 0), (1, 1), (1, 0)):
-            row, column = 24 + 2 * local + i, 24 + 2 * local + j
+        turns, first = self.components.rotations, self.elements.width
+        for i, j in zip(*np.tril_indices(turns), strict=True):
+            row, column = first + turns * local + i, first + turns * local + j
             slot = self._pattern.slots[triangle, row * (row + 1) // 2 + column]
-            end = np.where(swapped, 1 - i, i), np.where(swapped, 1 - j, j)
+            end = np.where(swapped, turns - 1 - i, i), np.where(swapped, turns - 1 - j, j)
             slots.append(slot)
             values.append(c.stiffness * c.mass[np.arange(len(c)), end[0], end[1]])
         slot, value = np.concatenate(slots), np.concatenate(values)
@@ -324,7 +358,7 @@ class ShellSystem:
     def _ground(self, Z: Array, data: Array) -> tuple[Ints, Array]:
         """Add a stiffness against the rigid motions of one triangle; returns its unknowns and its matrix."""
         number, block = ground_stiffness(self.components, self.elements, self._ground_triangle, Z)
-        lower = np.tril_indices(18)
+        lower = np.tril_indices(self.elements.moves)
         slots = self._pattern.slots[self._ground_triangle, : len(lower[0])]
         np.add.at(data, slots[slots >= 0], block[lower][slots >= 0])
         inside = number >= 0

@@ -1,4 +1,5 @@
-"""Sheets lifted to second order: a node in the middle of every edge, on the curve that the edge lies on.
+"""Nodes for elements of first and second order: the mesh as it is, or lifted, with a node in the middle of every edge
+on the curve that the edge lies on.
 
 High-order shells need it: with straight edges along a curved crease their energy is 10-40 % wrong and converges at
 first order only.
@@ -21,6 +22,42 @@ NEAR = 1e-6  # of the sheet's size: farther nodes are not on the curve
 
 
 @dataclass(frozen=True, eq=False)
+class LinearMesh:
+    """A flat sheet of three-node triangles, under the names of `QuadraticMesh`.
+
+    Raises:
+        MeshError: the sheet is not flat.
+    """
+
+    sheet: SheetMesh
+
+    def __post_init__(self) -> None:
+        check_flat(self.sheet)
+
+    degree = 1
+
+    @property
+    def nodes(self) -> Array:
+        return self.sheet.points
+
+    @property
+    def triangles(self) -> Ints:
+        return self.sheet.triangles
+
+    @property
+    def linear(self) -> SheetMesh:
+        return self.sheet
+
+    @cached_property
+    def carriers(self) -> Ints:
+        return _with_edges(self.sheet)
+
+    @cached_property
+    def places(self) -> Array:
+        return np.vstack((self.sheet.points, self.sheet.points[self.sheet.topology.edges].mean(axis=1)))
+
+
+@dataclass(frozen=True, eq=False)
 class QuadraticMesh:
     """A flat sheet of six-node triangles.
 
@@ -33,6 +70,18 @@ class QuadraticMesh:
     sheet: SheetMesh
     nodes: Array
     triangles: Ints
+
+    degree = 2
+
+    @property
+    def carriers(self) -> Ints:
+        """(t, 6) places that unknowns of an element belong to: its corners, then its edges, numbered from n."""
+        return self.triangles
+
+    @property
+    def places(self) -> Array:
+        """(n + e, 3) where these are, mm."""
+        return self.nodes
 
     @cached_property
     def linear(self) -> SheetMesh:
@@ -55,6 +104,19 @@ class QuadraticMesh:
         return np.column_stack((pairs[:, 0], middle, middle, pairs[:, 1])).reshape(-1, 2)
 
 
+ElementMesh = LinearMesh | QuadraticMesh
+
+
+def _with_edges(mesh: SheetMesh) -> Ints:
+    return np.column_stack((mesh.triangles, len(mesh.points) + mesh.topology.triangle_edges))
+
+
+def check_flat(mesh: SheetMesh) -> None:
+    """Refuse a sheet that does not lie in z = 0 (MeshError)."""
+    if not mesh.flat:
+        raise MeshError("the shell takes only a sheet that is flat in z = 0; unfold it first")
+
+
 def lift(mesh: SheetMesh) -> QuadraticMesh:
     """Lift a flat sheet to second order on the curves of its edge sets.
 
@@ -62,8 +124,7 @@ def lift(mesh: SheetMesh) -> QuadraticMesh:
         MeshError: the sheet is not flat, an edge set does not lie on its curve, or a curved edge turns a triangle
             inside out (the mesh is too coarse for its curves).
     """
-    if not mesh.flat:
-        raise MeshError("only a sheet that is flat in z = 0 can be lifted to second order; unfold it first")
+    check_flat(mesh)
     ends = mesh.points[mesh.topology.edges]
     middle = ends.mean(axis=1)
     for name, curve in mesh.curves.items():
@@ -71,8 +132,7 @@ def lift(mesh: SheetMesh) -> QuadraticMesh:
             continue
         edges = mesh.topology.find_edges(mesh.edge_sets[name])
         middle[edges, :2] = _middle(name, curve, ends[edges, :, :2], NEAR * mesh.size)
-    triangles = np.column_stack((mesh.triangles, len(mesh.points) + mesh.topology.triangle_edges))
-    lifted = QuadraticMesh(mesh, np.vstack((mesh.points, middle)), triangles)
+    lifted = QuadraticMesh(mesh, np.vstack((mesh.points, middle)), _with_edges(mesh))
     _check_orientation(lifted)
     return lifted
 

@@ -1,13 +1,14 @@
-"""Crease-conforming meshes of any pattern by gmsh.
+"""Crease-conforming meshes of any pattern by gmsh, graded toward what needs it.
 
-Boundary curves and creases are cut into edges of about the wanted size whose nodes lie exactly on them; between them
-the sheet is filled with nearly equilateral triangles. Named edge sets know the curve that they lie on.
+Boundary curves and creases are cut into edges of about the wanted size there, whose nodes lie exactly on them; between
+them the sheet is filled with nearly equilateral triangles. Named edge sets know the curve that they lie on.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from meshes.curves import Array, Curve, Polyline
 from meshes.errors import MeshError
-from meshes.mesh import SheetMesh
+from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.planar import corners
 from meshes.topology import Ints
@@ -25,15 +26,58 @@ Faces = list[
 ]  # of every face: its loops of nodes, and edges inside
 
 
-def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> SheetMesh:
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """Wanted edge length at any point: the smallest of `largest` and, for every line, its own plus growth x distance.
+
+    Attributes:
+        largest: mm; near: names of lines and their lengths, mm; lines: shapely geometries of these; growth: mm a mm.
+    """
+
+    largest: float
+    near: dict[str, float]
+    lines: dict[str, Any]
+    growth: float
+
+    def at(self, points: Array) -> Array:
+        """(n,) wanted edge lengths, mm, at (n, 2) points."""
+        import shapely
+
+        out = np.full(len(points), self.largest)
+        places = shapely.points(points)
+        for name, size in self.near.items():
+            out = np.minimum(out, size + self.growth * shapely.distance(places, self.lines[name]))
+        return out
+
+    def divide(self, curve: Curve, a: float, b: float, least: int = 1) -> list[float]:
+        """Parameters after `a` up to `b` that cut this part of a curve into edges of the wanted lengths."""
+        u = np.linspace(a, b, 257 if self.near else 2)
+        density = curve.length / self.at(curve.point(u))
+        count = np.concatenate(([0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(u))))
+        cells = max(least, round(float(count[-1])))
+        inner = np.interp(count[-1] * np.arange(1, cells) / cells, count, u)
+        return [*inner.tolist(), b]
+
+
+def unstructured(
+    pattern: CreasePattern,
+    *,
+    size: float,
+    near: Mapping[str, float] | None = None,
+    growth: float = 0.3,
+    seed: int = 1,
+) -> SheetMesh:
     """Mesh a pattern with triangles of edge length about `size` (mm).
 
     Args:
         size: wanted edge length; shorter where curves meet.
+        near: shorter edge lengths at named creases and edges, mm: {"crease:crease": 1.0, "edge:start": 2.0}.
+        growth: how fast the edge length grows away from these, mm a mm.
         seed: of gmsh's own small random shifts; the same seed gives the same mesh.
 
     Raises:
-        MeshError: a size that cannot be, an outline that its named edges do not make up, or gmsh failed.
+        MeshError: a size that cannot be, a name that the pattern has not, an outline that its named edges do not make
+            up, or gmsh failed.
     """
     if not isinstance(pattern, CreasePattern):
         raise MeshError(
@@ -50,10 +94,11 @@ def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> Sheet
     if not curves:
         raise MeshError("this pattern names no boundary curves; an unstructured mesh needs them")
     curves |= {f"crease:{crease.name}": crease.curve for crease in pattern.creases}
+    sizes = _sizes(curves, size, dict(near or {}), growth)
     facets = {f"facet:{i}": curve for i, curve in enumerate(pattern.facets)}
-    points, chains = _chains(curves | facets, size)
+    points, chains = _chains(curves | facets, sizes)
     segments = np.vstack(list(chains.values()))
-    points, triangles = _fill(points, _faces(pattern, points, segments), size, seed)
+    points, triangles = _fill(points, _faces(pattern, points, segments), sizes, chains, seed)
     drawn = [chains.pop(name) for name in facets]
     if drawn:
         chains["edge:facet"] = np.vstack(drawn)
@@ -67,7 +112,24 @@ def unstructured(pattern: CreasePattern, *, size: float, seed: int = 1) -> Sheet
         curves=curves,
         kind="gmsh",
         remarks=pattern.remarks,
+        origin=Origin.of(pattern, points, triangles),
     )
+
+
+def _sizes(curves: dict[str, Curve], size: float, near: dict[str, float], growth: float) -> Sizes:
+    import shapely
+
+    for name, wanted in near.items():
+        if name not in curves:
+            raise MeshError(f"near: the pattern has no '{name}'; use one of {', '.join(curves)}")
+        if not math.isfinite(wanted) or not 0.0 < wanted <= size:
+            raise MeshError(
+                f"near: {wanted} at '{name}' cannot be; use an edge length in mm up to size = {size:g}"
+            )
+    if not math.isfinite(growth) or growth <= 0.0:
+        raise MeshError(f"growth = {growth} cannot be; use how fast edges grow, 0.1 to 0.5 mm a mm")
+    u = np.linspace(0.0, 1.0, 513)
+    return Sizes(size, near, {name: shapely.LineString(curves[name].point(u)) for name in near}, growth)
 
 
 def sheet_area(pattern: CreasePattern) -> float:
@@ -77,10 +139,10 @@ def sheet_area(pattern: CreasePattern) -> float:
     return float(shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).area)
 
 
-def _chains(curves: dict[str, Curve], size: float) -> tuple[Array, dict[str, Ints]]:
+def _chains(curves: dict[str, Curve], sizes: Sizes) -> tuple[Array, dict[str, Ints]]:
     """Points (k, 2) on all curves, and each curve as a chain of node pairs; curves that meet share nodes."""
     ends = np.vstack([curve.point(np.array([0.0, 1.0])) for curve in curves.values()])
-    near = 1e-6 * float(np.ptp(ends, axis=0).max() + size)
+    near = 1e-6 * float(np.ptp(ends, axis=0).max() + sizes.largest)
     points: list[Array] = []
     joints: Joints = {}
     chains: dict[str, Ints] = {}
@@ -88,10 +150,7 @@ def _chains(curves: dict[str, Curve], size: float) -> tuple[Array, dict[str, Int
         breaks = _breaks(curve, ends, near)
         u = [breaks[0]]
         for a, b in pairwise(breaks):
-            cells = max(1, round((b - a) * curve.length / size))
-            if curve.closed and len(breaks) == 2:
-                cells = max(3, cells)
-            u += [*(a + (b - a) * np.arange(1, cells) / cells).tolist(), b]
+            u += sizes.divide(curve, a, b, least=3 if curve.closed and len(breaks) == 2 else 1)
         fixed = set(breaks)
         nodes = [_node(points, joints, at, near) if value in fixed else _new(points, at)
                  for value, at in zip(u, curve.point(np.array(u)), strict=True)]  # fmt: skip
@@ -199,18 +258,21 @@ def _check_apart(points: Array, segments: Ints, lines: Any) -> None:
         )
 
 
-def _fill(points: Array, faces: Faces, size: float, seed: int) -> tuple[Array, Ints]:
+def _fill(
+    points: Array, faces: Faces, sizes: Sizes, chains: dict[str, Ints], seed: int
+) -> tuple[Array, Ints]:
     """Nodes (n, 2), the given points first, and counter-clockwise triangles (t, 3) by gmsh."""
     import gmsh
 
     gmsh.initialize(argv=["", "-v", "0"], readConfigFiles=False, interruptible=False)
     try:
         for name, value in (("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.Algorithm", 6),
-                            ("Mesh.RandomSeed", seed), ("Mesh.MeshSizeMax", 1.15 * size)):  # fmt: skip
+                            ("Mesh.RandomSeed", seed), ("Mesh.MeshSizeMax", 1.15 * sizes.largest)):  # fmt: skip
             gmsh.option.setNumber(name, value)
         gmsh.model.add("sheet")
+        wanted = sizes.at(points)
         for k, (x, y) in enumerate(points):
-            gmsh.model.geo.addPoint(x, y, 0.0, size, k + 1)
+            gmsh.model.geo.addPoint(x, y, 0.0, wanted[k], k + 1)
         lines: dict[tuple[int, int], int] = {}
 
         def line(a: int, b: int) -> int:
@@ -234,6 +296,9 @@ def _fill(points: Array, faces: Faces, size: float, seed: int) -> tuple[Array, I
         for surface, inner in embedded:
             if inner:
                 gmsh.model.mesh.embed(1, inner, 2, surface)
+        _grade(
+            gmsh, sizes, {name: [abs(line(a, b)) for a, b in chains[name].tolist()] for name in sizes.near}
+        )
         gmsh.model.mesh.generate(2)
         return _read(gmsh, len(points))
     except MeshError:
@@ -242,6 +307,23 @@ def _fill(points: Array, faces: Faces, size: float, seed: int) -> tuple[Array, I
         raise MeshError(f"gmsh could not mesh the pattern ({failed}); try another size") from failed
     finally:
         gmsh.finalize()
+
+
+def _grade(gmsh: Any, sizes: Sizes, lines: dict[str, list[int]]) -> None:
+    """The wanted edge lengths inside the sheet as gmsh's background field."""
+    if not lines:
+        return
+    field = gmsh.model.mesh.field
+    grown = []
+    for name, tags in lines.items():
+        distance = field.add("Distance")
+        field.setNumbers(distance, "CurvesList", tags)
+        field.setNumber(distance, "Sampling", 5)
+        grown.append(field.add("MathEval"))
+        field.setString(grown[-1], "F", f"{sizes.near[name]} + {sizes.growth} * F{distance}")
+    least = field.add("Min")
+    field.setNumbers(least, "FieldsList", grown)
+    field.setAsBackgroundMesh(least)
 
 
 def _read(gmsh: Any, fixed: int) -> tuple[Array, Ints]:

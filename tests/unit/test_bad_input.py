@@ -57,7 +57,7 @@ CASES = [
     ("unknown actuation", {"steps": step("folds = {}")}, ["steps[0].folds", "'fold'"]),
     ("unknown fold key", {"steps": BASE["steps"] + step("fold = { crease = 'crease', angle = 1 }")},
      ["steps[1].fold.angle = 1", "crease, to, by"]),
-    ("pinch", {"steps": step("pinch = { by = 0.1 }")}, ["steps[0].pinch", "cannot pinch yet"]),
+    ("pinch without a crease", {"steps": step("pinch = { by = 0.1 }")}, ["steps[0].pinch.crease is missing"]),
     # --- tables and types
     ("no pattern", {"pattern": ""}, ["pattern is missing", "[pattern]"]),
     ("no sheet", {"sheet": ""}, ["sheet is missing"]),

@@ -12,7 +12,7 @@ import pytest
 
 import bh
 import meshes
-from bh.actuation import Displace
+from bh.actuation import Displace, Fold, Moment
 from bh.errors import InputError, ModelError
 from bh.model import Model, Sheet
 from bh.path import Path
@@ -301,6 +301,18 @@ def on_the_boundary() -> meshes.SheetMesh:
                 .step(Displace("edge:end", "z", 1.0), Displace("corner:inner-end", "z", 2.0))
             ),
             ("displaced by 1 and by 2 mm", "remove one"),
+        ),
+        (
+            lambda: sheet().step(Fold("crease", to=2.0), Fold("all", by=0.5)),
+            ("crease 'crease'", "given 2 and 2.64159 rad in one step (1)", "step of its own"),
+        ),
+        (
+            lambda: (
+                sheet()
+                .crease("crease", stiffness=0.1)
+                .step(Moment("crease", to=0.1), Moment("crease", to=0.2))
+            ),
+            ("crease 'crease'", "given 0.1 and 0.2 N mm / mm in one step (1)"),
         ),
         (lambda: sheet().support("edge:inner", "z").fold("crease", by=0.1), ("leave 3 of 6", "add supports")),
         (lambda: sheet().fold("fold", by=0.1), ("no crease 'fold'", "its creases: crease")),

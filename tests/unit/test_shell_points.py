@@ -130,4 +130,4 @@ def test_quadrature() -> None:
     assert t.weights.sum() == pytest.approx(0.5)
     assert t.edge_weights.sum() == pytest.approx(1.0)
     assert t.edge_weights @ t.s**5 == pytest.approx(1 / 6)
-    assert t.weights @ (t.bary[:, 1] ** 4) == pytest.approx(1 / 30)
+    assert t.weights @ (t.factors[:, 0, 0] ** 4) == pytest.approx(1 / 30)

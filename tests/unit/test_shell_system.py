@@ -14,7 +14,7 @@ from bh.model import Model, Sheet
 from bh.program import program
 from fem import system as system_module
 from fem.assembly import build_pattern
-from fem.kirchhoff_love import Shell
+from fem.kirchhoff_love import LinearShell, Shell
 from fem.shell import carried_frames, flat_frames, shell_elements
 from fem.system import ShellSystem
 from meshes import SheetMesh
@@ -36,8 +36,8 @@ def distorted(mesh: SheetMesh, amount: float = 0.25) -> SheetMesh:
     return replace(mesh, points=points)
 
 
-def system_of(model: Model) -> ShellSystem:
-    return Shell().system(model, program(model)[0], None)
+def system_of(model: Model, shell: type[Shell] = Shell) -> ShellSystem:
+    return shell().system(model, program(model)[0], None)
 
 
 def held() -> Model:
@@ -56,10 +56,11 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize("shell", [Shell, LinearShell])
 @pytest.mark.parametrize("name", CASES)
-def test_derivatives(name: str) -> None:
+def test_derivatives(name: str, shell: type[Shell]) -> None:
     """Residual, tangent, rate and power against central differences at a state far from equilibrium."""
-    system = system_of(CASES[name])
+    system = system_of(CASES[name], shell)
     random = np.random.default_rng(1)
     q = system.start() + 0.3 * random.normal(size=system.size)
     v, lam, h = random.normal(size=system.size), 0.4, 1e-6

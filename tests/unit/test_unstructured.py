@@ -117,3 +117,37 @@ def test_bad_patterns() -> None:
     half = CreasePattern(rings=(square,), edges=(("inner", Line((0.0, 0.0), (1.0, 0.0))),))
     with pytest.raises(MeshError, match="do not enclose"):
         meshes.unstructured(half, size=0.3)
+
+
+def test_graded_mesh() -> None:
+    """Edges have the wanted length at the named lines, and grow no faster than told away from them."""
+    near, growth = {"crease:crease": 0.5, "edge:start": 0.8}, 0.3
+    mesh = meshes.unstructured(PATTERNS["sector"], size=4.0, near=near, growth=growth)
+    topology = mesh.topology
+    ends = mesh.points[topology.edges]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    for name, size in near.items():
+        along = lengths[topology.find_edges(mesh.edge_sets[name])]
+        assert along.max() < 1.15 * size
+    middle = ends.mean(axis=1)
+    from_crease = np.abs(np.linalg.norm(middle[:, :2], axis=1) - 100.0)
+    wanted = np.minimum(np.minimum(0.5 + growth * from_crease, 0.8 + growth * np.abs(middle[:, 1])), 4.0)
+    assert (lengths < 1.8 * wanted).all()
+    assert 0.8 < np.median(lengths / wanted) < 1.2
+    even = meshes.unstructured(PATTERNS["sector"], size=0.5)
+    assert len(mesh.triangles) < 0.35 * len(even.triangles)
+
+
+@pytest.mark.parametrize(
+    ("near", "growth", "words"),
+    [
+        ({"crease:fold": 1.0}, 0.3, ["crease:fold", "crease:crease"]),
+        ({"crease:crease": 9.0}, 0.3, ["9.0", "up to size"]),
+        ({"crease:crease": 0.0}, 0.3, ["0.0", "up to size"]),
+        ({"crease:crease": 1.0}, 0.0, ["growth"]),
+    ],
+)
+def test_gradings_that_cannot_be(near: dict[str, float], growth: float, words: list[str]) -> None:
+    with pytest.raises(MeshError) as caught:
+        meshes.unstructured(PATTERNS["sector"], size=3.0, near=near, growth=growth)
+    assert all(word in str(caught.value) for word in words)
