@@ -19,7 +19,7 @@ from bh.observables import Until
 from bh.pinch_zone import Pinched, chain, is_chain, parts, zone
 from bh.supports import AXES, Constraints, Prescribed, resolve, select
 from meshes import SheetMesh
-from meshes.topology import Ints
+from meshes.topology import Ints, dihedral_angles
 
 SHEET, SPRING, HELD = 0, 1, 2
 
@@ -103,7 +103,7 @@ class _Builder:
         hinges, nodes = len(topology.hinges), len(model.mesh.points)
         self.law = np.zeros(hinges, dtype=np.int64)
         self.stiffness = np.zeros(hinges)
-        self.rest = stress_free_angles(model.mesh)
+        self.rest = dihedral_angles(model.mesh.points, topology.hinges)
         self.made = self.rest.copy()  # rest angles of the laws; they come in during the first step
         self.held = np.full(hinges, np.nan)
         self.moment = np.zeros(hinges)
@@ -383,19 +383,6 @@ class _Builder:
             Prescribed(np.array([node]), direction, before.get((node, direction), start), end)
             for (node, direction), end in self.displaced.items()
         ]
-
-
-def stress_free_angles(mesh: SheetMesh) -> Array:
-    """(m,) dihedral angles of the mesh as it is made, rad: there springs are at rest before the first step."""
-    hinges = mesh.topology.hinges
-    if mesh.flat:
-        return np.full(len(hinges), math.pi)
-    wing, tail, head, other = (mesh.points[hinges[:, k]] for k in range(4))
-    edge = head - tail
-    one, two = np.cross(edge, wing - tail), np.cross(other - tail, edge)
-    length = np.linalg.norm(edge, axis=1)
-    turn = np.arctan2(length * np.einsum("mi,mi->m", one, other - tail), np.einsum("mi,mi->m", one, two))
-    return np.asarray(np.mod(math.pi + turn, 2.0 * math.pi))
 
 
 def program(model: Model, ended: Mapping[int, Ended] | None = None) -> tuple[StepProgram, ...]:

@@ -19,8 +19,8 @@ HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "distribute
 
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.program", "bh.observables",
-    "bh.describe", "bh.advice", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state", "bh.formulations",
-    "bh.refinement",
+    "bh.describe", "bh.advice", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state",
+    "bh.formulations", "bh.refinement",
 )  # fmt: skip
 PATH = ("bh.path", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
