@@ -471,7 +471,13 @@ def test_places_by_coordinates(tmp_path):
     mesh = read_drawn(svg(tmp_path, SQUARE + line(0, 20, 100, 40)))
     (node,) = mesh.nodes("near:99,1.5")
     assert mesh.points[node] == pytest.approx([100.0, 0.0, 0.0])
-    for place, words in (("near:1", "two lengths"), ("near:a,b", "two lengths"), ("near:500,0", "mm from the sheet"), ("near:nan,0", "from the sheet")):  # fmt: skip
+    wrong = {
+        "near:1": "two lengths",
+        "near:a,b": "two lengths",
+        "near:500,0": "from the sheet",
+        "near:nan,0": "mm",
+    }
+    for place, words in wrong.items():
         with pytest.raises(meshes.MeshError, match=words):
             mesh.nodes(place)
 
