@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from hypothesis import given, settings
@@ -39,6 +40,16 @@ def shapes(draw: st.DrawFn) -> str:
         turn = f'transform="rotate({n[4]}) scale({n[5]})"'
         return f'<ellipse cx="{n[0]}" cy="{n[1]}" rx="{n[2]}" ry="{n[3]}" {turn} {look}/>'
     return f'<polyline points="{n[0]},{n[1]} {n[2]},{n[3]} {n[4]},{n[5]} {n[6]},{n[7]}" {look}/>'
+
+
+def told(read: Callable[[Path], object], file: Path) -> tuple[object, str]:
+    """What was read and nothing, or None and the one line that was told."""
+    try:
+        return read(file), ""
+    except FileFormatError as error:
+        message = str(error)
+    assert "\n" not in message
+    return None, message
 
 
 @settings(max_examples=60, deadline=None)
