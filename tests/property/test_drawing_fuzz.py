@@ -9,7 +9,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshes import CreasePattern
+from meshes import CreasePattern, FileFormatError
 from meshes.io import read_drawn, read_pattern
 
 NUMBERS = st.one_of(
