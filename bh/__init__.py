@@ -44,7 +44,8 @@ _HOME = {
 _SUBMODULES = {
     "contact": "bh.analysis.contact", "corrugation": "bh.applications.corrugation",
     "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
-    "pinching": "bh.applications.pinching", "plotting": "bh.plotting", "scan": "bh.scan",
+    "pinching": "bh.applications.pinching", "plotting": "bh.plotting",
+    "rulings": "bh.analysis.rulings", "scan": "bh.scan",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",
 }  # fmt: skip

@@ -47,10 +47,12 @@ def test_the_tutorial_runs(here, capsys):
 
 
 def test_the_python_runs(here, capsys):
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    exec(compile(code, "docs/drawing.md", "exec"), {})
-    outcome, angle = capsys.readouterr().out.split()
-    assert outcome == "reached"
+    names: dict[str, object] = {}
+    for code in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
+        exec(compile(code, "docs/drawing.md", "exec"), names)
+    outcome, angle, again, energy = capsys.readouterr().out.split()
+    assert outcome == again == "reached"
+    assert float(energy) == pytest.approx(0.93, abs=0.02)
     assert 0.5 < float(angle) < 0.8
 
 
