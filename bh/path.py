@@ -128,7 +128,7 @@ class Path:
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
-        return found
+        return found + [f"{remark.code}: {remark}" for remark in self.model.remarks]
 
     @property
     def iterations(self) -> int:
