@@ -33,7 +33,10 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("bh.solvers", ("meshes", "bh.solvers")),
     *((module, ("meshes", *DESCRIPTION)) for module in DESCRIPTION),
     # `path.plot()` and `bh.trace(..., accuracy=...)` are the user's words; what they need is loaded when it is called
-    *((module, ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.plotting", "bh.accuracy")) for module in PATH),
+    *(
+        (module, ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.plotting", "bh.accuracy"))
+        for module in PATH
+    ),
     ("bh.accuracy", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.accuracy", "bh.analysis")),
     ("bh.analysis", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis")),
     ("bh.applications", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis", "bh.applications")),

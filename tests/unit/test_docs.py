@@ -27,6 +27,7 @@ TABLES: dict[str, type[schema.Table]] = {
     "steps: force": schema.ForceTable,
     "steps: displace": schema.DisplaceTable,
     "outputs": schema.OutputsTable,
+    "accuracy": schema.AccuracyTable,
 }
 
 
