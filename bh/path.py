@@ -21,11 +21,13 @@ from bh.formulations import Formulation, formulation
 from bh.model import Model
 from bh.program import StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
+from bh.halves import Halves
 from bh.refinement import Goal
 from bh.solvers.automatic import Automatic
 from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
+from bh.symmetry import Plane
 from bh.storage import CriticalRow, PathFile, StateRow, reading
 from bh.threads import one_blas_thread
 from meshes.mesh import count
@@ -82,7 +84,9 @@ class Path:
         accuracy: the estimate of its error, where an accuracy was asked for (`bh.accuracy.Accuracy`), else None.
     """
 
-    def __init__(self, model: Model, provenance: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self, model: Model, provenance: dict[str, Any] | None = None, symmetry: Plane | None = None
+    ) -> None:
         self.model = model
         self.provenance = provenance or _provenance(model)
         self.records: list[Record] = []
@@ -90,6 +94,7 @@ class Path:
         self.accuracy: Accuracy | None = None
         self._formulation: Formulation = formulation(model.formulation)
         self._programs: tuple[StepProgram, ...] = program(model)
+        self._halves = None if symmetry is None else Halves(self._formulation, model, self._programs, symmetry)
         self._systems: dict[int, Any] = {}
         self._states: dict[int, State] = {}
 
@@ -243,17 +248,21 @@ class Path:
     def _system(self, step: int) -> Any:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
-            start = None
-            if step > 0:
-                last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
-                start = None if last is None else self[last]
-            self._systems[step] = self._formulation.system(self.model, self._programs[step], start)
+            self._systems[step] = self._formulation.system(
+                self.model, self._programs[step], self._start(step)
+            )
         return self._systems[step]
+
+    def _start(self, step: int) -> State | None:
+        """The state that a step begins at; None is the stress-free sheet."""
+        last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
+        return None if last is None else self[last]
 
 
 def trace(
     model: Model,
     *,
+    symmetry: Plane | None = None,
     progress: bool | ProgressMeter = False,
     strategy: Strategy | None = None,
     file: str | FilePath | None = None,
@@ -263,6 +272,9 @@ def trace(
     """Follow the equilibrium of `model` through all its steps.
 
     Args:
+        symmetry: "x", "y" or a normal [x, y, 0]: the model is mirror-symmetric, solve one half of it (`bh.symmetry`).
+            States are of the whole sheet, and are stable if no mode, symmetric or not, is negative; that is looked at
+            in the last state of a step only. What would leave the symmetry on the way is not found.
         progress: True for a bar in the terminal, or an object that is told about every increment.
         strategy: how increments are chosen; the default suits all scenes.
         file: write every accepted state to this file before the next increment begins.
@@ -285,13 +297,13 @@ def trace(
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
     if accuracy is not None:
-        return _trace_to(model, accuracy, progress, strategy, file, resume)
+        return _trace_to(model, accuracy, progress, strategy, file, resume, symmetry)
     strategy = strategy or Automatic()
-    path = Path(model)
+    path = Path(model, symmetry=symmetry)
     target: PathFile | None = None
     if file is not None:
         if resume:
-            path, target = _resume(model, FilePath(file))
+            path, target = _resume(model, FilePath(file), symmetry)
         else:
             path._system(0)  # a model that cannot be solved must not replace the file of one that was
             target = _new_file(path, FilePath(file))
@@ -319,13 +331,14 @@ def _trace_to(
     strategy: Strategy | None,
     file: str | FilePath | None,
     resume: bool,
+    symmetry: Plane | None,
 ) -> Path:
     from bh.accuracy import solve
 
     if resume:
         raise ModelError("a run to a wanted accuracy begins anew on every mesh; run it without resume")
     goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-    path = solve(model, goal, progress=progress, strategy=strategy)
+    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)
     if file is not None:
         path.save(file)
     return path
@@ -334,10 +347,14 @@ def _trace_to(
 def _run_step(
     path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
 ) -> StepOutcome:
-    system = path._system(step)
+    whole = path._system(step)
+    halves = path._halves
+    system = whole if halves is None else halves.system(step, path._start(step))
     began = time.perf_counter()
 
     def accept(record: Record) -> None:
+        if halves is not None:
+            record = halves.whole(step, whole, record)
         path.records.append(record)
         if target is not None:
             target.add(path._row(len(path.records) - 1, record))
@@ -356,7 +373,10 @@ def _run_step(
             )
             began = time.perf_counter()
     else:
-        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in _recent(done)]
+        recent = _recent(done)
+        if halves is not None:
+            recent = [halves.part(step, whole, record) for record in recent]
+        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in recent]
         increment = done[-1].next_increment
         if (
             len(history) < 3 and step > 0 and not any(r.jumped for r in done)
@@ -393,21 +413,21 @@ def _new_file(path: Path, file: FilePath) -> PathFile:
     return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)
 
 
-def _resume(model: Model, file: FilePath) -> tuple[Path, PathFile]:
+def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path, PathFile]:
     path = Path.load(file)
     if path.provenance.get("input") != fingerprint(model):
         raise PathFileError(
             f"'{file}' holds another model; run without --resume, or choose another output folder"
         )
-    path = _with_model(path, model)
+    path = _with_model(path, model, symmetry)
     target = PathFile.open(file)
     target.forget_failed_steps()
     path.steps = [step for step in path.steps if step.outcome == "reached"]
     return path, target
 
 
-def _with_model(path: Path, model: Model) -> Path:
-    other = Path(model, path.provenance)
+def _with_model(path: Path, model: Model, symmetry: Plane | None) -> Path:
+    other = Path(model, path.provenance, symmetry)
     other.records, other.steps = path.records, path.steps
     return other
 

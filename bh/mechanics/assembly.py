@@ -114,6 +114,8 @@ def scatter(H, n, slots, data):  # type: ignore[no-untyped-def]
             slot = slots[at]
             if slot >= 0:
                 data[slot] += H[i, j]
+            elif slot < -1:
+                data[-2 - slot] += 2.0 * H[i, j]
             at += 1
 
 
