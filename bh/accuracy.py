@@ -18,6 +18,8 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
+from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,6 +105,18 @@ class Accuracy:
 
 def _plain(value: Array) -> list[float] | None:
     return [float(v) for v in value] if np.isfinite(value).all() else None
+
+
+def trace_to(
+    model: Model, accuracy: float | Goal, file: str | FilePath | None, resume: bool, **options: Any
+) -> Path:
+    """What `bh.trace(..., accuracy=...)` does; options of `solve`."""
+    if resume:
+        raise ModelError("a run to a wanted accuracy begins anew on every mesh; run it without resume")
+    path = solve(model, accuracy if isinstance(accuracy, Goal) else Goal(accuracy), **options)
+    if file is not None:
+        path.save(file)
+    return path
 
 
 def solve(

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from bh.errors import ModelError
-from bh.formulations import names
 from bh.formulations import formulation as registered
+from bh.formulations import names
 from bh.model import Model
 from bh.program import StepProgram, program
 from bh.solvers.modes import count_negative
@@ -29,7 +29,7 @@ class Halves:
         if not hasattr(formulation, "half"):
             able = ", ".join(name for name in names() if hasattr(registered(name), "half"))
             raise ModelError(
-                f"formulation '{formulation.name}' cannot be solved by halves; leave out symmetry, or take one of: {able}"
+                f"formulation '{formulation.name}' cannot be solved by halves; take one of: {able}"
             )
         self.formulation, self.model = formulation, model
         self.plane = mirror(model.mesh, plane)
@@ -45,18 +45,25 @@ class Halves:
         return self._systems[step]
 
     def whole(self, step: int, whole: Any, record: R) -> R:
-        """A record of the half as one of the whole sheet; at the end of the step its negative modes are counted."""
+        """A record of the half as one of the whole sheet; all that it knows of stability is where the half has none."""
         half, at = self._systems[step], record
         q = self.formulation.whole(whole, half, self.plane, at.q, at.lam)  # type: ignore[attr-defined]
-        negative = None
-        if at.lam == 1.0:  # type: ignore[attr-defined]
-            forces = whole.evaluate(q, 1.0).forces
-            negative = count_negative(whole.tangent(q, 1.0, forces))
         points = tuple(
-            replace(c, q=self.formulation.whole(whole, half, self.plane, c.q, c.lam), mode=whole.loads(half.vectors(c.mode)))
+            replace(
+                c,
+                q=self.formulation.whole(whole, half, self.plane, c.q, c.lam),
+                mode=whole.loads(half.vectors(c.mode)),
+            )
             for c in at.critical  # type: ignore[attr-defined]
         )
+        negative = at.negative or None  # type: ignore[attr-defined]
         return replace(at, q=q, negative=negative, critical=points)  # type: ignore[type-var]
+
+    @staticmethod
+    def negative(whole: Any, record: Any) -> int:
+        """Negative modes of the whole sheet, symmetric or not."""
+        forces = whole.evaluate(record.q, record.lam).forces
+        return count_negative(whole.tangent(record.q, record.lam, forces))
 
     def part(self, step: int, whole: Any, record: R) -> R:
         """The unknowns of the half from a record of the whole sheet."""

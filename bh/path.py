@@ -6,7 +6,7 @@ import platform
 import time
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path as FilePath
@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from bh.describe import describe, fingerprint, rebuild
 from bh.errors import ModelError, PathFileError
 from bh.formulations import Formulation, formulation
+from bh.halves import Halves
 from bh.model import Model
 from bh.program import StepProgram, open_ends, program
 from bh.progress import ProgressMeter, meter
-from bh.halves import Halves
 from bh.refinement import Goal
 from bh.solvers.automatic import Automatic
 from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
-from bh.symmetry import Plane
 from bh.storage import CriticalRow, PathFile, StateRow, reading
+from bh.symmetry import Plane
 from bh.threads import one_blas_thread
 from meshes.mesh import count
 
@@ -94,7 +94,9 @@ class Path:
         self.accuracy: Accuracy | None = None
         self._formulation: Formulation = formulation(model.formulation)
         self._programs: tuple[StepProgram, ...] = program(model)
-        self._halves = None if symmetry is None else Halves(self._formulation, model, self._programs, symmetry)
+        self._halves = (
+            None if symmetry is None else Halves(self._formulation, model, self._programs, symmetry)
+        )
         self._systems: dict[int, Any] = {}
         self._states: dict[int, State] = {}
 
@@ -116,7 +118,15 @@ class Path:
     @property
     def stable(self) -> bool | None:
         """Is the last state stable? None where that was not looked at."""
+        self._look_at_whole()
         return self.records[-1].stable if self.records else None
+
+    def _look_at_whole(self) -> None:
+        """Of a sheet solved by halves, count the negative modes of the last state, symmetric or not, when asked."""
+        if self._halves is not None and self.records and self.records[-1].negative is None:
+            last = self.records[-1]
+            self.records[-1] = replace(last, negative=self._halves.negative(self._system(last.step), last))
+            self._states.pop(len(self.records) - 1, None)
 
     @property
     def critical_points(self) -> list[tuple[int, CriticalPoint]]:
@@ -137,6 +147,7 @@ class Path:
         found += dict.fromkeys(ends)
         if self.accuracy is not None and not self.accuracy.met:
             found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
+        self._look_at_whole()
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
@@ -272,9 +283,8 @@ def trace(
     """Follow the equilibrium of `model` through all its steps.
 
     Args:
-        symmetry: "x", "y" or a normal [x, y, 0]: the model is mirror-symmetric, solve one half of it (`bh.symmetry`).
-            States are of the whole sheet, and are stable if no mode, symmetric or not, is negative; that is looked at
-            in the last state of a step only. What would leave the symmetry on the way is not found.
+        symmetry: "x", "y" or a normal [x, y, 0]: solve one half of a mirror-symmetric model (`bh.symmetry`). States are
+            of the whole sheet; what leaves the symmetry is only looked for in the last state (`path.stable`).
         progress: True for a bar in the terminal, or an object that is told about every increment.
         strategy: how increments are chosen; the default suits all scenes.
         file: write every accepted state to this file before the next increment begins.
@@ -297,7 +307,11 @@ def trace(
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
     if accuracy is not None:
-        return _trace_to(model, accuracy, progress, strategy, file, resume, symmetry)
+        from bh.accuracy import trace_to
+
+        return trace_to(
+            model, accuracy, file, resume, progress=progress, strategy=strategy, symmetry=symmetry
+        )
     strategy = strategy or Automatic()
     path = Path(model, symmetry=symmetry)
     target: PathFile | None = None
@@ -321,26 +335,6 @@ def trace(
         report.close(path.outcome)
         if target is not None:
             target.close()
-    return path
-
-
-def _trace_to(
-    model: Model,
-    accuracy: float | Goal,
-    progress: bool | ProgressMeter,
-    strategy: Strategy | None,
-    file: str | FilePath | None,
-    resume: bool,
-    symmetry: Plane | None,
-) -> Path:
-    from bh.accuracy import solve
-
-    if resume:
-        raise ModelError("a run to a wanted accuracy begins anew on every mesh; run it without resume")
-    goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)
-    if file is not None:
-        path.save(file)
     return path
 
 

@@ -36,7 +36,7 @@ class Mirror:
         normal: (3,) unit normal of the plane; `offset` its distance from the origin along it, mm.
         node: (n,) the image of every node; `side` (n,) -1, 0 (in the plane) or 1.
         edge, hinge, triangle: (e,), (m,), (t,) images of edges, hinges and triangles.
-        edge_weight, hinge_weight, triangle_weight: what part of each belongs to the kept half: 1, 1/2 (its own image), 0.
+        edge_weight, hinge_weight, triangle_weight: what part of each is in the kept half: 1, 1/2 (its own image), 0.
     """
 
     mesh: SheetMesh
@@ -88,7 +88,7 @@ def mirror(mesh: SheetMesh, plane: Plane) -> Mirror:
     order, other = np.lexsort(corners.T), np.lexsort(images.T)
     if not np.array_equal(corners[order], images[other]):
         raise ModelError(
-            f"symmetry along {plane}: the mesh ({mesh.kind}) is not its own image, its diagonals are; take staggered or "
+            f"symmetry along {plane}: the mesh ({mesh.kind}) is not its own image; take staggered or "
             "alternating cells in an even number, or leave out symmetry"
         )
     triangle = np.empty(len(corners), dtype=np.int64)
@@ -102,13 +102,19 @@ def _normal(mesh: SheetMesh, plane: Plane) -> Array:
     if not isinstance(plane, str):
         vector = np.asarray(plane, dtype=float)
         if vector.shape != (3,) or not np.isfinite(vector).all() or not vector[:2].any() or vector[2] != 0.0:
-            raise ModelError(f"symmetry = {plane} cannot be; give \"x\", \"y\" or a normal [x, y, 0] in the sheet")
+            raise ModelError(
+                f'symmetry = {plane} cannot be; give "x", "y" or a normal [x, y, 0] in the sheet'
+            )
         return np.asarray(vector / np.linalg.norm(vector))
     if plane not in ("x", "y"):
-        raise ModelError(f'symmetry = "{plane}" is not known; give "x", "y" or a normal [x, y, 0] in the sheet')
+        raise ModelError(
+            f'symmetry = "{plane}" is not known; give "x", "y" or a normal [x, y, 0] in the sheet'
+        )
     inner = mesh.curves.get("edge:inner")
     if isinstance(inner, Arc) and not inner.closed:
-        before, after = inner.point(np.array([0.25, 0.75]))  # the chord is parallel to the tangent in the middle
+        before, after = inner.point(
+            np.array([0.25, 0.75])
+        )  # the chord is parallel to the tangent in the middle
         y = np.append(after - before, 0.0)
         y /= np.linalg.norm(y)
         return y if plane == "y" else np.array([y[1], -y[0], 0.0])
@@ -124,8 +130,8 @@ def _images(mesh: SheetMesh, normal: Array, offset: float, near: float) -> Ints:
         worst = int(np.argmax(distance))
         x, y, z = mesh.points[worst]
         raise ModelError(
-            f"the mesh is not mirror-symmetric: node {worst} at ({x:.4g}, {y:.4g}, {z:.4g}) has no image across the plane "
-            f"normal to ({normal[0]:.3g}, {normal[1]:.3g}, 0); mend the mesh, or leave out symmetry"
+            f"the mesh is not mirror-symmetric: node {worst} at ({x:.4g}, {y:.4g}, {z:.4g}) has no image across the "
+            f"plane normal to ({normal[0]:.3g}, {normal[1]:.3g}, 0); mend the mesh, or leave out symmetry"
         )
     return np.asarray(image, dtype=np.int64)
 
@@ -150,7 +156,9 @@ def check(model: Model, steps: Sequence[StepProgram], plane: Mirror) -> None:
         for what, tensor, vector in _constrained(step.constraints):
             image = np.einsum("ij,njk,kl->nil", plane.matrix, tensor, plane.matrix)
             _same(tensor[plane.node], image, model, f"{where}: the supports")
-            _same(vector[plane.node], vector @ plane.matrix, model, f"{where}: the displacements at the {what}")
+            _same(
+                vector[plane.node], vector @ plane.matrix, model, f"{where}: the displacements at the {what}"
+            )
         clamped = model.mesh.topology.find_edges(step.constraints.clamped)
         if set(plane.edge[clamped].tolist()) != set(clamped.tolist()):
             raise ModelError(f"{where}: the clamped edges are not mirror-symmetric; {ADVICE}")
@@ -166,7 +174,9 @@ def _check_hinges(model: Model, step: StepProgram, plane: Mirror, where: str) ->
         off = np.abs(one - other) > ALIKE * max(float(np.abs(one).max(initial=0.0)), 1e-300)
         if off.any():
             a, b = model.mesh.topology.hinges[int(np.argmax(off)), 1:3]
-            raise ModelError(f"{where}: the creases are not mirror-symmetric ({name} at edge {a}-{b}); {ADVICE}")
+            raise ModelError(
+                f"{where}: the creases are not mirror-symmetric ({name} at edge {a}-{b}); {ADVICE}"
+            )
 
 
 def _constrained(c: Constraints) -> list[tuple[str, Array, Array]]:

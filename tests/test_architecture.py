@@ -19,9 +19,9 @@ HEAVY = ("gmsh", "pyvista", "matplotlib", "skfem", "dask", "pymoo")
 
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.program", "bh.scene", "bh.scene_schema",
-    "bh.describe", "bh.state", "bh.formulations", "bh.refinement",
+    "bh.describe", "bh.state", "bh.formulations", "bh.refinement", "bh.symmetry",
 )  # fmt: skip
-PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
+PATH = ("bh.path", "bh.halves", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = ("bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.offscreen", "bh.warm_up", "bh.accuracy")
 

@@ -1,8 +1,8 @@
 """Half of a mirror-symmetric sheet: images share their unknowns, elements count for the part that lies in the half.
 
-All nodes keep their numbers and places; only who is an unknown changes. With the reflection R an image has the local axes
-of its original turned by R, and so the same local components. The energy of the half is half of the energy, forces on
-nodes in the plane count half, and so do multipliers of creases that are their own image.
+All nodes keep their numbers and places; only who is an unknown changes. With the reflection R an image has the local
+axes of its original turned by R, and so the same local components. The energy of the half is half of the energy, forces
+on nodes in the plane count half, and so do multipliers of creases that are their own image.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from bh.actuation import Ramp
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.elements import Elements
 from bh.program import StepProgram
-from bh.supports import Constraints, free_motions, rigid_motions
+from bh.supports import Constraints
 from bh.symmetry import Mirror
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -31,7 +31,6 @@ class MirroredDisplacements(Displacements):
     def __init__(self, mesh: SheetMesh, constraints: Constraints, start_points: Array, plane: Mirror) -> None:
         super().__init__(mesh, _reflected(constraints, plane), start_points)
         self.plane = plane
-        self.weight: Array
         kept = (plane.side <= 0)[:, None] & ~self.constraints.fixed
         self.number = np.full(kept.shape, -1, dtype=np.int64)
         self.number[kept] = np.arange(kept.sum())
@@ -42,7 +41,11 @@ class MirroredDisplacements(Displacements):
         self.number[image] = self.number[plane.node[image]]
         self._images = np.flatnonzero((image[:, None] & (self.number >= 0)).ravel())
         self._of = self.number.ravel()[self._images]
-        self.weight = 1.0 + np.bincount(self._of, minlength=len(self.free))
+        self.weight = np.asarray(1.0 + np.bincount(self._of, minlength=len(self.free)), dtype=np.float64)
+        self._kept = np.flatnonzero(~image)
+        self._fixed_kept = self.constraints.fixed[self._kept]
+        self._turned_kept = np.flatnonzero(self.constraints.frame_of[self._kept] >= 0)
+        self._axes_kept = self.constraints.frames[self.constraints.frame_of[self._kept[self._turned_kept]]]
 
     def positions(self, u: Array, lam: float) -> Array:
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
@@ -63,19 +66,25 @@ class MirroredDisplacements(Displacements):
 
     def rigid(self, x: Array) -> Array:
         """Those of the rigid motions that are symmetric, along the plane and the turn in it, orthonormal by weight."""
-        scale = np.ones(6)
-        scale[3:] = 1.0 / max(float(np.linalg.norm(np.ptp(x, axis=0))), 1e-300)
-        allowed = free_motions(x, self.constraints) / scale[:, None]
-        n = self.plane.normal
-        symmetric = np.zeros((6, 3))
-        symmetric[:3, 0], symmetric[2, 1], symmetric[3:, 2] = (-n[1], n[0], 0.0), 1.0, n
-        # what the supports allow falls into symmetric and antisymmetric motions, so cosines are 1 or 0
-        _, cosine, right = np.linalg.svd(np.linalg.qr(allowed)[0].T @ symmetric, full_matrices=False)
-        motions = rigid_motions(x) @ (scale[:, None] * (symmetric @ right[cosine > 0.5].T))
-        for column in range(motions.shape[1]):
-            motions[:, column] = self.to_local(motions[:, column].reshape(-1, 3)).ravel()
+        n, kept = self.plane.normal, self._kept
+        arm = x[kept] - x.mean(axis=0)
+        motions = np.empty((len(kept), 3, 3))
+        motions[:, :, 0], motions[:, :, 1], motions[:, :, 2] = (
+            (-n[1], n[0], 0.0),
+            (0.0, 0.0, 1.0),
+            np.cross(n, arm),
+        )
+        motions[:, :, 2] /= max(float(np.abs(arm).max()), 1e-300)
+        motions[self._turned_kept] = self._axes_kept @ motions[self._turned_kept]
+        rows = motions[self._fixed_kept]
+        if len(
+            rows
+        ):  # what the supports leave of them; nodes in the plane are held across it, which they all obey
+            _, size, right = np.linalg.svd(np.linalg.qr(rows, mode="r"), full_matrices=True)
+            rank = int((size > 1e-7 * np.sqrt(len(rows))).sum())
+            motions = motions @ right[rank:].T
         root = np.sqrt(self.weight)[:, None]
-        return np.asarray(np.linalg.qr(root * motions[self.free])[0] / root)
+        return np.asarray(np.linalg.qr(root * motions[~self._fixed_kept])[0] / root)
 
     @cached_property
     def ground_triangle(self) -> int:
@@ -97,7 +106,12 @@ def _reflected(c: Constraints, plane: Mirror) -> Constraints:
     axes[turned] = c.frames[c.frame_of[of[turned]]]
     frame_of[image] = len(c.frames) + np.arange(len(image))
     return replace(
-        c, fixed=fixed, start=start, end=end, frame_of=frame_of, frames=np.concatenate((c.frames, axes @ plane.matrix))
+        c,
+        fixed=fixed,
+        start=start,
+        end=end,
+        frame_of=frame_of,
+        frames=np.concatenate((c.frames, axes @ plane.matrix)),
     )
 
 
