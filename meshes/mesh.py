@@ -205,7 +205,9 @@ class SheetMesh:
 def _mark(points: Array, triangles: Ints) -> int:
     """Checksum of nodes and triangles; a flat sheet has the same in two and in three columns."""
     used = points if points[:, 2:].any() else points[:, :2]
-    return zlib.crc32(np.ascontiguousarray(triangles).tobytes(), zlib.crc32(np.ascontiguousarray(used).tobytes()))
+    return zlib.crc32(
+        np.ascontiguousarray(triangles).tobytes(), zlib.crc32(np.ascontiguousarray(used).tobytes())
+    )
 
 
 def _check_triangles(points: Array, triangles: Ints) -> None:

@@ -307,16 +307,18 @@ def _rates(
         if not ended:
             continue
         last, cost = errs[member][ended[-1]][quantity], runs[ended[-1]]
-        params = {"scene": problem.name, "model": member.name, "along": cost.along, "rows": cost.rows}
+        params: dict[str, Any] = {"scene": problem.name, "model": member.name}
+        params |= {"along": cost.along, "rows": cost.rows}
         params |= {"order": rate(*zip(*above, strict=True)) if len(above) > 2 else math.nan, "bar": last[1]}
         params |= {"memory_mb": cost.memory_mb, "below_the_bar": last[0] <= last[1]}
         if quantity == "curve":
             params["mm"] = last[0] * problem.length
         judged = member.formulation == "consistent" and quantity == "energy"
+        asked = problem.asked + last[1] if judged else None
         result.checks.append(
             Check(CASE, f"relative error of the finest mesh, {QUANTITIES[quantity]}", params, last[0], "1", 0.0,
-                  SOURCE, problem.asked + last[1] if judged else None, unknowns=cost.unknowns, iterations=cost.iterations,
-                  wall_time_s=cost.wall_time_s, outcome=cost.outcome)
+                  SOURCE, asked, unknowns=cost.unknowns, iterations=cost.iterations, wall_time_s=cost.wall_time_s,
+                  outcome=cost.outcome)
         )  # fmt: skip
 
 

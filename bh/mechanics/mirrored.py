@@ -42,6 +42,7 @@ class MirroredDisplacements(Displacements):
         self._images = np.flatnonzero((image[:, None] & (self.number >= 0)).ravel())
         self._of = self.number.ravel()[self._images]
         self.weight = np.asarray(1.0 + np.bincount(self._of, minlength=len(self.free)), dtype=np.float64)
+        self._root = np.sqrt(self.weight)
         self._kept = np.flatnonzero(~image)
         self._fixed_kept = self.constraints.fixed[self._kept]
         self._turned_kept = np.flatnonzero(self.constraints.frame_of[self._kept] >= 0)
@@ -83,7 +84,7 @@ class MirroredDisplacements(Displacements):
             _, size, right = np.linalg.svd(np.linalg.qr(rows, mode="r"), full_matrices=True)
             rank = int((size > 1e-7 * np.sqrt(len(rows))).sum())
             motions = motions @ right[rank:].T
-        root = np.sqrt(self.weight)[:, None]
+        root = self._root[:, None]
         return np.asarray(np.linalg.qr(root * motions[~self._fixed_kept])[0] / root)
 
     @cached_property
