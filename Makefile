@@ -4,6 +4,7 @@
 # Variables:
 #   PYTHON       the interpreter that .venv is made from, 3.11 or newer
 #                (unset: the first usable one of python3.14 ... python3.11, python3)
+#   QUICK        QUICK=1: `make report` runs every case with fewer points
 #   PYTEST_ARGS  handed to pytest by `make test` and `make bench`
 
 VENV := .venv
@@ -19,9 +20,9 @@ export PIP_NO_INPUT := 1
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-report: setup ## set everything up, then write the report
+report: setup ## set everything up, then write the report (QUICK=1 for fewer points)
 	@echo "== Report"
-	@$(VENV)/bin/bh report
+	@$(VENV)/bin/bh report $(if $(filter-out 0,$(QUICK)),--quick)
 
 test: lint ## set everything up, then run the linters and the tests (PYTEST_ARGS="-k name")
 	@echo "== pytest"

@@ -18,8 +18,6 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
-from pathlib import Path as FilePath
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +25,13 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations import formulation, names
 from bh.model import Model
-from bh.path import Path, trace
+from bh.path import Path
 from bh.program import program
 from bh.progress import ProgressMeter
 from bh.refinement import Goal, Refinement, mesh_at, pattern_of, with_mesh
 from bh.solvers.trace import Strategy
 from bh.symmetry import Plane
+from bh.tracing import trace
 
 Array = NDArray[np.float64]
 LARGEST = 40_000  # triangles
@@ -105,18 +104,6 @@ class Accuracy:
 
 def _plain(value: Array) -> list[float] | None:
     return [float(v) for v in value] if np.isfinite(value).all() else None
-
-
-def trace_to(
-    model: Model, accuracy: float | Goal, file: str | FilePath | None, resume: bool, **options: Any
-) -> Path:
-    """What `bh.trace(..., accuracy=...)` does; options of `solve`."""
-    if resume:
-        raise ModelError("a run to a wanted accuracy begins anew on every mesh; run it without resume")
-    path = solve(model, accuracy if isinstance(accuracy, Goal) else Goal(accuracy), **options)
-    if file is not None:
-        path.save(file)
-    return path
 
 
 def solve(

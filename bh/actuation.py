@@ -8,11 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.pinch_zone import PROFILES, Profile
 
 Array = NDArray[np.float64]
 Angles = float | Sequence[float]
@@ -91,6 +93,65 @@ class Fold:
 
 
 @dataclass(frozen=True)
+class Pinch:
+    """Close a crease that is folded already over a part of its length (source 5.3.2).
+
+    Along the pinched zone the dihedral angle goes from what it is to the pinched one by a profile (`bh.pinch_zone`).
+    Outside of the zone, and in later steps, the crease stays what it was; `Fold` with the stiffness of its spring opens
+    a pinch again. In one step with the fold, the zone goes to where the fold would have brought it.
+
+    Attributes:
+        crease: its name, or "all" for every crease that is drawn as mountain or valley.
+        at: where the middle of the zone is, in parts of the crease's length from its start, 0 to 1.
+        to: dihedral angle in the middle, rad in (0, 2 pi).
+        by: fold angle in the middle instead, mountain or valley as drawn, rad in (0, pi). If neither is given it is
+            pi - pi / 14, the source's pinch.
+        length: of the zone along the crease, mm; a fifth of the crease if not given.
+        how: "imposed" holds the angles of the zone exactly. "rest" only sets the rest angles of the crease's spring,
+            which the sheet resists: with the source's L* of 0.5 and 2 mm such a pinch stops far above its angle.
+        profile: "cosine", or "grip" for the pinched angle all over the zone.
+    """
+
+    crease: str
+    at: float = 0.5
+    to: float | None = None
+    by: float | None = None
+    length: float | None = None
+    how: Literal["imposed", "rest"] = "imposed"
+    profile: Profile = "cosine"
+
+    def __post_init__(self) -> None:
+        what = f"pinch of crease '{self.crease}'"
+        if self.to is not None and self.by is not None:
+            raise ModelError(f"{what} has to and by; give one of them")
+        for key, low, high in (("to", 0.0, 2.0 * math.pi), ("by", 0.0, math.pi)):
+            value = getattr(self, key)
+            if value is not None and not low < value < high:
+                hint = "; angles are radians, not degrees" if abs(value) > 7.0 else ""
+                raise ModelError(
+                    f"{what}: {key} = {value} rad closes it beyond what it can; stay inside ({low:g}, {high:.4g}){hint}"
+                )
+        if not 0.0 <= self.at <= 1.0:
+            raise ModelError(
+                f"{what}: at = {self.at} is outside the crease; give a part of its length, 0 to 1"
+            )
+        if self.length is not None and not (math.isfinite(self.length) and self.length > 0.0):
+            raise ModelError(f"{what}: length = {self.length} cannot be; give a positive length in mm")
+        for key, known in (("how", ("imposed", "rest")), ("profile", tuple(PROFILES))):
+            if getattr(self, key) not in known:
+                raise ModelError(
+                    f"{what}: {key} = '{getattr(self, key)}' is not known; use {' or '.join(known)}"
+                )
+
+    def target(self, sense: Array) -> Array:
+        """(k,) dihedral angles in the middle, rad, for edges drawn as mountain (+1) or valley (-1)."""
+        if self.to is not None:
+            return np.full(len(sense), float(self.to))
+        by = math.pi - math.pi / 14.0 if self.by is None else self.by
+        return np.asarray(math.pi - sense * by)
+
+
+@dataclass(frozen=True)
 class Moment:
     """A dead couple a length on a crease, N mm / mm; positive folds the crease the way that it is drawn."""
 
@@ -143,7 +204,78 @@ class Displace:
                 raise ModelError(f"displacement at '{self.at}': the direction is the zero vector")
 
 
-Actuation = Fold | Moment | Force | Displace
+@dataclass(frozen=True)
+class Bar:
+    """A rigid bar that the sheet can touch, without friction, in the step that names it (`bh.mechanics.touching`).
+
+    Its section is a rectangle with rounded edges, its axis as long as it needs to be. Bars take the place of the
+    rigid-body support in their step.
+
+    Attributes:
+        name: in `State.pressing`.
+        at: centre of the section where the step begins, mm.
+        azimuth: of the axis, from the x axis towards y, rad; tilt: of the axis, upwards, rad.
+        width, height: of the whole section, mm; radius: of its edges, mm. Width and height of twice the radius make a
+            cylinder.
+        by: how far it moves while lambda runs from 0 to 1, mm.
+        stiffness: of its surface, N/mm for every mm of the mesh's edges; gap: distance at which it begins to press, mm.
+    """
+
+    name: str
+    at: tuple[float, float, float]
+    azimuth: float
+    width: float
+    height: float
+    radius: float
+    by: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tilt: float = 0.0
+    stiffness: float = 50.0
+    gap: float = 0.05
+
+    def __post_init__(self) -> None:
+        for key in ("at", "by"):
+            _vector(f"bar '{self.name}': {key}", getattr(self, key))
+        _finite(f"bar '{self.name}': azimuth or tilt", (self.azimuth, self.tilt))
+        for key in ("width", "height", "radius", "stiffness", "gap"):
+            value = getattr(self, key)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ModelError(f"bar '{self.name}': {key} = {value} cannot be; give a positive number")
+        if 2.0 * self.radius > min(self.width, self.height) * (1.0 + 1e-12):
+            raise ModelError(
+                f"bar '{self.name}': its radius {self.radius:g} mm is more than half of its section"
+            )
+
+    @property
+    def half(self) -> tuple[float, float]:
+        """Half the width and height between the centres of the rounded edges, mm."""
+        return max(0.5 * self.width - self.radius, 0.0), max(0.5 * self.height - self.radius, 0.0)
+
+    @property
+    def across(self) -> tuple[float, float, float]:
+        """Unit vector of the width, horizontal."""
+        return -math.sin(self.azimuth), math.cos(self.azimuth), 0.0
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """Unit vector of the height."""
+        s = math.sin(self.tilt)
+        return -s * math.cos(self.azimuth), -s * math.sin(self.azimuth), math.cos(self.tilt)
+
+
+@dataclass(frozen=True)
+class Tether:
+    """Soft springs that hold nodes where the step begins; they share the `total` stiffness along x, y and z, N/mm."""
+
+    at: str | Sequence[int]
+    total: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        _vector(f"tether at '{self.at}'", self.total)
+        if min(self.total) < 0.0:
+            raise ModelError(f"tether at '{self.at}': {self.total} cannot be; stiffness is not negative")
+
+
+Actuation = Fold | Pinch | Moment | Force | Displace | Bar | Tether
 
 
 def _finite(what: str, values: Sequence[float]) -> None:

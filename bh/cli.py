@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
+    "segments": "Make the data set of pinched segments for inverse design.",
+    "sweep": "Solve a scene for many parameters into a labelled data set.",
     "verify": "Check the solvers against theory and published numbers.",
     "report": "Run the verification cases and write the report page.",
 }
@@ -188,6 +190,40 @@ def view(
         except InputError as error:
             again = shlex.join(["bh", "view", str(path), "--picture", "sheet.png"])
             raise InputError(f"{error}, or {again}") from error
+
+
+@app.command()
+def export(
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="A scene (flat), or a path or run's folder (folded).")
+    ],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What to write; its suffix is the format.")],
+    state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
+    facets: Annotated[bool, typer.Option("--facets", help="Also the edges of the mesh (SVG, DXF).")] = False,
+) -> None:
+    """Write a flat pattern or a folded sheet for other programs."""
+    from bh.errors import InputError
+    from bh.export import write_flat, write_state
+
+    if source.suffix.lower() == ".toml":
+        from bh.scene import load_scene
+
+        done = write_flat(file, load_scene(source).model.mesh, facets)
+    else:
+        from bh.path import Path as Trace
+        from bh.run import path_file
+
+        solved = Trace.load(path_file(source) if source.is_dir() else source)
+        if not -len(solved) <= state < len(solved):
+            raise InputError(
+                f"--state {state}: '{source}' has the states 0 to {len(solved) - 1}; -1 is the last"
+            )
+        last = state % len(solved)
+        if file.suffix.lower() in (".svg", ".dxf"):
+            done = write_flat(file, solved.model.mesh, facets)
+        else:
+            done = write_state(file, [solved[k] for k in range(last + 1)], source.stem)
+    typer.echo(f"wrote {done}")
 
 
 @app.command()

@@ -11,21 +11,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Displace, Fold, Force, Moment
+from bh.actuation import Actuation, Bar, Displace, Fold, Force, Moment, Pinch, Tether
 from bh.errors import PathFileError
 from bh.model import CreaseLaw, ElementStiffness, Model, Sheet
+from bh.observables import Until
 from bh.supports import RigidBody, Support
-from meshes import Arc, Line, Polyline, SheetMesh
+from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
 AnyArray = NDArray[Any]
 ACTUATIONS: dict[str, type[Actuation]] = {
     "fold": Fold,
+    "pinch": Pinch,
     "moment": Moment,
     "force": Force,
     "displace": Displace,
 }
-CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "polyline": Polyline}
+CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
+STEP_ITEMS: dict[str, type[Actuation | Until]] = {
+    **ACTUATIONS,
+    "bar": Bar,
+    "tether": Tether,
+    "until": Until,
+}
 FORMAT = 1
 
 
@@ -54,7 +62,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         },
         "supports": ["rigid-body" if isinstance(s, RigidBody) else _plain(s) for s in model.supports],
         "creases": {name: _plain(law) for name, law in model.creases.items()},
-        "steps": [[_tagged(item, ACTUATIONS) for item in step] for step in model.steps],
+        "steps": [[_tagged(item, STEP_ITEMS) for item in step] for step in model.steps],
     }
     return data, arrays
 
@@ -83,7 +91,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             mesh=mesh,
             sheet=Sheet(**data["sheet"]),
             supports=tuple(RigidBody() if s == "rigid-body" else Support(**s) for s in data["supports"]),
-            steps=tuple(tuple(_untagged(item, ACTUATIONS) for item in step) for step in data["steps"]),
+            steps=tuple(tuple(_untagged(item, STEP_ITEMS) for item in step) for step in data["steps"]),
             creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
             formulation=data["formulation"],
             stiffness=ElementStiffness(arrays["stiffness/bars"], arrays["stiffness/hinges"], data["green"])
@@ -119,7 +127,7 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
     rest = {key: value for key, value in data.items() if key != "kind"}
     if data["kind"] == "polyline":
         rest["vertices"] = np.asarray(rest["vertices"])
-    for key in ("start", "end", "centre"):
+    for key in ("start", "end", "centre", "curvatures", "lengths"):
         if isinstance(rest.get(key), list):
             rest[key] = tuple(rest[key])
     return kinds[data["kind"]](**rest)

@@ -2,20 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from bh.errors import ModelError
 from bh.formulations import formulation as registered
 from bh.formulations import names
 from bh.model import Model
-from bh.program import StepProgram, program
+from bh.program import Ended, StepProgram, program
 from bh.solvers.modes import count_negative
 from bh.state import State
-from bh.symmetry import Plane, check, halved, mirror
+from bh.symmetry import Mirror, Plane, check, halved, mirror
 
 R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Half:
+    """One step: `system` of the half, `sheet` of the whole."""
+
+    formulation: Any
+    plane: Mirror
+    system: Any
+    sheet: Any
+
+    def unknowns(self, q: Any, lam: float) -> Any:
+        """Unknowns of the whole sheet."""
+        return self.formulation.whole(self.sheet, self.system, self.plane, q, lam)
+
+    def whole(self, record: R) -> R:
+        """A record of the half as one of the whole sheet; all that it knows of stability is where the half has none."""
+        at: Any = record
+        points = tuple(
+            replace(c, q=self.unknowns(c.q, c.lam), mode=self.sheet.loads(self.system.vectors(c.mode)))
+            for c in at.critical
+        )
+        return replace(at, q=self.unknowns(at.q, at.lam), negative=at.negative or None, critical=points)
+
+    def part(self, record: R) -> R:
+        """A record of the whole sheet as one of the half."""
+        at: Any = record
+        return replace(at, q=self.formulation.part(self.sheet, self.system, self.plane, at.q, at.lam))
 
 
 class Halves:
@@ -34,38 +62,19 @@ class Halves:
         self.formulation, self.model = formulation, model
         self.plane = mirror(model.mesh, plane)
         check(model, steps, self.plane)
-        free = any(step.constraints.rigid_body for step in steps)
-        self._programs = program(halved(model, self.plane, free))
-        self._systems: dict[int, Any] = {}
+        self._half = halved(model, self.plane, any(step.constraints.rigid_body for step in steps))
+        self._found: dict[int, Half] = {}
 
-    def system(self, step: int, start: State | None) -> Any:
-        """The half's system of a step that begins at a state of the whole sheet."""
-        if step not in self._systems:
-            self._systems[step] = self.formulation.half(self.model, self._programs[step], start, self.plane)
-        return self._systems[step]
-
-    def whole(self, step: int, whole: Any, record: R) -> R:
-        """A record of the half as one of the whole sheet; all that it knows of stability is where the half has none."""
-        half, at = self._systems[step], record
-        q = self.formulation.whole(whole, half, self.plane, at.q, at.lam)  # type: ignore[attr-defined]
-        points = tuple(
-            replace(
-                c,
-                q=self.formulation.whole(whole, half, self.plane, c.q, c.lam),
-                mode=whole.loads(half.vectors(c.mode)),
-            )
-            for c in at.critical  # type: ignore[attr-defined]
-        )
-        negative = at.negative or None  # type: ignore[attr-defined]
-        return replace(at, q=q, negative=negative, critical=points)  # type: ignore[type-var]
+    def of(self, step: int, sheet: Any, start: State | None, ended: Mapping[int, Ended]) -> Half:
+        """The half of a step that begins at a state of the whole sheet, whose system is `sheet`."""
+        if step not in self._found:
+            ramps = program(self._half, ended)[step]
+            system = self.formulation.half(self.model, ramps, start, self.plane)
+            self._found[step] = Half(self.formulation, self.plane, system, sheet)
+        return self._found[step]
 
     @staticmethod
-    def negative(whole: Any, record: Any) -> int:
+    def negative(sheet: Any, record: Any) -> int:
         """Negative modes of the whole sheet, symmetric or not."""
-        forces = whole.evaluate(record.q, record.lam).forces
-        return count_negative(whole.tangent(record.q, record.lam, forces))
-
-    def part(self, step: int, whole: Any, record: R) -> R:
-        """The unknowns of the half from a record of the whole sheet."""
-        q = self.formulation.part(whole, self._systems[step], self.plane, record.q, record.lam)  # type: ignore[attr-defined]
-        return replace(record, q=q)  # type: ignore[type-var]
+        forces = sheet.evaluate(record.q, record.lam).forces
+        return count_negative(sheet.tangent(record.q, record.lam, forces))

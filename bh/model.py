@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.actuation import Actuation, Displace, Fold, Force, Moment
+from bh.actuation import Actuation, Displace, Fold, Force, Moment, Pinch
 from bh.errors import ModelError
+from bh.observables import Until
 from bh.supports import RigidBody, Support
 from meshes import SheetMesh
 from meshes.mesh import count
@@ -108,7 +109,7 @@ class Model:
         mesh: the stress-free sheet.
         sheet: its material and thickness.
         supports: none at all means the rigid-body support.
-        steps: each a tuple of actuations that act together; steps run one after another.
+        steps: each a tuple of actuations that act together (and an `Until` that ends it); steps run one after another.
         creases: laws of spring creases. A crease with no law and no fold is ordinary sheet.
         formulation: name of a registered formulation.
         stiffness: given element stiffness (bars and hinges only), or None to derive it from the sheet.
@@ -119,7 +120,7 @@ class Model:
     mesh: SheetMesh
     sheet: Sheet
     supports: tuple[Support | RigidBody, ...] = ()
-    steps: tuple[tuple[Actuation, ...], ...] = ()
+    steps: tuple[tuple[Actuation | Until, ...], ...] = ()
     creases: Mapping[str, CreaseLaw] = field(default_factory=dict)
     formulation: str = "bars-and-hinges"
     stiffness: ElementStiffness | None = None
@@ -216,15 +217,23 @@ class Model:
         self.mesh.crease_edges(name)
         return replace(self, creases={**self.creases, name: CreaseLaw(**law)})
 
-    def step(self, *actuations: Actuation) -> Model:
-        """Add a step in which all `actuations` act together."""
-        if not actuations:
-            raise ModelError("a step needs at least one actuation (fold, moment, force or displace)")
+    def step(self, *actuations: Actuation | Until, until: Until | None = None) -> Model:
+        """Add a step in which all `actuations` act together; it ends before they are complete where `until` says."""
+        if until is not None:
+            actuations = (*actuations, until)
+        if all(isinstance(item, Until) for item in actuations):
+            raise ModelError("a step needs at least one actuation (fold, pinch, moment, force or displace)")
+        if sum(isinstance(item, Until) for item in actuations) > 1:
+            raise ModelError("a step has two targets to end at (until); give it one")
         return replace(self, steps=(*self.steps, actuations))
 
-    def fold(self, crease: str, **how: Any) -> Model:
+    def fold(self, crease: str, until: Until | None = None, **how: Any) -> Model:
         """Add a step that folds a crease; arguments of `bh.Fold`."""
-        return self.step(Fold(crease, **how))
+        return self.step(Fold(crease, **how), until=until)
+
+    def pinch(self, crease: str, **how: Any) -> Model:
+        """Add a step that pinches a crease that is folded already; arguments of `bh.Pinch`."""
+        return self.step(Pinch(crease, **how))
 
     def moment(self, crease: str, to: float) -> Model:
         """Add a step with a couple a length on a crease; see `bh.Moment`."""

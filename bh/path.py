@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-import platform
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import astuple, dataclass, replace
-from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.describe import describe, fingerprint, rebuild
-from bh.errors import ModelError, PathFileError
+from bh.describe import describe, rebuild
 from bh.formulations import Formulation, formulation
-from bh.halves import Halves
+from bh.halves import Half, Halves
 from bh.model import Model
-from bh.program import StepProgram, open_ends, program
-from bh.progress import ProgressMeter, meter
-from bh.refinement import Goal
-from bh.solvers.automatic import Automatic
-from bh.solvers.increments import ARC, LOAD, CriticalPoint, point
-from bh.solvers.trace import Strategy, Walk, walk
+from bh.observables import until_of
+from bh.program import Ended, StepProgram, open_ends, program
+from bh.provenance import provenance_of
+from bh.solvers.increments import ARC, LOAD, CriticalPoint
 from bh.state import State
 from bh.storage import CriticalRow, PathFile, StateRow, reading
 from bh.symmetry import Plane
-from bh.threads import one_blas_thread
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -88,7 +80,7 @@ class Path:
         self, model: Model, provenance: dict[str, Any] | None = None, symmetry: Plane | None = None
     ) -> None:
         self.model = model
-        self.provenance = provenance or _provenance(model)
+        self.provenance = provenance or provenance_of(model)
         self.records: list[Record] = []
         self.steps: list[StepOutcome] = []
         self.accuracy: Accuracy | None = None
@@ -221,7 +213,7 @@ class Path:
         Raises:
             PathFileError: the file cannot be written.
         """
-        target = _new_file(self, FilePath(file))
+        target = new_file(self, FilePath(file))
         for index, record in enumerate(self.records):
             target.add(self._row(index, record))
         for step, end in enumerate(self.steps):
@@ -259,171 +251,33 @@ class Path:
     def _system(self, step: int) -> Any:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
+            if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
+                self._programs = program(self.model, self._ended(step))
             self._systems[step] = self._formulation.system(
                 self.model, self._programs[step], self._start(step)
             )
         return self._systems[step]
+
+    def _half(self, step: int) -> Half | None:
+        """The half that solves a step, or None where the whole sheet is solved."""
+        if self._halves is None:
+            return None
+        return self._halves.of(step, self._system(step), self._start(step), self._ended(step))
 
     def _start(self, step: int) -> State | None:
         """The state that a step begins at; None is the stress-free sheet."""
         last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
         return None if last is None else self[last]
 
-
-def trace(
-    model: Model,
-    *,
-    symmetry: Plane | None = None,
-    progress: bool | ProgressMeter = False,
-    strategy: Strategy | None = None,
-    file: str | FilePath | None = None,
-    resume: bool = False,
-    accuracy: float | Goal | None = None,
-) -> Path:
-    """Follow the equilibrium of `model` through all its steps.
-
-    Args:
-        symmetry: "x", "y" or a normal [x, y, 0]: solve one half of a mirror-symmetric model (`bh.symmetry`). States are
-            of the whole sheet; what leaves the symmetry is only looked for in the last state (`path.stable`).
-        progress: True for a bar in the terminal, or an object that is told about every increment.
-        strategy: how increments are chosen; the default suits all scenes.
-        file: write every accepted state to this file before the next increment begins.
-        resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
-        accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
-            chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
-            see `bh.accuracy` and `path.accuracy`. The file is written when that is done.
-
-    Returns:
-        the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
-        its reason and keeps everything up to there.
-
-    Raises:
-        ModelError: the model has no steps, or cannot be solved as described.
-        PathFileError: the file cannot be written, or is of another model.
-    """
-    if not isinstance(model, Model):
-        what = "give scene.model" if hasattr(model, "model") else "give a bh.Model"
-        raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
-    if not model.steps:
-        raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
-    if accuracy is not None:
-        from bh.accuracy import trace_to
-
-        return trace_to(
-            model, accuracy, file, resume, progress=progress, strategy=strategy, symmetry=symmetry
-        )
-    strategy = strategy or Automatic()
-    path = Path(model, symmetry=symmetry)
-    target: PathFile | None = None
-    if file is not None:
-        if resume:
-            path, target = _resume(model, FilePath(file), symmetry)
-        else:
-            path._system(0)  # a model that cannot be solved must not replace the file of one that was
-            target = _new_file(path, FilePath(file))
-    report = meter(progress)
-    try:
-        for step in range(len(path.steps), len(model.steps)):
-            with one_blas_thread():
-                end = _run_step(path, step, strategy, report, target)
-            path.steps.append(end)
-            if target is not None:
-                target.finish_step(step, *astuple(end))
-            if end.outcome != "reached":
-                break
-    finally:
-        report.close(path.outcome)
-        if target is not None:
-            target.close()
-    return path
-
-
-def _run_step(
-    path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
-) -> StepOutcome:
-    whole = path._system(step)
-    halves = path._halves
-    system = whole if halves is None else halves.system(step, path._start(step))
-    began = time.perf_counter()
-
-    def accept(record: Record) -> None:
-        if halves is not None:
-            record = halves.whole(step, whole, record)
-        path.records.append(record)
-        if target is not None:
-            target.add(path._row(len(path.records) - 1, record))
-
-    increment: float | None = None
-    done = [record for record in path.records if record.step == step]
-    origin = point(system, system.start(), 0.0)
-    if not done:
-        history = [origin]
-        if step == 0:
-            imbalance = system.evaluate(origin.q, 0.0).imbalance
-            accept(
-                Record(
-                    0, 0.0, origin.q, 0, imbalance, time.perf_counter() - began, strategy.limits(system)[0]
-                )
-            )
-            began = time.perf_counter()
-    else:
-        recent = _recent(done)
-        if halves is not None:
-            recent = [halves.part(step, whole, record) for record in recent]
-        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in recent]
-        increment = done[-1].next_increment
-        if (
-            len(history) < 3 and step > 0 and not any(r.jumped for r in done)
-        ):  # later steps do not store their start
-            history.insert(0, origin)
-    for item in walk(Walk(system, strategy, tuple(history), increment, origin)):
-        now = time.perf_counter()
-        if item.outcome != "reached":
-            return StepOutcome(item.outcome, item.note, item.iterations)
-        at = item.point
-        accept(
-            Record(
-                step, at.lam, at.q, item.iterations, item.imbalance, now - began, item.next_increment,
-                negative=at.negative, mode=at.mode, note=item.note, cuts=item.cuts, jumped=item.jumped,
-                critical=item.critical,
-            )
-        )  # fmt: skip
-        report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
-        began = time.perf_counter()
-    return StepOutcome("reached")
-
-
-def _recent(done: list[Record]) -> list[Record]:
-    """Records that a resumed step needs: three since the last jump, and all of a run by arc length that goes on."""
-    jumps = [index for index, record in enumerate(done) if record.jumped]
-    arc = len(done)
-    while arc > 0 and done[arc - 1].mode != LOAD:
-        arc -= 1
-    return done[max(arc - 3, jumps[-1] if jumps else 0, 0) :]
-
-
-def _new_file(path: Path, file: FilePath) -> PathFile:
-    data, arrays = describe(path.model)
-    return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)
-
-
-def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path, PathFile]:
-    path = Path.load(file)
-    if path.provenance.get("input") != fingerprint(model):
-        raise PathFileError(
-            f"'{file}' holds another model; run without --resume, or choose another output folder"
-        )
-    path = _with_model(path, model, symmetry)
-    target = PathFile.open(file)
-    target.forget_failed_steps()
-    path.steps = [step for step in path.steps if step.outcome == "reached"]
-    return path, target
-
-
-def _with_model(path: Path, model: Model, symmetry: Plane | None) -> Path:
-    other = Path(model, path.provenance, symmetry)
-    other.records, other.steps = path.records, path.steps
-    return other
+    def _ended(self, before: int) -> dict[int, Ended]:
+        """Steps before `before` that ended early, by an `Until`."""
+        last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
+        found = {}
+        for step, index in last.items():
+            if until_of(self.model.steps[step]) is not None and self.records[index].lam < 1.0:
+                state = self[index]
+                found[step] = Ended(state.lam, state.points, state.dihedral_angles)
+        return found
 
 
 def _record(row: StateRow) -> Record:
@@ -434,17 +288,7 @@ def _record(row: StateRow) -> Record:
     )  # fmt: skip
 
 
-@lru_cache(maxsize=1)
-def versions() -> dict[str, str]:
-    """Versions of the project and of what its numbers depend on."""
-    found = {"python": platform.python_version()}
-    for name in ("curved-crease-workbench", "numpy", "scipy", "numba"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
-
-
-def _provenance(model: Model) -> dict[str, Any]:
-    return {"input": fingerprint(model), "versions": versions(), "formulation": model.formulation}
+def new_file(path: Path, file: FilePath) -> PathFile:
+    """An empty path file for a path, which replaces an older one."""
+    data, arrays = describe(path.model)
+    return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)

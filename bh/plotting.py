@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.offscreen import PlotError, has_display, render
+from bh.panels import cut_open
 from meshes.io.export import replacing, write_mesh
 
 if TYPE_CHECKING:
@@ -249,22 +250,10 @@ def _superscript(exponent: int) -> str:
 def _panels(state: State) -> Any:
     """The sheet as a pyvista surface cut open along its creases, so that shading is smooth up to them."""
     import pyvista as pv
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
 
-    mesh, topology = state.mesh, state.mesh.topology
-    joined = np.ones(len(topology.edges), dtype=bool)
-    joined[topology.edge_triangles[:, 1] < 0] = False
-    for crease in mesh.creases:
-        joined[topology.find_edges(mesh.crease_edges(crease))] = False
-    one, two = topology.edge_triangles[joined].T
-    count = len(mesh.triangles)
-    graph = coo_array((np.ones(len(one)), (one, two)), shape=(count, count))
-    _, panel = connected_components(graph, directed=False)
-    keys = np.column_stack((np.repeat(panel, 3), mesh.triangles.ravel()))
-    corners, triangles = np.unique(keys, axis=0, return_inverse=True)
-    surface = pv.PolyData.from_regular_faces(state.points[corners[:, 1]], triangles.reshape(-1, 3))
-    surface.point_data["node"] = corners[:, 1]
+    nodes, triangles = cut_open(state.mesh)
+    surface = pv.PolyData.from_regular_faces(state.points[nodes], triangles)
+    surface.point_data["node"] = nodes
     return surface
 
 

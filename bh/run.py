@@ -11,6 +11,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,12 +20,13 @@ import numpy as np
 from bh.analysis.contact import Contact, first_contact
 from bh.describe import fingerprint
 from bh.errors import InputError
+from bh.export import FOLDED, write_flat, write_state
 from bh.model import Model
 from bh.path import Path as Trace
-from bh.path import trace
 from bh.progress import ProgressMeter
 from bh.scene import Scene
 from bh.storage import PathFile, reading
+from bh.tracing import trace
 from meshes.io.export import replacing
 
 FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
@@ -266,7 +268,7 @@ def _number(value: float) -> float | None:
 def remove_extras(folder: Path, mark: str) -> None:
     """Remove what `extras` has written for another run, as far as it can be removed; nothing else."""
     with contextlib.suppress(OSError):
-        for name in (f"folded{mark}.png", f"folded{mark}.fold", f"path{mark}.pvd"):
+        for name in (f"folded{mark}.png", f"path{mark}.pvd", *(f"folded{mark}{suffix}" for suffix in FOLDED)):
             (folder / name).unlink(missing_ok=True)
         for file in (folder / f"path{mark}").glob("[0-9][0-9][0-9][0-9]*.vtu"):
             file.unlink()
@@ -304,4 +306,10 @@ def extras(
         f"path{mark}.pvd": (series, vtu or scene.outputs.vtu),
         f"folded{mark}.fold": (fold, scene.outputs.fold),
     }
-    return {name: write for name, (write, asked) in wanted.items() if asked}
+    files: dict[str, Callable[[], Any]] = {name: write for name, (write, asked) in wanted.items() if asked}
+    for suffix in scene.outputs.folded:
+        name = f"folded{mark}.{suffix}"
+        files[name] = partial(write_state, folder / name, [path[-1]], scene.name)
+    for suffix in scene.outputs.flat:
+        files[f"flat.{suffix}"] = partial(write_flat, folder / f"flat.{suffix}", scene.model.mesh)
+    return files

@@ -6,7 +6,6 @@ Every error is a `SceneError` of one line. Keys are told as dotted paths; entrie
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,25 +13,33 @@ from typing import Any
 
 import numpy as np
 
-from bh.actuation import Actuation, Fold, Moment
+from bh.actuation import Actuation, Bar, Fold, Moment, Pinch, Tether
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
+from bh.observables import Until
 from bh.program import program
 from bh.refinement import Goal, pattern_of
+from bh.scene_patterns import (
+    LIBRARY,
+    DrawingPattern,
+    FilePattern,
+)
 from bh.scene_schema import (
     ACTUATIONS,
-    LIBRARY,
     AccuracyTable,
     CreaseTable,
-    FilePattern,
+    DrawnTable,
     GmshTable,
     MeshTable,
     ModelTable,
     OutputsTable,
     SheetTable,
     SupportTable,
+    UntilTable,
+)
+from bh.scene_tables import (
     as_table,
     as_tables,
     check_keys,
@@ -45,7 +52,7 @@ from bh.scene_schema import (
     within,
 )
 from bh.supports import RigidBody, Support, directions, select
-from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip, structured
+from meshes import CreasePattern, SheetMesh, structured
 
 SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
@@ -55,11 +62,13 @@ LONGEST_FILE = 20_000_000  # bytes
 
 @dataclass(frozen=True)
 class Outputs:
-    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet (FOLD)."""
+    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet, the flat pattern."""
 
     pictures: bool = False
     vtu: bool = False
     fold: bool = False
+    folded: tuple[str, ...] = ()
+    flat: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -132,8 +141,23 @@ def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Sce
         raise SceneError(one_line(f"{name}: {error}")) from error
 
 
+def scene_from_tables(tables: dict[str, Any], folder: str | Path = ".", name: str = "scene") -> Scene:
+    """A scene from its tables as `tomllib` reads them: what a sweep changes between points.
+
+    Raises:
+        SceneError: as `parse_scene`.
+    """
+    try:
+        return replace(_from_tables(tables, Path(folder)), name=name)
+    except InputError as error:
+        raise SceneError(one_line(f"{name}: {error}")) from error
+
+
 def _scene(text: str, folder: Path) -> Scene:
-    data = read_toml(text)
+    return _from_tables(read_toml(text), folder)
+
+
+def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
     check_keys("", data, SECTIONS)
     for key in ("pattern", "sheet", "steps"):
         if key not in data:
@@ -163,7 +187,7 @@ def _scene(text: str, folder: Path) -> Scene:
             pattern_of(model)
             if accuracy.at is not None:
                 model.mesh.nodes(accuracy.at)
-    return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold), accuracy=accuracy)
+    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy)
 
 
 def _accuracy(data: Any) -> Goal:
@@ -192,7 +216,7 @@ def _formulation(name: str) -> str:
 def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
     table = as_table(pattern, "pattern")
     if "file" in table:
-        return _mesh_from_file(read_table(FilePattern, table, "pattern"), mesh, folder)
+        return _mesh_from_file(table, mesh, folder)
     kind = table.get("kind")
     listed = ", ".join(LIBRARY)
     if kind is None:
@@ -207,21 +231,35 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
             "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
         )
     how = _mesh_table(as_table(mesh, "mesh"))
-    flat = _pattern(drawn)
+    if isinstance(how, DrawnTable):
+        raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
+    with within("pattern"):
+        pattern = drawn.draw()
+    return _meshed(pattern, how)
+
+
+def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
     if isinstance(how, GmshTable):
         from meshes.unstructured import sheet_area, unstructured
 
         _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
         with within("mesh"):
             return unstructured(flat, size=how.size, near=how.near, growth=how.growth, seed=how.seed)
+    if not flat.rails:
+        raise SceneError(
+            f'mesh.kind = "{how.kind}" is for creases that run across the sheet side by side, or round a hole; '
+            'these do not: use kind = "gmsh" with size'
+        )
     _check_size(flat, how)
     with within("mesh"):
         return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
 
 
-def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable:
+def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable | DrawnTable:
     if table.get("kind") == "gmsh":
         return read_table(GmshTable, table, "mesh")
+    if table.get("kind") == "drawn":
+        return read_table(DrawnTable, table, "mesh")
     if "size" in table:
         raise SceneError(
             f'mesh.size = {shown(table["size"])} is for kind = "gmsh"; use along or aspect_ratio, or add that kind'
@@ -229,25 +267,37 @@ def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable:
     return read_table(MeshTable, table, "mesh")
 
 
-def _pattern(table: Any) -> CreasePattern:
-    with within("pattern"):
-        if table.kind == "strip":
-            return strip(table.length, table.width, table.creases, table.fold)
-        if table.kind == "annulus_sector":
-            return annulus_sector(table.radius, table.width, table.angle, table.fold)
-        return full_annulus(table.radius, table.width, table.fold)
-
-
-def _mesh_from_file(table: FilePattern, mesh: Any, folder: Path) -> SheetMesh:
-    name = shown(table.file)
-    if Path(table.file).suffix.lower() != ".fold":
-        raise SceneError(f"pattern.file = {name} is not a .fold file; this version reads no other yet")
+def _mesh_from_file(table: dict[str, Any], mesh: Any, folder: Path) -> SheetMesh:
+    name = shown(table["file"])
+    suffix = Path(str(table["file"])).suffix.lower()
+    if suffix in (".svg", ".dxf"):
+        return _mesh_from_drawing(read_table(DrawingPattern, table, "pattern"), mesh, folder)
+    stored = read_table(FilePattern, table, "pattern")
+    if suffix != ".fold":
+        raise SceneError(f"pattern.file = {name} is no file of a pattern; give .svg, .dxf or .fold")
     if mesh is not None:
         raise SceneError(f"mesh: {name} brings its own faces, and they are the mesh; remove [mesh]")
     from meshes.io import read_fold
 
     with within("pattern.file"):
-        return read_fold(folder / table.file, table.frame)
+        return read_fold(folder / stored.file, stored.frame)
+
+
+def _mesh_from_drawing(table: DrawingPattern, mesh: Any, folder: Path) -> SheetMesh:
+    from meshes.io import read_drawn, read_pattern
+
+    if mesh is None:
+        raise SceneError(
+            'mesh is missing; add a table [mesh] with kind = "gmsh" and size, along or aspect_ratio (creases side by '
+            'side), or kind = "drawn" (the faces of the drawing)'
+        )
+    how = _mesh_table(as_table(mesh, "mesh"))
+    options = {name: value for name, value in table if name != "file"}
+    with within("pattern.file"):
+        if isinstance(how, DrawnTable):
+            return read_drawn(folder / table.file, **options)
+        drawn = read_pattern(folder / table.file, **options)
+    return _meshed(drawn, how)
 
 
 def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
@@ -256,8 +306,9 @@ def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
     along = float(how.along or 0)
     if how.aspect_ratio is not None:
         length = max(rail.length for rail in pattern.rails)
-        inner, outer = (rail.point(np.zeros(1))[0] for rail in (pattern.rails[0], pattern.rails[-1]))
-        height = math.dist(inner, outer) / panels
+        # at one end and in the middle: panels can taper
+        inner, outer = (rail.point(np.array([0.0, 0.5])) for rail in (pattern.rails[0], pattern.rails[-1]))
+        height = float(np.linalg.norm(outer - inner, axis=1).max()) / panels
         along = how.aspect_ratio * length / height * how.rows
     _check_triangles(2.0 * along * how.rows * panels)
 
@@ -289,18 +340,29 @@ def _crease(item: Any, at: str) -> CreaseLaw:
         return CreaseLaw(table.Lstar, table.stiffness, table.rest)
 
 
-def _step(item: Any, at: str) -> tuple[Actuation, ...]:
+def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
     step = as_table(item, at)
-    if "pinch" in step:
-        raise SceneError(f"{at}.pinch: this version cannot pinch yet; use fold, moment, force or displace")
-    check_keys(at, step, ACTUATIONS)
-    if not step:
+    check_keys(at, step, (*ACTUATIONS, "until"))
+    if not set(step) - {"until"}:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
-    found: list[Actuation] = []
+    found: list[Actuation | Until] = []
     for key, value in step.items():
+        if key == "until":
+            found.append(_until(value, f"{at}.until"))
+            continue
         for where, each in one_or_more(value, f"{at}.{key}"):
             found.append(_actuation(key, each, where))
     return tuple(found)
+
+
+def _until(item: Any, at: str) -> Until:
+    table = read_table(UntilTable, item, at)
+    with within(at):
+        if table.depth is not None:
+            return Until("depth", table.depth, tolerance=table.tolerance)
+        assert table.observable is not None
+        assert table.value is not None
+        return Until(table.observable, table.value, table.of, table.tolerance)
 
 
 def _actuation(key: str, item: Any, at: str) -> Actuation:
@@ -331,8 +393,10 @@ def _check(model: Model) -> None:
                 select(mesh, support.at)
     for i, actuations in enumerate(model.steps):
         for item in actuations:
+            if isinstance(item, Until | Bar | Tether):
+                continue
             key = type(item).__name__.lower()
-            if isinstance(item, Fold | Moment):
+            if isinstance(item, Fold | Moment | Pinch):
                 if item.crease != "all":
                     with within(f"steps[{i}].{key}.crease"):
                         mesh.crease_edges(item.crease)

@@ -149,6 +149,10 @@ def check(model: Model, steps: Sequence[StepProgram], plane: Mirror) -> None:
     """Raises `ModelError` with one line that names what is not symmetric."""
     for number, step in enumerate(steps):
         where = f"step {number + 1}"
+        if step.bodies:
+            raise ModelError(
+                f"{where}: a sheet that touches bodies is not solved by halves; leave out symmetry"
+            )
         _check_hinges(model, step, plane, where)
         for name in ("start", "end"):
             force = getattr(step.force, name)
@@ -169,6 +173,7 @@ def _check_hinges(model: Model, step: StepProgram, plane: Mirror, where: str) ->
     for name in ("rest", "held", "moment"):
         ramp = getattr(step, name)
         values |= {f"{name} at the start": ramp.start, f"{name} at the end": ramp.end}
+    values |= {"pinch": step.pinch.toward, "extent of the pinch": step.pinch.part}
     for name, value in values.items():
         one, other = np.nan_to_num(value), np.nan_to_num(value[plane.hinge])
         off = np.abs(one - other) > ALIKE * max(float(np.abs(one).max(initial=0.0)), 1e-300)

@@ -120,21 +120,19 @@ def connectors(
     stiffness = np.where(program.law == SPRING, program.stiffness, 0.0)[hinges]
 
     def fold(angles: Array) -> Array:
-        """(c, r) fold angles of dihedral angles (m,)."""
-        return np.repeat(math.pi - angles[hinges], turns).reshape(-1, turns)
+        """(c, r) fold angles of dihedral angles (m, 2) at the ends of edges, or (m,) of whole edges."""
+        out: Array = (math.pi - angles[hinges]).reshape(-1, turns)
+        return out
 
     begin = beta[hinges]
-    angle = Ramp(
-        np.where(
-            held[:, None], np.where(np.isnan(fold(program.held.start)), begin, fold(program.held.start)), 0.0
-        ),
-        np.where(held[:, None], fold(program.held.end), 0.0),
-    )
+    imposed = program.held_angles(math.pi - (beta if turns == 2 else beta[:, 0]))
+    springs = program.rest_ends if turns == 2 else program.rest
+    angle = Ramp(*(np.where(held[:, None], fold(at), 0.0) for at in (imposed.start, imposed.end)))
     # a held crease that is released keeps its moment: k (rest - beta) is what the crease carried
     turn = np.linalg.solve(mass, couple[hinges][..., None])[..., 0]
     released = begin + turn / np.where(stiffness > 0.0, stiffness, np.inf)[:, None]
-    start = fold(program.rest.start)
-    rest = Ramp(np.where(np.isnan(start), released, start), fold(program.rest.end))
+    start = fold(springs.start)
+    rest = Ramp(np.where(np.isnan(start), released, start), fold(springs.end))
     load = Ramp(
         np.where(held, 0.0, program.moment.start[hinges]), np.where(held, 0.0, program.moment.end[hinges])
     )

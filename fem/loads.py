@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Fold, Force, Ramp
+from bh.actuation import Actuation, Displace, Fold, Force, Ramp
 from bh.errors import ModelError
 from bh.model import Model
+from bh.observables import Until
 from bh.program import program
 from bh.supports import Constraints, select
 from fem.components import edge_set
@@ -41,7 +42,7 @@ def constraints(mesh: ElementMesh, model: Model, step: int) -> Constraints:
     return program(replace(model, mesh=mesh.linear, steps=steps))[step].constraints
 
 
-def _plain(item: Actuation) -> Actuation:
+def _plain(item: Actuation | Until) -> Actuation | Until:
     """Fold angles an edge do not fit the halved edges, and do not matter here."""
     if not isinstance(item, Fold):
         return item
@@ -60,6 +61,10 @@ def forces(mesh: ElementMesh, model: Model, step: int, lengths: Array) -> Ramp:
     A `total` on a named set of edges is a uniform line load a length of edge; everything else acts on the corners
     named. A force stays until another one acts on the same place, as in `bh.program`.
     """
+    for actuations in model.steps[:step]:  # the builder of these does not know where such a step ended
+        moved = any(isinstance(item, Force | Displace) for item in actuations)
+        if moved and any(isinstance(item, Until) for item in actuations):
+            raise ModelError("the shell cannot go on after a force or displacement that `until` ended early")
     acting: dict[object, Array] = {}
     before: dict[object, Array] = {}
     for actuations in model.steps[: step + 1]:

@@ -1,6 +1,7 @@
 """Flat geometry: crease patterns, meshes of them, and their file formats."""
 
-from meshes.curves import Arc, Line, Polyline
+from meshes.corrugations import corrugation, corrugation_table, curved_corrugation
+from meshes.curves import Arc, ArcChain, Line, Polyline
 from meshes.errors import FileFormatError, InputError, MeshError, PatternError
 from meshes.library import (
     annulus_sector,
@@ -12,12 +13,14 @@ from meshes.library import (
     two_arcs,
 )
 from meshes.mesh import SheetMesh
+from meshes.parallel import parallel_creases
 from meshes.pattern import Crease, CreasePattern
 from meshes.structured import structured
 from meshes.unstructured import unstructured
 
 __all__ = [
     "Arc",
+    "ArcChain",
     "Crease",
     "CreasePattern",
     "FileFormatError",
@@ -28,9 +31,13 @@ __all__ = [
     "Polyline",
     "SheetMesh",
     "annulus_sector",
+    "corrugation",
+    "corrugation_table",
+    "curved_corrugation",
     "full_annulus",
     "opposite_parabolas",
     "parabolic_canopy",
+    "parallel_creases",
     "sine_tessellation",
     "strip",
     "structured",

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class Curve(Protocol):
-    """A plane curve. `point(u)` maps (k,) parameters in [0, 1] to (k, 2) points, at constant speed."""
+    """A plane curve. `point(u)` maps (k,) parameters in [0, 1] to (k, 2) points, at constant speed (see `ArcChain`)."""
 
     @property
     def length(self) -> float: ...
@@ -96,13 +96,92 @@ class Polyline:
         return np.column_stack([np.interp(at, s, self.vertices[:, axis]) for axis in range(2)])
 
 
+@dataclass(frozen=True)
+class ArcChain:
+    """Circular arcs and straight pieces that run smoothly into one another, or a curve parallel to such a chain.
+
+    Attributes:
+        start: (x, y) where the chain begins, mm; heading: polar angle of its tangent there, rad.
+        curvatures: of the pieces, 1/mm, positive where the chain turns to the left; lengths: of the pieces, mm.
+        offset: of the curve to the left of the chain, mm; less than any radius on that side.
+
+    The speed is constant along the chain itself, so that parallel curves have the points of one normal at one u; that
+    of a curve at an offset is constant on each piece.
+    """
+
+    start: tuple[float, float]
+    heading: float
+    curvatures: tuple[float, ...]
+    lengths: tuple[float, ...]
+    offset: float = 0.0
+
+    @property
+    def length(self) -> float:
+        return float(
+            sum(
+                piece_length * (1.0 - k * self.offset)
+                for k, piece_length in zip(self.curvatures, self.lengths, strict=True)
+            )
+        )
+
+    @property
+    def closed(self) -> bool:
+        return False
+
+    @property
+    def breaks(self) -> Array:
+        """(n + 1,) parameters of the ends of the pieces."""
+        s = np.concatenate(([0.0], np.cumsum(self.lengths)))
+        return np.asarray(s / s[-1])
+
+    def point(self, u: Array) -> Array:
+        s = np.atleast_1d(np.asarray(u, dtype=float)) * sum(self.lengths)
+        knots = np.concatenate(([0.0], np.cumsum(self.lengths)))
+        piece = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(self.lengths) - 1)
+        heading = self.heading + np.concatenate(
+            ([0.0], np.cumsum(np.multiply(self.curvatures, self.lengths)))
+        )
+        knot = np.zeros((len(knots), 2))
+        knot[0] = self.start
+        for i, (k, piece_length) in enumerate(zip(self.curvatures, self.lengths, strict=True)):
+            knot[i + 1] = knot[i] + _arc_step(heading[i], k, np.array([piece_length]))[0]
+        out = np.empty((len(s), 2))
+        for i, k in enumerate(self.curvatures):
+            here = piece == i
+            along = s[here] - knots[i]
+            turned = heading[i] + k * along
+            left = np.column_stack((-np.sin(turned), np.cos(turned)))
+            out[here] = knot[i] + _arc_step(heading[i], k, along) + self.offset * left
+        return out
+
+
+def _arc_step(heading: float, k: float, s: Array) -> Array:
+    """(n, 2) chords of an arc of curvature k after lengths s; sin x / x keeps straight ones exact."""
+    half = 0.5 * k * s
+    chord = s * np.sinc(half / np.pi)
+    return np.column_stack((chord * np.cos(heading + half), chord * np.sin(heading + half)))
+
+
 def sample(curve: Curve, tolerance: float = 1e-3) -> Array:
     """Points (k, 2) on `curve` whose chords stay within about `tolerance` (mm) of it."""
     if isinstance(curve, Polyline):
         return curve.vertices
+    if isinstance(curve, ArcChain):
+        return curve.point(_chain_samples(curve, tolerance))
     count = 1
     if isinstance(curve, Arc):
         # sagitta of a chord over angle a: radius (1 - cos(a / 2))
         reach = np.sqrt(8.0 * min(tolerance, curve.radius) / curve.radius)
         count = max(int(np.ceil(abs(curve.sweep) / reach)), 8 if curve.closed else 1)
     return curve.point(np.linspace(0.0, 1.0, count + 1))
+
+
+def _chain_samples(chain: ArcChain, tolerance: float) -> Array:
+    """Parameters of the ends of the pieces, and as many between them as their arcs need."""
+    u = [np.zeros(1)]
+    for i, (k, piece_length) in enumerate(zip(chain.curvatures, chain.lengths, strict=True)):
+        size = piece_length * abs(1.0 - k * chain.offset)
+        bend = abs(k) / max(abs(1.0 - k * chain.offset), 1e-300)
+        count = max(int(np.ceil(size * np.sqrt(bend / (8.0 * tolerance)))), 1)
+        u.append(np.linspace(chain.breaks[i], chain.breaks[i + 1], count + 1)[1:])
+    return np.concatenate(u)

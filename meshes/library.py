@@ -30,7 +30,7 @@ def strip(
             f"strip creases {heights} leave the sheet or are not in order; give rising heights between 0 and {width:g}"
         )
     rails: list[Curve] = [Line((0.0, y), (length, y)) for y in [0.0, *heights, width]]
-    return _between_rails(rails, folds)
+    return between_rails(rails, folds)
 
 
 def annulus_sector(
@@ -51,12 +51,12 @@ def annulus_sector(
         hint = "; angles are radians, not degrees" if 7.0 < angle <= 360.0 else ""
         raise PatternError(f"angle {angle:g} rad closes the sector; use full_annulus for a whole turn{hint}")
     radii = _radii(radius, width)
-    return _between_rails([Arc((0.0, 0.0), r, 0.0, angle) for r in radii], folds)
+    return between_rails([Arc((0.0, 0.0), r, 0.0, angle) for r in radii], folds)
 
 
 def full_annulus(radius: float | Sequence[float], width: float, folds: Folds = "mountain") -> CreasePattern:
     """A whole annulus with concentric creases; arguments as for `annulus_sector`."""
-    return _between_rails([Arc((0.0, 0.0), r, 0.0, 2.0 * math.pi) for r in _radii(radius, width)], folds)
+    return between_rails([Arc((0.0, 0.0), r, 0.0, 2.0 * math.pi) for r in _radii(radius, width)], folds)
 
 
 def two_arcs(
@@ -166,7 +166,7 @@ def _rectangle(width: float, height: float, curves: Sequence[Curve], folds: Fold
             raise PatternError(
                 f"crease {i} ends at y = {ends[0]:g} mm, not on a side of the sheet; move it inside"
             )
-    return _between_rails(rails, folds)
+    return between_rails(rails, folds)
 
 
 def _graph(width: float, y: Callable[[Array], Array]) -> Polyline:
@@ -204,7 +204,8 @@ def _radii(radius: float | Sequence[float], width: float) -> list[float]:
     return [creases[0] - width, *creases, creases[-1] + width]
 
 
-def _between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
+def between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
+    """A sheet between the first and the last of some curves, with creases along the others."""
     count = len(rails) - 2
     kinds: list[FoldKind] = [folds] * count if isinstance(folds, str) else list(folds)
     if len(kinds) != count:

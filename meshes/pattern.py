@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from meshes.curves import Array, Curve, sample
 from meshes.errors import PatternError
+from meshes.topology import Ints
 
 FoldKind = Literal["mountain", "valley", "flat"]
 FOLD_KINDS: tuple[FoldKind, ...] = ("mountain", "valley", "flat")
@@ -17,11 +18,15 @@ FOLD_KINDS: tuple[FoldKind, ...] = ("mountain", "valley", "flat")
 
 @dataclass(frozen=True)
 class Crease:
-    """A named crease curve; `fold` says how it was drawn: mountain (dihedral < pi), valley (> pi) or flat."""
+    """A named crease curve; `fold` says how it was drawn: mountain (dihedral < pi), valley (> pi) or flat.
+
+    `angle` is how far it was drawn to fold, rad in [0, pi], or None.
+    """
 
     name: str
     curve: Curve
     fold: FoldKind = "mountain"
+    angle: float | None = None
 
     def __post_init__(self) -> None:
         if self.fold not in FOLD_KINDS:
@@ -42,6 +47,9 @@ class CreasePattern:
             order, all run the same way); empty where a pattern has no such order, then only an unstructured
             mesh can be made of it.
         edges: names of boundary curves ("inner", "outer", "start", "end").
+        facets: lines that a mesh is to follow though the sheet does not fold there, such as drawn rulings.
+        groups: names for several places together, such as ("crease:mountain", ("crease:m1", "crease:m2")).
+        remarks: what was taken for granted when the pattern was read, one line each.
 
     Raises:
         PatternError: a crease leaves the sheet, crosses itself or another one, or names are not unique.
@@ -52,6 +60,9 @@ class CreasePattern:
     rails: tuple[Curve, ...] = ()
     edges: tuple[tuple[str, Curve], ...] = ()
     units: Literal["mm"] = "mm"
+    facets: tuple[Curve, ...] = ()
+    groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.units != "mm":
@@ -69,7 +80,40 @@ class CreasePattern:
 
     @property
     def folds(self) -> dict[str, FoldKind]:
-        return {crease.name: crease.fold for crease in self.creases}
+        """How creases, and groups of creases that are drawn alike, were drawn."""
+        each = {crease.name: crease.fold for crease in self.creases}
+        for name, members in self.groups:
+            kinds = {each.get(member.removeprefix("crease:")) for member in members}
+            if name.startswith("crease:") and len(kinds) == 1 and None not in kinds:
+                each[name.removeprefix("crease:")] = kinds.pop()  # type: ignore[assignment]
+        return each
+
+
+def with_groups(pattern: CreasePattern, sets: dict[str, Ints]) -> dict[str, Ints]:
+    """The edge sets of a mesh with those of the pattern's groups in front, whose members are joined."""
+    joined = {
+        name: np.vstack([sets[member] for member in members])
+        for name, members in pattern.groups
+        if all(member in sets for member in members)
+    }
+    return joined | sets
+
+
+def drawn_angles(pattern: CreasePattern, sets: Mapping[str, Ints]) -> dict[str, Array]:
+    """Drawn fold angles of the creases of a mesh (rad, mountain positive, nan unknown); none if no crease has one."""
+    sign = {"mountain": 1.0, "valley": -1.0, "flat": 0.0}
+    each = {c.name: sign[c.fold] * (np.nan if c.angle is None else c.angle) for c in pattern.creases}
+    if all(crease.angle is None for crease in pattern.creases):
+        return {}
+    members = {name: [m.removeprefix("crease:") for m in parts] for name, parts in pattern.groups}
+    members |= {f"crease:{name}": [name] for name in each}
+    return {
+        name.removeprefix("crease:"): np.concatenate(
+            [np.full(len(sets[f"crease:{part}"]), each[part]) for part in parts]
+        )
+        for name, parts in members.items()
+        if name in sets and all(part in each for part in parts)
+    }
 
 
 def _check_geometry(rings: Sequence[Array], creases: Sequence[Crease]) -> None:
@@ -100,10 +144,12 @@ def _check_geometry(rings: Sequence[Array], creases: Sequence[Crease]) -> None:
         if not grown.covers(line):
             raise PatternError(f"crease '{crease.name}' leaves the sheet; move it inside the outline")
         lines.append(line)
-    for i, first in enumerate(lines):
-        for j in range(i):
-            second = lines[j]
-            if first.crosses(second) or (first.intersection(second).length > 1e-6 * size):
-                raise PatternError(
-                    f"creases '{creases[j].name}' and '{creases[i].name}' cross; let them meet only at end points"
-                )
+    shapes = np.array(lines, dtype=object)
+    for i, j in shapely.STRtree(shapes).query(shapes, predicate="intersects").T.tolist():
+        if j >= i:
+            continue
+        first, second = lines[i], lines[j]
+        if first.crosses(second) or (first.intersection(second).length > 1e-6 * size):
+            raise PatternError(
+                f"creases '{creases[j].name}' and '{creases[i].name}' cross; let them meet only at end points"
+            )

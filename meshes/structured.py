@@ -12,6 +12,7 @@ are cut into triangles decides the accuracy of bars and hinges (DESIGN.md, secti
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
@@ -19,7 +20,8 @@ import numpy as np
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
 from meshes.mesh import Origin, SheetMesh
-from meshes.pattern import CreasePattern
+from meshes.pattern import CreasePattern, drawn_angles, with_groups
+from meshes.tapered import tapered_mesh, tapers
 from meshes.topology import Ints, build
 
 Kind = Literal["staggered", "alternating", "one-way", "mirrored"]
@@ -70,6 +72,8 @@ def structured(
     if along < least or int(along) != along:
         raise MeshError(f"along = {along} cells cannot be; use a whole number from {least}")
 
+    if tapers(pattern):
+        return _tapered(pattern, int(along), int(rows), kind, float(np.mean(heights / rows / widths)) * along)
     lines, panels = _node_lines(pattern, int(along), int(rows), staggered=kind == "staggered")
     points = np.vstack([line for line, _ in lines])
     triangles, first = _triangles(lines, panels, int(along), kind, pattern.closed)
@@ -81,14 +85,47 @@ def structured(
     return SheetMesh(
         points=points,
         triangles=triangles,
-        edge_sets=edge_sets,
+        edge_sets=with_groups(pattern, edge_sets),
         corners=corners,
         folds=pattern.folds,
+        fold_angles=drawn_angles(pattern, edge_sets),
         curves=curves,
         spans=spans,
         kind=kind,
         aspect_ratio=alpha,
         origin=Origin.of(pattern, points, triangles),
+    )
+
+
+def _tapered(pattern: CreasePattern, along: int, rows: int, kind: Kind, alpha: float) -> SheetMesh:
+    """A mesh of panels that taper to points; see `meshes.tapered`."""
+    if kind not in ("staggered", "alternating"):
+        raise MeshError(f"panels that taper to points have no '{kind}' mesh; use staggered or alternating")
+    if along < 4:
+        raise MeshError(f"along = {along} columns cannot follow curves to their ends; use at least 4")
+    points, triangles, chains = tapered_mesh(pattern, along, rows, staggered=kind == "staggered")
+    names = ["edge:inner", *(f"crease:{crease.name}" for crease in pattern.creases), "edge:outer"]
+    pairs = [list(pairwise(chain)) for chain in chains]
+    sets = {names[0]: np.array(pairs[0]), names[-1]: np.array(pairs[-1])}
+    for k in range(1, len(chains) - 1):  # a crease ends where it runs into another line
+        own = [pair for pair in pairs[k] if pair not in pairs[k - 1] and pair not in pairs[k + 1]]
+        if not own:
+            raise MeshError(
+                f"{names[k]} is closer to its neighbours than cells are long; use more than {along} along"
+            )
+        sets[names[k]] = np.array(own)
+    curves: dict[str, Curve] = {f"edge:{name}": curve for name, curve in pattern.edges}
+    curves.update({f"crease:{crease.name}": crease.curve for crease in pattern.creases})
+    start, end = chains[-1][0], chains[-1][-1]
+    return SheetMesh(
+        points=points,
+        triangles=triangles,
+        edge_sets=sets,
+        corners={"corner:inner-start": start, "corner:inner-end": end},
+        folds=pattern.folds,
+        curves=curves,
+        kind=kind,
+        aspect_ratio=alpha,
     )
 
 

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from meshes.curves import Array, Curve
+from meshes.curves import Array, Curve, Polyline
 from meshes.errors import MeshError
 from meshes.mesh import Origin, SheetMesh
-from meshes.pattern import CreasePattern
+from meshes.pattern import CreasePattern, drawn_angles, with_groups
+from meshes.planar import corners
 from meshes.topology import Ints
 
 Faces = list[
@@ -94,15 +95,20 @@ def unstructured(
         raise MeshError("this pattern names no boundary curves; an unstructured mesh needs them")
     curves |= {f"crease:{crease.name}": crease.curve for crease in pattern.creases}
     sizes = _sizes(curves, size, dict(near or {}), growth)
-    points, chains = _chains(curves, sizes)
+    facets = {f"facet:{i}": curve for i, curve in enumerate(pattern.facets)}
+    points, chains = _chains(curves | facets, sizes)
     segments = np.vstack(list(chains.values()))
     points, triangles = _fill(points, _faces(pattern, points, segments), sizes, chains, seed)
+    drawn = [chains.pop(name) for name in facets]
+    if drawn:
+        chains["edge:facet"] = np.vstack(drawn)
     return SheetMesh(
         points=points,
         triangles=triangles,
-        edge_sets=chains,
+        edge_sets=with_groups(pattern, chains),
         corners=_corners(chains),
         folds=pattern.folds,
+        fold_angles=drawn_angles(pattern, chains),
         curves=curves,
         kind="gmsh",
         origin=Origin.of(pattern, points, triangles),
@@ -137,28 +143,36 @@ def _chains(curves: dict[str, Curve], sizes: Sizes) -> tuple[Array, dict[str, In
     ends = np.vstack([curve.point(np.array([0.0, 1.0])) for curve in curves.values()])
     near = 1e-6 * float(np.ptp(ends, axis=0).max() + sizes.largest)
     points: list[Array] = []
-    joints: list[int] = []  # where curves may meet
+    joints: Joints = {}
     chains: dict[str, Ints] = {}
     for name, curve in curves.items():
         breaks = _breaks(curve, ends, near)
         u = [breaks[0]]
         for a, b in pairwise(breaks):
             u += sizes.divide(curve, a, b, least=3 if curve.closed and len(breaks) == 2 else 1)
-        nodes = [_node(points, joints, at, near) if value in breaks else _new(points, at)
+        fixed = set(breaks)
+        nodes = [_node(points, joints, at, near) if value in fixed else _new(points, at)
                  for value, at in zip(u, curve.point(np.array(u)), strict=True)]  # fmt: skip
         chains[name] = np.column_stack((nodes[:-1], nodes[1:]))
     return np.array(points), chains
 
 
 def _breaks(curve: Curve, ends: Array, near: float) -> list[float]:
-    """Parameters where the curve begins, ends, or another curve meets it."""
+    """Parameters where the curve begins, ends, has a corner, or another curve meets it."""
     u = np.linspace(0.0, 1.0, 2049)
     samples = curve.point(u)
     found = [0.0, 1.0]
-    for end in ends:
+    if isinstance(curve, Polyline):
+        steps = np.linalg.norm(np.diff(curve.vertices, axis=0), axis=1)
+        found += (np.cumsum(steps)[:-1][corners(curve.vertices)[1:-1]] / steps.sum()).tolist()
+    reach = 2.0 * curve.length / 2048.0
+    close = (ends > samples.min(axis=0) - reach).all(axis=1) & (ends < samples.max(axis=0) + reach).all(
+        axis=1
+    )
+    for end in np.unique(ends[close], axis=0):
         distance = np.linalg.norm(samples - end, axis=1)
         k = int(distance.argmin())
-        if distance[k] > 2.0 * curve.length / 2048.0:
+        if distance[k] > reach:
             continue
         low, high = u[max(k - 1, 0)], u[min(k + 1, 2048)]
         for _ in range(60):  # the distance has one minimum between neighbouring samples
@@ -170,16 +184,22 @@ def _breaks(curve: Curve, ends: Array, near: float) -> list[float]:
             found.append(middle)
     found.sort()
     apart = 2.0 * near / curve.length
-    return [value for i, value in enumerate(found) if i == 0 or value - found[i - 1] > apart]
+    kept = [value for i, value in enumerate(found) if i == 0 or value - found[i - 1] > apart]
+    kept[-1] = 1.0  # itself, not a break found next to it
+    return kept
 
 
-def _node(points: list[Array], joints: list[int], at: Array, near: float) -> int:
+Joints = dict[tuple[int, int], int]  # where curves may meet: the node in each square of a grid
+
+
+def _node(points: list[Array], joints: Joints, at: Array, near: float) -> int:
     """Index of the joint at that place, made if there is none."""
-    for k in joints:
-        if math.dist(points[k], at) < near:
-            return k
-    joints.append(_new(points, at))
-    return joints[-1]
+    x, y = (math.floor(value / near) for value in at)
+    for square in ((x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
+        if square in joints and math.dist(points[joints[square]], at) < near:
+            return joints[square]
+    joints[x, y] = _new(points, at)
+    return joints[x, y]
 
 
 def _new(points: list[Array], at: Array) -> int:
@@ -194,13 +214,18 @@ def _faces(pattern: CreasePattern, points: Array, segments: Ints) -> Faces:
     sheet = shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:]))
 
     lines = shapely.linestrings(points[segments])
-    polygons, _, dangles, _ = shapely.polygonize_full(lines)
+    _check_apart(points, segments, lines)
+    polygons, bridges, dangles, _ = shapely.polygonize_full(lines)
     where = {tuple(point): k for k, point in enumerate(points.tolist())}
 
     def loop(ring: Any) -> list[int]:
         return [where[tuple(at)] for at in np.asarray(ring.coords)[:-1].tolist()]
 
-    loose = [tuple(where[tuple(at)] for at in line.coords) for line in shapely.get_parts(dangles)]
+    ends = [
+        *shapely.get_parts(dangles),
+        *shapely.get_parts(bridges),
+    ]  # bridges lead to a hole or a closed crease
+    loose = [tuple(where[tuple(at)] for at in line.coords) for line in ends]
     found: Faces = []
     for polygon in shapely.get_parts(polygons):
         if not sheet.covers(polygon.representative_point()):
@@ -216,6 +241,20 @@ def _faces(pattern: CreasePattern, points: Array, segments: Ints) -> Faces:
     if abs(covered - sheet.area) > 0.05 * sheet.area:
         raise MeshError("the named boundary curves do not enclose the sheet; name all of its edges")
     return found
+
+
+def _check_apart(points: Array, segments: Ints, lines: Any) -> None:
+    """No two segments cross, or lie over each other."""
+    import shapely
+
+    one, two = shapely.STRtree(lines).query(lines, predicate="intersects")
+    one, two = one[one < two], two[one < two]
+    apart = (segments[one][:, :, None] != segments[two][:, None, :]).all(axis=(1, 2))
+    if apart.any():
+        x, y = points[segments[one[apart][0]]].mean(axis=0)
+        raise MeshError(
+            f"chords of two curves cross near ({x:.6g}, {y:.6g}); use a smaller size, or part the curves there"
+        )
 
 
 def _fill(

@@ -1,249 +1,94 @@
-"""The report page, built from a folder of stored results; reads, formats and writes, and never solves."""
+"""The report, built from stored results: a front page and a page a chapter. Reads and writes, never solves."""
 
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from datetime import datetime, timedelta
-from functools import cached_property
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-
+from bh import interactive
 from meshes.errors import FileFormatError
 from meshes.io.export import replacing
-from reports.figures import (
-    Plot,
-    ReportError,
-    csv_link,
-    legend,
-    markup,
-    picture_link,
-    plot_rows,
-    scientific,
-    svg,
-    typeset,
+from reports import words
+from reports.changes import MOST, changes
+from reports.claims import Claim, claims
+from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
+from reports.records import (
+    Case,
+    CaseInfo,
+    Frames,
+    Results,
+    known_cases,
+    read,
+    schema,
+    shortfall,
+    validated,
 )
+from verification.chapters import CHAPTERS, OTHER, Chapter, chapter_of
 
 SOURCE = (
     "Equation numbers, “the source” and “App. B” refer to the dissertation “How Curved Creases Enhance the "
     "Stiffness and Enable Shape Morphing of Thin-Sheet Structures” by Woodruff."
 )
-VERDICTS = ("holds", "reported", "differs")  # from the best to the worst
 MOST_FAILURES = 25  # that are listed at the top
 TEMPLATES = Path(__file__).parent / "templates"
-
-
-class Check(BaseModel):
-    """One record: a figure, its reference, and how far they may be apart. `error` is relative, or absolute to 0."""
-
-    model_config = ConfigDict(strict=True)
-
-    case: str
-    quantity: str
-    params: dict[str, Any] = {}
-    value: float | None
-    unit: str = ""
-    reference: float | None = None
-    source: str | None = None
-    error: float | None = None
-    tolerance: float | None = None
-    passed: bool | None
-    unknowns: float | None = None
-    iterations: float | None = None
-    wall_time_s: float | None = None
-    outcome: str = "reached"
-
-    @property
-    def use(self) -> float:
-        """The error as a share of the tolerance; nan where there is none to compare."""
-        if self.tolerance is None or self.error is None:
-            return math.nan
-        if self.tolerance == 0.0:
-            return 0.0 if self.error == 0.0 else math.inf
-        return abs(self.error) / self.tolerance
-
-    @property
-    def result(self) -> str:
-        if self.passed is None:
-            return "reported"
-        if self.passed:
-            return "pass"
-        return "failed" if self.outcome == "reached" else f"failed: {self.outcome}"
-
-
-class Picture(BaseModel):
-    """A picture beside the results, what it shows in words, and a caption."""
-
-    model_config = ConfigDict(strict=True)
-
-    file: str
-    alt: str
-    caption: str = ""
-
-
-class CaseInfo(BaseModel):
-    """What a case says of itself."""
-
-    model_config = ConfigDict(strict=True)
-
-    name: str
-    title: str = ""
-    question: str = ""
-    source: str = ""
-    verdict: str = ""
-    notes: list[str] = []
-    plots: list[Plot] = []
-    pictures: list[Picture] = []
-    wall_time_s: float | None = None
-    # of the run that the case is from; None where that is the run of the whole file
-    versions: dict[str, str] | None = None
-    date: str | None = None
-    machine: str | dict[str, Any] | None = None
-    quick: bool | None = None
-
-
-class Results(BaseModel):
-    """The file checks.json."""
-
-    model_config = ConfigDict(strict=True)
-
-    checks: list[Check]
-    versions: dict[str, str] = {}
-    date: str = ""
-    machine: str | dict[str, Any] = ""
-    quick: bool = False
-    cases: list[CaseInfo] = []
+ASSETS = {"plotly.min.js": interactive.library, "viewer.js": interactive.script}
 
 
 @dataclass(frozen=True)
-class Case:
-    """A case with its records, numbered as in the file, and with its pictures read in."""
+class Page:
+    """A chapter with its cases, and those of it that have not been run."""
 
-    info: CaseInfo
-    checks: list[tuple[int, Check]]
-    plots: list[dict[str, Any]] = field(default_factory=list)
-    pictures: list[dict[str, Any]] = field(default_factory=list)
-
-    @property
-    def name(self) -> str:
-        return self.info.name
+    chapter: Chapter
+    cases: list[Case]
+    missing: list[str]
+    claims: list[Claim]
 
     @property
-    def title(self) -> str:
-        return self.info.title or self.name
-
-    def count(self, passed: bool | None) -> int:
-        return sum(check.passed is passed for _, check in self.checks)
-
-    @property
-    def judged(self) -> int:
-        return self.count(True) + self.count(False)
+    def file(self) -> str:
+        return f"{self.chapter.page}.html"
 
     @property
     def verdict(self) -> str:
-        """The worse of what the case says and what its records say."""
-        found = "differs" if self.count(False) else "holds" if self.count(True) else "reported"
-        said = self.info.verdict if self.info.verdict in VERDICTS else found
-        return max(found, said, key=VERDICTS.index)
-
-    @cached_property
-    def worst(self) -> Check | None:
-        """The check that uses most of its tolerance."""
-        compared = [check for _, check in self.checks if not math.isnan(check.use)]
-        return max(compared, key=lambda check: check.use, default=None)
+        """The worst verdict of its cases; "missing" without any."""
+        found = {case.verdict for case in self.cases}
+        return next((word for word in ("differs", "holds", "reported") if word in found), "missing")
 
     @property
-    def groups(self) -> list[dict[str, Any]]:
-        """The records by quantity, unit and source, with the parameters that all of a group share."""
-        found: dict[tuple[str, str, str], list[tuple[int, Check]]] = {}
-        for number, check in self.checks:
-            found.setdefault((check.quantity, check.unit, check.source or ""), []).append((number, check))
-        groups = []
-        for (quantity, unit, source), rows in found.items():
-            first = rows[0][1].params
-            common = {
-                key: value
-                for key, value in first.items()
-                if len(rows) > 1 and all(check.params.get(key, first) == value for _, check in rows)
-            }
-            groups.append(
-                {"quantity": quantity, "unit": unit, "source": source, "common": common, "rows": rows}
-            )
-        return groups
-
-    def has(self, name: str) -> bool:
-        """Whether any record gives this figure."""
-        return any(getattr(check, name) is not None for _, check in self.checks)
-
-    @property
-    def csv(self) -> str:
-        """Link to all records as CSV."""
-        names = ("quantity", "value", "unit", "reference", "error", "tolerance", "passed", "unknowns", "iterations",
-                 "wall_time_s", "outcome", "source")  # fmt: skip
-        keys = list(dict.fromkeys(key for _, check in self.checks for key in check.params))
-        rows: list[list[Any]] = [[*names, *keys]]
-        for _, check in self.checks:
-            rows.append([*(getattr(check, name) for name in names), *(check.params.get(key) for key in keys)])
-        return csv_link(rows)
+    def scenes(self) -> bool:
+        return any(case.scenes for case in self.cases)
 
 
 def build(results_folder: Path, out_file: Path) -> Path:
-    """Write the report of the results in a folder as one self-contained HTML page.
+    """Write the report of the results in a folder: `out_file`, and beside it a folder of its name with the chapters.
 
-    The same results give the same page, byte for byte.
+    The pages need nothing else, and the same results give the same pages, byte for byte. The schemas of the results are
+    written beside them.
 
     Returns:
-        the absolute path of the page.
+        the absolute path of the front page.
 
     Raises:
-        ReportError: results that are missing or not valid, or a page that cannot be written.
+        ReportError: results that are missing or not valid, or pages that cannot be written.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-    from markupsafe import Markup
-
-    folder = Path(results_folder)
-    results = read(folder / "checks.json")
-    cases = _cases(results, folder)
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
-        "number": number, "share": share, "seconds": seconds, "plain": typeset,
-        "unlike": lambda params, common: {key: v for key, v in params.items() if key not in common},
-        "text": lambda text: Markup(markup(text)), "params": lambda params: Markup(_params(params)),
-    }  # fmt: skip
-    failed = [item for case in cases for item in case.checks if item[1].passed is False]
-    missing = [name for name in known_cases() if name not in [case.name for case in cases]]
-    page = environment.get_template("report.html").render(
-        results=results,
-        source=SOURCE,
-        missing=missing,
-        shortfall=shortfall(results),
-        others=_others(results),
-        date=_date(results.date),
-        cases=cases,
-        machine=_machine(results.machine),
-        style=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
-        judged=sum(case.judged for case in cases),
-        reported=sum(case.count(None) for case in cases),
-        failed=failed,
-        most_failures=MOST_FAILURES,
-        odd=[item for case in cases for item in case.checks if item[1].passed and item[1].use > 1.0],
-        seconds_in_all=sum(case.info.wall_time_s or 0.0 for case in cases),
-    )
-    target = Path(out_file)
+    folder, target = Path(results_folder), Path(out_file)
+    site = Site(folder, target.stem, target.name)
+    pages = {
+        page.file: site.render("chapter.html", page) for page in site.pages if page.cases or page.missing
+    }
+    front = site.render("front.html", None)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with replacing(target) as temporary:
-            temporary.write_text(page, encoding="utf-8", newline="\n")
+            _write_folder(target.parent / target.stem, pages, site.scenes)
+            temporary.write_text(front, encoding="utf-8", newline="\n")
+        for name, model in (("checks", Results), ("frames", Frames)):
+            text = json.dumps(schema(model), indent=1) + "\n"
+            (folder / f"{name}.schema.json").write_text(text, encoding="utf-8")
     except FileFormatError as error:
         raise ReportError(str(error)) from error
     except OSError as error:
@@ -253,52 +98,119 @@ def build(results_folder: Path, out_file: Path) -> Path:
     return target.resolve()
 
 
-def read(file: Path) -> Results:
-    """Stored results.
+def one_page(results_folder: Path) -> str:
+    """The whole report as one page without scripts, to be printed.
 
     Raises:
-        ReportError: no such file, or not the results of `bh verify`; the message names the entry.
+        ReportError: results that are missing or not valid.
     """
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ReportError(f"there are no results in '{file.parent}'; run `bh verify` first") from error
-    except OSError as error:
-        raise ReportError(f"'{file}' cannot be read ({error.strerror}); choose another folder") from error
-    except (ValueError, RecursionError) as error:
-        raise ReportError(f"'{file}' is not JSON; run `bh verify` again") from error
-    try:
-        results = Results.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"])
-        entry = place.lstrip(".") or "the file"
-        raise ReportError(f"'{file}': {entry}: {first['msg'].lower()}; run `bh verify` again") from error
-    names = [info.name for info in results.cases]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise ReportError(f"'{file}': case '{twice}' is there twice; run `bh verify` again")
-    return results
+    return Site(Path(results_folder), "", "", whole=True).render("print.html", None)
 
 
-def known_cases() -> list[str]:
-    """Names of all verification cases that there are."""
-    from verification.cases import CASES
+class Site:
+    """The stored results, read once, and the pages that are made of them.
 
-    return list(CASES)
+    `chapters` is the folder of the chapters as seen from the front page, `front` the front page as seen from there;
+    with `whole` all is one page.
+    """
+
+    def __init__(self, folder: Path, chapters: str, front: str, *, whole: bool = False) -> None:
+        self.whole, self.chapters, self.front = whole, chapters, front
+        self.results = read(folder / "checks.json")
+        self.cases = _cases(self.results, folder)
+        self.changes = changes(folder, self.results)
+        ran = [case.name for case in self.cases]
+        self.missing = [name for name in known_cases() if name not in ran]
+        self.pages = [self._page(chapter) for chapter in (*CHAPTERS, OTHER)]
+        if not (self.pages[-1].cases or self.pages[-1].missing):
+            self.pages.pop()
+
+    @property
+    def scenes(self) -> bool:
+        return any(page.scenes for page in self.pages)
+
+    def _page(self, chapter: Chapter) -> Page:
+        cases = [case for case in self.cases if chapter_of(case.name) == chapter]
+        missing = [name for name in self.missing if chapter_of(name) == chapter]
+        return Page(chapter, cases, missing, claims(cases))
+
+    def render(self, template: str, page: Page | None) -> str:
+        """One page; `page` is the chapter that it shows, None for the front."""
+        every = self.cases
+        failed = [item for case in every for item in case.checks if item[1].passed is False]
+        text: str = (
+            _environment(self._linker(page))
+            .get_template(template)
+            .render(
+                site=self,
+                here=page,
+                results=self.results,
+                source=SOURCE,
+                shortfall=shortfall(self.results),
+                others=_others(self.results),
+                date=words.date(self.results.date),
+                seeds=_seeds(every),
+                machine=_machine(self.results.machine),
+                style=(TEMPLATES / "style.css").read_text(encoding="utf-8") + interactive.style(),
+                judged=sum(case.judged for case in every),
+                reported=sum(case.count(None) for case in every),
+                failed=failed,
+                most_failures=MOST_FAILURES,
+                most_moves=MOST,
+                pareto=_pareto(every),
+                odd=[item for case in every for item in case.checks if item[1].passed and item[1].use > 1.0],
+                seconds_in_all=sum(case.info.wall_time_s or 0.0 for case in every),
+            )
+        )
+        return text
+
+    def _linker(self, page: Page | None) -> Callable[[str, str], str]:
+        """Links from `page` to an id on the page of a case, or to that page ("" for the front page)."""
+
+        def link(case: str, anchor: str = "") -> str:
+            tail = f"#{anchor}" if anchor else ""
+            if self.whole:
+                return tail or "#top"
+            if not case:
+                return f"../{self.front}{tail}" if page else tail or "#top"
+            there = f"{chapter_of(case).page}.html"
+            return there + tail if page else f"{self.chapters}/{there}{tail}"
+
+        return link
 
 
-def shortfall(results: Results) -> str:
-    """What a full run has and these results have not, in a few words: "1 of 5 cases run, 1 of them quick"."""
-    known = known_cases()
-    there = {info.name for info in results.cases} | {check.case for check in results.checks}
-    run = [name for name in known if name in there]
-    quick = sum(results.quick if info.quick is None else info.quick for info in results.cases)
-    words = [f"{len(run)} of {len(known)} cases run"] if len(run) < len(known) else []
-    if quick:
-        some = f"{quick} of them quick" if words else f"{quick} of {len(known)} cases quick"
-        words.append("quick" if quick == len(results.cases) else some)
-    return ", ".join(words)
+def _environment(link: Callable[[str, str], str]) -> Any:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "number": words.number, "share": words.share, "seconds": words.seconds, "plain": typeset, "date": words.date,
+        "unlike": lambda params, common: {key: v for key, v in params.items() if key not in common},
+        "text": lambda text: Markup(markup(text)), "params": lambda given: Markup(words.params(given)),
+    }  # fmt: skip
+    environment.globals["link"] = link
+    return environment
+
+
+def _write_folder(folder: Path, pages: dict[str, str], scenes: bool) -> None:
+    """The chapters and what they load, complete before they take the place of those that were there."""
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".report-") as draft:
+        new = Path(draft) / "new"
+        (new / "assets").mkdir(parents=True)
+        for name, page in pages.items():
+            (new / name).write_text(page, encoding="utf-8", newline="\n")
+        for name, text in ASSETS.items() if scenes else ():
+            (new / "assets" / name).write_text(text(), encoding="utf-8", newline="\n")
+        if folder.exists():
+            shutil.move(folder, Path(draft) / "old")
+        shutil.move(new, folder)
 
 
 def _others(results: Results) -> list[tuple[str, str]]:
@@ -307,13 +219,31 @@ def _others(results: Results) -> list[tuple[str, str]]:
     for info in results.cases:
         if info.date in (None, results.date):
             continue
-        words = [_date(info.date or "")]
+        told = [words.date(info.date or "")]
         versions = results.versions if info.versions is None else info.versions
         for key, value in versions.items():
             if results.versions.get(key, value) != value:
-                words.append(f"{key} {value}")
-        found.append((info.name, "; ".join(words)))
+                told.append(f"{key} {value}")
+        found.append((info.name, "; ".join(told)))
     return found
+
+
+def _seeds(cases: Sequence[Case]) -> str:
+    """The seeds that records name."""
+    found = sorted(
+        {str(check.params["seed"]) for case in cases for _, check in case.checks if "seed" in check.params}
+    )
+    few = found if len(found) <= 6 else [*found[:6], f"and {len(found) - 6} more"]
+    return ", ".join(few) or "none"
+
+
+def _pareto(cases: Iterable[Case]) -> tuple[Case, list[dict[str, Any]]] | None:
+    """The plots of error against time of the case `speed_error`, if it has been run."""
+    for case in cases:
+        if case.name == "speed_error" and case.plots:
+            named = [item for item in case.plots if "pareto" in item["plot"].id.lower()]
+            return case, (named or case.plots)[:2]
+    return None
 
 
 def _cases(results: Results, folder: Path) -> list[Case]:
@@ -333,13 +263,39 @@ def _cases(results: Results, folder: Path) -> list[Case]:
             plots.append(
                 {"plot": plot, "svg": drawn, "legend": legend(plot), "csv": csv_link(plot_rows(plot))}
             )
-        pictures = []
-        for picture in info.pictures:
-            link, width, height = picture_link(_inside(folder, picture.file))
-            pictures.append({"picture": picture, "link": link, "width": width, "height": height})
+        pictures = [{"picture": picture, **_picture(folder, picture.file)} for picture in info.pictures]
+        scenes = [
+            {"scene": scene, "data": _frames(folder, scene.file), "still": _picture(folder, scene.still)}
+            for scene in info.scenes
+        ]
+        for number, item in enumerate(scenes, start=1):
+            item["html"] = _viewer(item, f"sheet-{name}-{number}")
         checks = [(n, check) for n, check in enumerate(results.checks, start=1) if check.case == name]
-        cases.append(Case(info, checks, plots, pictures))
+        cases.append(Case(info, checks, plots, pictures, scenes))
     return cases
+
+
+def _viewer(item: dict[str, Any], name: str) -> str:
+    from markupsafe import escape
+
+    still, alt = item["still"], escape(item["scene"].alt)
+    image = f'<img src="{still["link"]}" width="{still["width"]}" height="{still["height"]}" alt="{alt}">'
+    return interactive.figure(item["data"], name, item["scene"].title, image)
+
+
+def _picture(folder: Path, name: str) -> dict[str, Any]:
+    link, width, height = picture_link(_inside(folder, name))
+    return {"link": link, "width": width, "height": height}
+
+
+def _frames(folder: Path, name: str) -> dict[str, Any]:
+    """Frames of `bh.interactive`, as they are stored."""
+    file = _inside(folder, name)
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ReportError(f"frames '{name}' cannot be read; run `bh verify` again") from error
+    return validated(Frames, text, name).model_dump()
 
 
 def _inside(folder: Path, name: str) -> Path:
@@ -354,74 +310,3 @@ def _machine(machine: str | dict[str, Any]) -> list[tuple[str, str]]:
     if isinstance(machine, str):
         return [("machine", machine)] if machine else []
     return [(key, "unknown" if value is None else str(value)) for key, value in machine.items()]
-
-
-def _date(text: str) -> str:
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        return text
-    zone = {None: "", timedelta(0): " UTC"}.get(moment.utcoffset(), f" {moment:%z}")
-    return f"{moment.day} {moment:%B %Y, %H:%M}{zone}"
-
-
-# --- figures in words ------------------------------------------------------------------------------------------
-
-
-def number(value: float | None, digits: int = 5, full: bool = False) -> str:
-    """A number with so many significant digits; without trailing zeros where it is exact, unless in `full`."""
-    if value is None:
-        return "\N{EN DASH}"
-    if not math.isfinite(value):
-        return "not a number" if math.isnan(value) else ("∞" if value > 0 else "\N{MINUS SIGN}∞")
-    if value == 0.0:
-        return "0"
-    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-    short = not full and float(f"{mantissa}e{exponent}") == value
-    power = int(exponent)
-    if -4 <= power < 6:
-        text = f"{value:,.{max(digits - 1 - power, 0)}f}".replace(",", "\u2009")
-    else:
-        text = mantissa
-    if short and "." in text:
-        text = text.rstrip("0").rstrip(".")
-    text = text.replace("-", "\N{MINUS SIGN}")
-    return text if -4 <= power < 6 else scientific(text, power)
-
-
-def share(value: float | None, check: Check) -> str:
-    """An error or tolerance: in percent where it is relative and not tiny, else as a number with the unit."""
-    if value is None or not math.isfinite(value):
-        return number(value)
-    if not check.reference:
-        return f"{number(value, 2)}\u00a0{check.unit}".strip()
-    return f"{number(100.0 * value, 2)}\u00a0%" if abs(value) >= 1e-5 else number(value, 2)
-
-
-def seconds(value: float | None) -> str:
-    """A time in the unit that suits it."""
-    if value is None or not math.isfinite(value):
-        return number(value)
-    if value < 1.0:
-        return f"{number(1e3 * value, 2)}\u00a0ms"
-    if value < 90.0:
-        return f"{number(value, 2 if value < 10.0 else 3)}\u00a0s"
-    return f"{int(value // 60)}\u00a0min\u00a0{int(value % 60)}\u00a0s"
-
-
-def _params(params: dict[str, Any]) -> str:
-    """Parameters as small key=value pairs, each kept on one line."""
-    return " ".join(
-        f'<span class="kv"><i>{markup(str(key))}</i>=\u2060{markup(_plain(value))}</span>'
-        for key, value in params.items()
-    )
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, bool) or value is None:
-        return {True: "yes", False: "no", None: "none"}[value]
-    if isinstance(value, int | float):
-        return number(float(value))
-    if isinstance(value, Iterable) and not isinstance(value, str | dict):
-        return "(" + ", ".join(_plain(part) for part in value) + ")"
-    return str(value)

@@ -19,12 +19,16 @@ def report(
     reuse: Annotated[
         bool, typer.Option("--reuse", help="show the results that are there, run nothing")
     ] = False,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="print all of it to a PDF file beside the page; needs a browser")
+    ] = False,
 ) -> None:
-    """Run the verification cases and write the report page.
+    """Run the verification cases and write the report: a front page, and a folder of chapters beside it.
 
-    It is one HTML file that needs nothing else.
+    They need nothing else, no network and no server.
     """
-    from reports.build import build, read, shortfall
+    from reports.build import build
+    from reports.records import read, shortfall
 
     page = results / "report.html" if out is None else out
     if not reuse:
@@ -32,6 +36,11 @@ def report(
 
         run(None, results, quick, lambda text: typer.echo(text, err=True))
     written = build(results, page)
+    printed = None
+    if pdf:
+        from reports.pdf import print_report
+
+        printed = print_report(results, page.with_suffix(".pdf"))
     found = read(results / "checks.json")
     judged = [check.passed for check in found.checks if check.passed is not None]
     less = shortfall(found)
@@ -40,4 +49,6 @@ def report(
         + (f" ({less})" if less else "")
     )
     typer.echo(f"report: {written}")
+    if printed is not None:
+        typer.echo(f"PDF: {printed}")
     typer.echo(written.as_uri())

@@ -15,15 +15,19 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 HOUSE = ("meshes", "bh", "fem", "verification", "reports")
 LONGEST_MODULE, LONGEST_FUNCTION = 450, 80
-HEAVY = ("gmsh", "pyvista", "matplotlib", "skfem", "dask", "pymoo")
+HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "distributed", "pymoo", "xarray", "h5py")
 
 DESCRIPTION = (
-    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.program", "bh.scene", "bh.scene_schema",
-    "bh.describe", "bh.state", "bh.formulations", "bh.refinement", "bh.symmetry",
+    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.program", "bh.observables",
+    "bh.describe", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state", "bh.formulations",
+    "bh.refinement", "bh.symmetry",
 )  # fmt: skip
-PATH = ("bh.path", "bh.halves", "bh.storage", "bh.progress", "bh.threads")
+PATH = ("bh.path", "bh.halves", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
-TOP = ("bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.offscreen", "bh.warm_up", "bh.accuracy")
+TOP = (
+    "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.offscreen", "bh.warm_up",
+    "bh.accuracy", "bh.advice", "bh.check", "bh.example", "bh.export", "bh.schema",
+)  # fmt: skip
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,
 # so that a part can be closed against itself too (the description does not know `bh.path`, ...).
@@ -60,7 +64,7 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     ("fem", ("meshes", "fem", *DESCRIPTION, "bh.solvers", *PATH)),
     ("verification", ("meshes", "bh", "fem", "verification")),
-    ("reports", ("meshes", "verification", "reports", "bh.plotting")),
+    ("reports", ("meshes", "verification", "reports", "bh.plotting", "bh.interactive")),
 )
 # the mechanics of bars and hinges are known by name to none of these
 DRIVERS = (

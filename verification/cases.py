@@ -21,12 +21,22 @@ ALL_CASES = {
     "derivatives": "verification.derivatives",
     "fig3_9": "verification.fig3_9",
     "fig3_11": "verification.fig3_11",
+    "sheets_3": "verification.sheets_3",
+    "fig5_5": "verification.fig5_5",
+    "fig5_9": "verification.fig5_9",
+    "fig5_10": "verification.fig5_10",
+    "fig5_11": "verification.fig5_11",
+    "fig5_3": "verification.fig5_3",
+    "appendix_a": "verification.appendix_a",
+    "pinch_shell": "verification.pinch_shell",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
     "appendix_b_cross": "verification.appendix_b_cross",
     "appendix_b_fields": "verification.appendix_b_fields",
+    "appendix_b_sheets": "verification.appendix_b_sheets",
     "shell_benchmarks": "verification.shell_benchmarks",
+    "tables4": "verification.tables4",
     "speed_error": "verification.speed_error",
     "honesty": "verification.honesty",
     "campaign": "verification.campaign",
@@ -36,7 +46,7 @@ LONG = {"campaign", "speed_error", "honesty", "fig3_8", "fig3_10"}
 LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
 CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
 # run with the case by `bh verify`
-PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields")}
+PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields", "appendix_b_sheets")}
 
 
 def case(name: str) -> Case:

@@ -76,6 +76,7 @@ class CaseResult:
     notes: list[str] = field(default_factory=list)
     plots: list[dict[str, Any]] = field(default_factory=list)
     pictures: list[dict[str, Any]] = field(default_factory=list)
+    scenes: list[dict[str, Any]] = field(default_factory=list)  # see `folded_frames.store`
     wall_time_s: float = 0.0
 
     @property
@@ -87,10 +88,8 @@ class CaseResult:
         return "holds" if all(judged) else "differs"
 
     def summary(self) -> dict[str, Any]:
-        data = {
-            key: getattr(self, key)
-            for key in ("name", "title", "question", "source", "notes", "plots", "pictures", "wall_time_s")
-        }
+        told = "name title question source notes plots pictures scenes wall_time_s"
+        data = {key: getattr(self, key) for key in told.split()}
         return {**data, "verdict": self.verdict}
 
 

@@ -64,7 +64,7 @@ def draw(seed: int, number: int) -> Draw:
         words += ", held at three corners"
     by = math.radians(float(rng.uniform(25.0, 90.0)))
     spring = rng.random() < 0.5
-    model = model.fold("all", by=by, **({"Lstar": float(rng.choice([10.0, 25.0, 60.0]))} if spring else {}))
+    model = model.fold("all", by=by, Lstar=float(rng.choice([10.0, 25.0, 60.0])) if spring else None)
     words += f", {'spring' if spring else 'imposed'} {math.degrees(by):.0f} degrees"
     what = "energy"
     if held:

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import platform
+import shutil
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
@@ -18,6 +19,7 @@ from verification.checks import RECORD, CaseResult, Context
 from verification.environment import environment
 
 OF_A_RUN = ("versions", "date", "machine", "quick")  # kept for every case, as cases may be run one by one
+LATER = ("scenes",)  # lists that records of earlier versions have not
 RECORDS = Path(__file__).with_name("records")
 
 
@@ -56,8 +58,20 @@ def run(
         report(f"{name}: {result.verdict}, {passed} of {judged} checks passed, {result.wall_time_s:.1f} s")
         found.append(result)
     data = _record(found, quick)
-    write_json(folder / "checks.json", _merged(_known(folder / "checks.json"), data))
+    merged = _merged(_known(folder / "checks.json"), data)
+    _keep(folder / "checks.json", folder / "previous.json")
+    write_json(folder / "checks.json", merged)
     return data
+
+
+def _keep(file: Path, copy: Path) -> None:
+    """Keep the results that are about to be replaced: the report says what changed."""
+    if not file.is_file():
+        return
+    try:
+        shutil.copyfile(file, copy)
+    except OSError as error:
+        raise InputError(f"cannot write '{copy}' ({error.strerror}); choose another folder") from error
 
 
 def _known(file: Path) -> dict[str, Any]:
@@ -99,6 +113,7 @@ def _stored(file: Path) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return nothing
     summary = CaseResult("", "", "", "").summary()
+    cases = [{**{key: list(summary[key]) for key in LATER}, **info} for info in cases]
     names = [info["name"] for info in cases]
     whole = (
         all(set(info) == {*summary, *OF_A_RUN} for info in cases)

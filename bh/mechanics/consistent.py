@@ -78,4 +78,5 @@ class Consistent:
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable,
+            pressing={} if system.touching is None else system.touching.pressing(x, lam),
         )  # fmt: skip

@@ -106,7 +106,7 @@ def consistent_elements(
     nodes = np.pad(nodes, ((0, 0), (0, -(-int(width.max()) // 3) - nodes.shape[1])), constant_values=-1)
 
     reference = dihedral_angles(mesh.points, topology.hinges)
-    held = Ramp(np.where(np.isnan(program.held.start), held_start, program.held.start), program.held.end)
+    held = program.held_angles(held_start)
     rest = [
         np.append(np.where(law == HELD, at, reference), np.pi)[joined.hinge] for at in (held.start, held.end)
     ]

@@ -71,7 +71,7 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
     gamma = PENALTY * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
     stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], 0.0)
     lock = _lock_stiffness(model, program, stiffness, k_bend, reference)
-    held_from = np.where(np.isnan(program.held.start), held_start, program.held.start)
+    imposed = program.held_angles(held_start)
     law = program.law[source]
 
     def ramp(bend: Array, spring: Array, held: Array) -> Array:
@@ -82,7 +82,7 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
     rest_from = np.where(
         np.isnan(program.rest.start), held_start - of_spring / _nonzero(k_fold), program.rest.start
     )
-    rest = Ramp(ramp(reference, rest_from, held_from), ramp(reference, program.rest.end, program.held.end))
+    rest = Ramp(ramp(reference, rest_from, imposed.start), ramp(reference, program.rest.end, imposed.end))
     scale = np.where(law == HELD, 0.0, hinge_length[source])
     couple = Ramp(program.moment.start[source] * scale, program.moment.end[source] * scale)
     return Elements(

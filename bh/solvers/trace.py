@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from bh.solvers.diagnosis import diagnose
+from bh.solvers.goal import locate_zero
 from bh.solvers.increments import Increment, Point
 from bh.solvers.system import System
+
+MISSED = "target-missed"
 
 
 class Strategy(Protocol):
@@ -36,7 +40,8 @@ class Strategy(Protocol):
 class Walk:
     """A step to be walked: from the last point of `history` (up to three) to lambda = 1.
 
-    `origin` is the point that the step began with, where `history` no longer has it (a resumed run).
+    `origin` is the point that the step began with, where `history` no longer has it (a resumed run). With a `goal` the
+    step ends where that is zero, to `tolerance`, and has failed if it is not before lambda = 1.
     """
 
     system: System
@@ -44,6 +49,8 @@ class Walk:
     history: tuple[Point, ...]
     increment: float | None = None
     origin: Point | None = None
+    goal: Callable[[Point], float] | None = None
+    tolerance: float = 1e-4
 
 
 def walk(task: Walk) -> Iterator[Increment]:
@@ -51,5 +58,36 @@ def walk(task: Walk) -> Iterator[Increment]:
 
     The last one has another outcome than "reached" if the step could not be finished, and names the reason.
     """
-    for item in task.strategy.follow(task.system, task.history, task.increment, task.origin):
-        yield item if item.outcome == "reached" else diagnose(task.system, item)
+    items = task.strategy.follow(task.system, task.history, task.increment, task.origin)
+    if task.goal is not None:
+        items = _until(task, items, task.goal)
+    for item in items:
+        yield item if item.outcome in ("reached", MISSED) else diagnose(task.system, item)
+
+
+def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float]) -> Iterator[Increment]:
+    """Increments up to the zero of `goal`; the last one is that state."""
+    here = task.history[-1]
+    left = goal(here)
+    for item in items:
+        if item.outcome != "reached":
+            yield item
+            return
+        now = goal(item.point)
+        if not item.jumped and left * now < 0.0 and abs(now) > task.tolerance:
+            found = locate_zero(task.system, here, item.point, (left, now), goal, task.tolerance)
+            note = "the target lies between two states, but the path to it was lost"
+            if found is None:
+                yield Increment(here, MISSED, item.iterations, math.nan, 0.0, note=note)
+                return
+            target, imbalance, spent = found
+            yield replace(
+                item, point=target, iterations=item.iterations + spent, imbalance=imbalance, critical=()
+            )
+            return
+        yield item
+        here, left = item.point, now
+        if abs(now) <= task.tolerance:
+            return
+    note = f"the target is not met before the end of the step (missed by {left:.6g})"
+    yield Increment(here, MISSED, 0, math.nan, 0.0, note=note)

@@ -51,7 +51,7 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
     import shapely
 
     try:
-        return _sheet(check(select(load(path), frame)))
+        return sheet_of_frame(check(select(load(path), frame)))
     except (InputError, shapely.errors.ShapelyError) as error:
         text = " ".join(str(error).split())
         raise FileFormatError(f"{shown(path)}: {text}") from error
@@ -60,7 +60,8 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
 # --- the sheet ------------------------------------------------------------------------------------
 
 
-def _sheet(frame: Frame) -> SheetMesh:
+def sheet_of_frame(frame: Frame) -> SheetMesh:
+    """The mesh of one checked frame; names and errors as `read_fold`."""
     faces = frame.faces or faces_of_graph(frame)
     sides = sides_of(faces)
     _check_edges(frame, sides)

@@ -57,7 +57,7 @@ CASES = [
     ("unknown actuation", {"steps": step("folds = {}")}, ["steps[0].folds", "'fold'"]),
     ("unknown fold key", {"steps": BASE["steps"] + step("fold = { crease = 'crease', angle = 1 }")},
      ["steps[1].fold.angle = 1", "crease, to, by"]),
-    ("pinch", {"steps": step("pinch = { by = 0.1 }")}, ["steps[0].pinch", "cannot pinch yet"]),
+    ("pinch without a crease", {"steps": step("pinch = { by = 0.1 }")}, ["steps[0].pinch.crease is missing"]),
     # --- tables and types
     ("no pattern", {"pattern": ""}, ["pattern is missing", "[pattern]"]),
     ("no sheet", {"sheet": ""}, ["sheet is missing"]),
@@ -237,7 +237,7 @@ def test_fold_file_is_refused(tmp_path, content, words):
 FILE_CASES = [
     ("missing", 'file = "other.fold"', "", ["pattern.file", "other.fold", "cannot be read"]),
     ("folder", 'file = "sub.fold"', "", ["pattern.file", "sub.fold", "folder"]),
-    ("other format", 'file = "sheet.svg"', "", ["pattern.file", "sheet.svg", "no other yet"]),
+    ("other format", 'file = "sheet.stl"', "", ["pattern.file", "sheet.stl", ".svg, .dxf or .fold"]),
     ("no name", 'file = ""', "", ['pattern.file = ""']),
     ("frame", 'file = "sheet.fold"\nframe = 3', "", ["no frame 3"]),
     ("odd frame", 'file = "sheet.fold"\nframe = -1', "", ["pattern.frame = -1"]),

@@ -1,4 +1,4 @@
-"""The report page: complete, self-contained, honest, the same every time; bad results are refused with one line."""
+"""The report: complete, self-contained, honest, the same every time; bad results are refused with one line."""
 
 from __future__ import annotations
 
@@ -15,10 +15,14 @@ import pytest
 from typer.testing import CliRunner
 
 from meshes.errors import InputError
-from reports.build import build, number, seconds, share
+from reports.build import build, one_page
 from reports.figures import Plot, svg, typeset
+from reports.words import number, seconds, share
 from verification.cases import CASES
+from verification.chapters import chapter_of
 
+# a page for each chapter that has a case, run or not
+CHAPTER_PAGES = sorted({f"{chapter_of(name).page}.html" for name in CASES})
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 MESHES = ("staggered", "alternating", "one-way", "mirrored")
 
@@ -131,11 +135,31 @@ class Page(HTMLParser):
         return [attributes for name, attributes in self.found if name == tag]
 
 
+def written(folder: Path) -> dict[Path, str]:
+    """Every page of the report that is made of the results in a folder, by file, the front page first."""
+    front = build(folder, folder / "report.html")
+    return {
+        file: file.read_text(encoding="utf-8")
+        for file in (front, *sorted((folder / "report").glob("*.html")))
+    }
+
+
 @pytest.fixture(scope="module")
-def html(tmp_path_factory: pytest.TempPathFactory) -> str:
-    folder = tmp_path_factory.mktemp("results")
-    results(folder)
-    return build(folder, folder / "report.html").read_text(encoding="utf-8")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("results")
+    results(found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def site(folder: Path) -> dict[Path, str]:
+    return written(folder)
+
+
+@pytest.fixture(scope="module")
+def html(folder: Path) -> str:
+    """All of the report as one page."""
+    return one_page(folder)
 
 
 @pytest.fixture(scope="module")
@@ -143,32 +167,45 @@ def page(html: str) -> Page:
     return Page(html)
 
 
-def test_page_is_well_formed(page: Page) -> None:
-    assert page.wrong == []
-    assert page.open == []
-    assert page.all("html")[0]["lang"] == "en"
-    assert len(page.all("h1")) == 1
+def test_pages_are_well_formed(site: dict[Path, str], html: str) -> None:
+    assert [file.name for file in site] == ["report.html", *CHAPTER_PAGES]
+    for text in (*site.values(), html):
+        page = Page(text)
+        assert page.wrong == []
+        assert page.open == []
+        assert page.all("html")[0]["lang"] == "en"
+        assert len(page.all("h1")) == 1
+        assert len(page.all("main")) == 1
 
 
-def test_ids_are_unique_and_links_lead_somewhere(page: Page) -> None:
-    ids = Counter(attributes["id"] for _, attributes in page.found if attributes.get("id"))
-    assert [name for name, count in ids.items() if count > 1] == []
-    pointed = {a["href"] for _, a in page.found if (a.get("href") or "").startswith("#")}
-    pointed |= {f"#{name}" for _, a in page.found for name in (a.get("aria-labelledby") or "").split()}
-    assert {name.removeprefix("#") for name in pointed} <= set(ids)
+def test_ids_are_unique_and_links_lead_somewhere(site: dict[Path, str], html: str, folder: Path) -> None:
+    pages = {file: Page(text) for file, text in site.items()} | {folder / "print.html": Page(html)}
+    ids = {file: Counter(a["id"] for _, a in page.found if a.get("id")) for file, page in pages.items()}
+    for file, page in pages.items():
+        assert [name for name, count in ids[file].items() if count > 1] == []
+        for name in (n for _, a in page.found for n in (a.get("aria-labelledby") or "").split()):
+            assert name in ids[file]
+        for link in (a["href"] for a in page.all("a") if not (a["href"] or "").startswith("data:")):
+            other, _, anchor = (link or "").partition("#")
+            there = (file.parent / other).resolve() if other else file
+            assert there in ids, f"{file.name}: {link}"
+            assert not anchor or anchor in ids[there], f"{file.name}: {link}"
+    linked = {a["href"] for a in pages[folder / "report.html"].all("a")}
+    assert {"report/chapter-3.html", "report/solver.html"} <= linked
 
 
-def test_nothing_comes_from_elsewhere(html: str, page: Page) -> None:
-    for tag, attributes in page.found:
-        for name in ("src", "href", "xlink:href", "srcset", "action", "data"):
-            value = attributes.get(name)
-            assert value is None or value.startswith(("#", "data:")), f"<{tag} {name}={value}>"
-    assert not page.all("script")
-    assert not page.all("link")
-    assert "@import" not in html
-    assert not re.search(r"url\((?!#)", html)
-    assert "http://" not in html
-    assert "https://" not in html
+def test_nothing_comes_from_elsewhere(site: dict[Path, str]) -> None:
+    for text in site.values():
+        for tag, attributes in Page(text).found:
+            for name in ("src", "href", "xlink:href", "srcset", "action", "data"):
+                value = attributes.get(name)
+                assert value is None or not re.match(r"(?!data:)[a-z]+:|//", value), f"<{tag} {name}={value}>"
+        assert "<script" not in text  # no sheets to turn in these results
+        assert "<link" not in text
+        assert "@import" not in text
+        assert not re.search(r"url\((?!#)", text)
+        assert "http://" not in text
+        assert "https://" not in text
 
 
 def test_pictures_and_plots_say_what_they_show(page: Page) -> None:
@@ -208,7 +245,7 @@ def test_failed_records_are_shown_as_failed(html: str, page: Page) -> None:
 
 def test_a_clean_run_says_so(tmp_path: Path) -> None:
     results(tmp_path, failing=0)
-    page = Page(build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8"))
+    page = Page(one_page(tmp_path))
     assert "No check failed: 17 of 17 are within their tolerances." in page.text
     assert "✗" not in page.text
     assert "What differs, and why" in page.text
@@ -219,22 +256,22 @@ def test_a_verdict_cannot_hide_failed_records(tmp_path: Path) -> None:
     for case in data["cases"]:
         case["verdict"] = "holds"
     write(tmp_path, data)
-    page = Page(build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8"))
-    assert page.text.count("✗ differs") == 2  # the table and the case
+    page = Page(one_page(tmp_path))
+    assert page.text.count("✗ differs") == 3  # the table, the contents of the chapter and the case
 
 
 def test_passed_records_beyond_their_tolerance_are_pointed_out(tmp_path: Path) -> None:
     data = results(tmp_path, failing=0)
     data["checks"][-1]["error"] = 1.0
     write(tmp_path, data)
-    page = Page(build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8"))
+    page = Page(one_page(tmp_path))
     assert "1 record is marked as passed with an error beyond the tolerance" in page.text
 
 
 def test_unreached_states_name_their_outcome(tmp_path: Path) -> None:
     lost = record("fold", "energy", None, False, reference=1.0, tolerance=0.1, outcome="limit-point")
     write(tmp_path, {"checks": [lost]})
-    page = Page(build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8"))
+    page = Page(one_page(tmp_path))
     assert "1 of 1 checks failed" in page.text
     assert "✗ failed: limit-point" in page.text
     assert "bh verify fold" in page.text
@@ -249,9 +286,11 @@ def test_data_behind_plots_can_be_had(page: Page) -> None:
     assert lines[5] == "staggered,20.0,"
 
 
-def test_same_results_give_the_same_page(tmp_path: Path, html: str) -> None:
+def test_same_results_give_the_same_pages(tmp_path: Path, html: str, site: dict[Path, str]) -> None:
     results(tmp_path)
-    assert build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8") == html
+    assert one_page(tmp_path) == html
+    again = {file.name: text for file, text in written(tmp_path).items()}
+    assert again == {file.name: text for file, text in site.items()}
 
 
 def test_reproduction_and_environment_are_told(page: Page) -> None:
@@ -268,7 +307,7 @@ def test_reproduction_and_environment_are_told(page: Page) -> None:
 
 def test_what_is_missing_or_quick_is_named(tmp_path: Path) -> None:
     data = results(tmp_path)
-    page = Page(build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8"))
+    page = Page(one_page(tmp_path))
     assert f"3 of {len(CASES)} cases run, quick. Not run: shear_calibration, appendix_b" in page.text
     assert "20 records of strips" in page.text
     assert "1 record of cone" in page.text
@@ -278,7 +317,7 @@ def test_what_is_missing_or_quick_is_named(tmp_path: Path) -> None:
         "versions": {"python": "3.11.4", "numpy": "1.0"},
     }
     write(tmp_path, data)
-    page = Page(build(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8"))
+    page = Page(one_page(tmp_path))
     assert "Not run" not in page.text
     assert f"1 of {len(CASES)} cases quick" in page.text
     assert "strips is of 2 January 2025, 03:04 UTC; numpy 1.0" in page.text
@@ -369,7 +408,7 @@ def test_numbers_have_sensible_digits() -> None:
 
 
 def test_errors_are_shares_of_the_reference(tmp_path: Path) -> None:
-    from reports.build import Check
+    from reports.records import Check
 
     against_one = Check.model_validate(record("a", "b", 1.0, unit="mm", reference=2.0))
     against_zero = Check.model_validate(record("a", "b", 1.0, unit="mm", reference=0.0))

@@ -1,0 +1,154 @@
+"""How far each edge of a crease takes part in a pinch. Arc lengths in mm of the flat sheet; parts in [0, 1].
+
+Profiles of a pinch of length b about its middle (s = 0), as parts of the way from the present angle to the pinched one:
+
+- "cosine": w(s) = cos^2(pi s / b), a raised cosine: one at the middle, zero with no slope at both ends, so that the
+  fold rate phi' is continuous along the crease, and with it the torsion (Eq. 5.6);
+- "grip": w(s) = 1, two jaws: the whole zone has the pinched angle, and the sheet finds its own way beyond.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from meshes import SheetMesh
+
+Array = NDArray[np.float64]
+Profile = Literal["cosine", "grip"]
+LEAST = 1e-9  # smaller parts are none
+
+
+def _cosine(s: Array, b: float) -> Array:
+    return np.where(np.abs(s) < 0.5 * b, np.cos(np.pi * s / b) ** 2, 0.0)
+
+
+def _cosine_integral(s: Array, b: float) -> Array:
+    s = np.clip(s, -0.5 * b, 0.5 * b)
+    return 0.5 * s + b / (4.0 * np.pi) * np.sin(2.0 * np.pi * s / b)
+
+
+def _grip(s: Array, b: float) -> Array:
+    return (np.abs(s) <= 0.5 * b).astype(float)
+
+
+def _grip_integral(s: Array, b: float) -> Array:
+    return np.clip(s, -0.5 * b, 0.5 * b)
+
+
+PROFILES: dict[str, tuple[Callable[[Array, float], Array], Callable[[Array, float], Array]]] = {
+    "cosine": (_cosine, _cosine_integral),
+    "grip": (_grip, _grip_integral),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Pinched:
+    """Held creases whose angles at the end of a step follow from those at its start.
+
+    Attributes:
+        toward: (m,) angle in the middle of the pinch, rad; nan where there is none.
+        base: (m,) angle that the pinch goes from, rad; nan where it is the one that the step begins with.
+        part: (m,) how far the edge goes from there to `toward`, and `ends` (m, 2) at its lower and its higher node.
+        present: (m,) what the steps before make of the angle at the start, rad, for the size of increments only.
+    """
+
+    toward: Array
+    base: Array
+    part: Array
+    ends: Array
+    present: Array
+
+    @classmethod
+    def none(cls, hinges: int) -> Pinched:
+        empty = np.full(hinges, np.nan)
+        return cls(empty, empty.copy(), np.zeros(hinges), np.zeros((hinges, 2)), np.full(hinges, np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A crease as arc lengths: `ends` (k, 2) of its edges in order, mm; `closed` where it runs round."""
+
+    ends: Array
+    closed: bool
+
+    @property
+    def length(self) -> float:
+        return float(self.ends[-1, 1])
+
+
+def is_chain(mesh: SheetMesh, crease: str) -> bool:
+    """True if the edges of a crease follow one another."""
+    pairs = mesh.crease_edges(crease)
+    return bool((pairs[:-1, 1] == pairs[1:, 0]).all())
+
+
+def chain(mesh: SheetMesh, crease: str) -> Chain:
+    """Arc lengths along a crease of the flat sheet.
+
+    Raises:
+        ModelError: its edges are no chain (FOLD files name all mountains together, and each chain of them).
+    """
+    if not is_chain(mesh, crease):
+        raise ModelError(
+            f"pinch of crease '{crease}': it is not one line, so there is no way along it; name one line of it"
+        )
+    pairs = mesh.crease_edges(crease)
+    steps = np.linalg.norm(mesh.points[pairs[:, 1]] - mesh.points[pairs[:, 0]], axis=1)
+    s = np.concatenate(([0.0], np.cumsum(steps)))
+    return Chain(np.column_stack((s[:-1], s[1:])), bool(pairs[0, 0] == pairs[-1, 1]))
+
+
+def parts(line: Chain, at: float, length: float, profile: str) -> tuple[Array, Array]:
+    """Parts (k,) of the edges of a chain in a pinch at the share `at` of its length, and (k, 2) of their ends.
+
+    An edge has the mean of the profile along it. Both are scaled so that the largest is one: on any mesh the edge that
+    closes most has just the pinched angle (the scale tends to one with the square of the edges' length).
+    """
+    value, integral = PROFILES[profile]
+    middle = at * line.length
+    turns = (-line.length, 0.0, line.length) if line.closed else (0.0,)
+    widths = line.ends[:, 1] - line.ends[:, 0]
+    mean: Array = np.zeros(len(widths))
+    ends: Array = np.zeros((len(widths), 2))
+    for turn in turns:
+        s = line.ends - middle + turn
+        mean += (integral(s[:, 1], length) - integral(s[:, 0], length)) / widths
+        ends += value(s, length)
+    if profile == "grip":  # jaws hold an edge or they do not
+        mean = np.where(mean >= min(0.5, mean.max()) - LEAST, 1.0, 0.0)
+        ends = np.repeat(mean, 2).reshape(-1, 2)
+    mean = np.where(mean > LEAST, mean / mean.max(), 0.0)
+    return mean, np.clip(ends / max(float(ends.max()), LEAST), 0.0, 1.0)
+
+
+def zone(line: Chain, name: str, at: float, length: float | None) -> float:
+    """Length of a pinched zone, mm; a fifth of the crease unless it is given.
+
+    Raises:
+        ModelError: the zone leaves the crease, or is shorter than two edges of the mesh.
+    """
+    whole = line.length
+    length = 0.2 * whole if length is None else length
+    edge = whole / len(line.ends)
+    if length < 1.999 * edge:
+        raise ModelError(
+            f"pinch of crease '{name}': its zone of {length:.4g} mm is shorter than two edges of the mesh "
+            f"({edge:.4g} mm each); give a longer one, or a finer mesh"
+        )
+    low, high = at * whole - 0.5 * length, at * whole + 0.5 * length
+    if length > whole * (1.0 + 1e-9) or (
+        not line.closed and (low < -1e-9 * whole or high > (1.0 + 1e-9) * whole)
+    ):
+        where = f"{0.5 * length / whole:.3g} to {1.0 - 0.5 * length / whole:.3g}"
+        mend = f"give at from {where}, or a shorter length" if length <= whole else "give a shorter length"
+        raise ModelError(
+            f"pinch of crease '{name}': its zone from {low:.4g} to {high:.4g} mm leaves the crease (0 to "
+            f"{whole:.4g} mm); {mend}"
+        )
+    return length

@@ -1,0 +1,181 @@
+"""Crease patterns that were drawn: SVG and DXF files to patterns and meshes. docs/drawing.md says how to draw one."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshes.curves import Array
+from meshes.errors import FileFormatError, InputError
+from meshes.io.export import shown
+from meshes.io.strokes import Rules, Stroke
+from meshes.mesh import SheetMesh
+from meshes.pattern import CreasePattern
+from meshes.planar import DrawnLine, Graph, heal
+from meshes.sheet import pattern_of, region_of
+
+FORMATS = (".svg", ".dxf")
+TOLERANCE, GAP = 2e-5, 5e-4  # of the drawing's diagonal
+SHORT = 0.4  # of its shortest line: a larger gap by default would swallow it
+LONGEST = 1e6  # mm
+LETTERS = {"mountain": "M", "valley": "V", "boundary": "B", "cut": "B", "facet": "F", "flat": "U"}
+
+
+def read_pattern(path: str | os.PathLike[str], **options: Any) -> CreasePattern:
+    """The crease pattern of an SVG or DXF drawing, lengths in mm.
+
+    Mountain and valley are as seen on the drawing, that is from +z. The sheet of an SVG file has the lower left corner
+    of its bounding box at the origin; that of a DXF file keeps its coordinates (unless `fit` scales it).
+
+    Args:
+        scale: mm a unit of the drawing; None for the unit that the file states (SVG: CSS lengths, 96 px an inch;
+            DXF: $INSUNITS, mm where it is unset).
+        fit: length of the longer side of the bounding box, mm, in place of a scale.
+        tolerance: how far chords may stay off curves, mm; None for 1 / 50,000 of the diagonal.
+        gap: lines that miss each other by up to so much are joined, mm; None for 1 / 2,000 of the diagonal, but no
+            more than 0.4 of the shortest line.
+        lines: what colours, layers and dashes stand for, in front of the defaults (see `meshes.io.strokes`).
+
+    Raises:
+        FileFormatError: one line that names the file, the line or place, and the mend.
+    """
+    return _told(path, lambda: _pattern(path, **options))
+
+
+def read_drawn(path: str | os.PathLike[str], **options: Any) -> SheetMesh:
+    """The drawing as a mesh of its own faces, cut into triangles; no node is added. Arguments as `read_pattern`.
+
+    For drawings whose facet lines are to be the mesh. The names are those of `meshes.io.read_fold`.
+
+    Raises:
+        FileFormatError: as for `read_pattern`; also lines that end inside the sheet.
+    """
+    return _told(path, lambda: _drawn(path, **options))
+
+
+def _told(path: str | os.PathLike[str], read: Any) -> Any:
+    import shapely
+
+    try:
+        return read()
+    except (InputError, shapely.errors.ShapelyError) as error:
+        raise FileFormatError(f"{shown(path)}: {' '.join(str(error).split())}") from error
+
+
+def _pattern(path: str | os.PathLike[str], **options: Any) -> CreasePattern:
+    graph, lines, remarks = read_graph(path, **options)
+    pattern = pattern_of(graph, lines)
+    return replace(pattern, remarks=(*remarks, *pattern.remarks))
+
+
+def _drawn(path: str | os.PathLike[str], **options: Any) -> SheetMesh:
+    from meshes.io.fold import sheet_of_frame
+    from meshes.io.fold_frame import Frame
+
+    graph, lines, _ = read_graph(path, **options)
+    region = region_of(graph, lines)
+    rim = np.setdiff1d(np.arange(len(graph.edges)), region.inside)
+    letters = ["F" if kind in ("boundary", "cut") else LETTERS[kind] for kind in graph.kinds]
+    for e in rim.tolist():
+        letters[e] = "B"
+    sign = {"M": -1.0, "V": 1.0}
+    angles = [sign[letter] * math.degrees(lines[line].angle) if letter in sign else 0.0
+              for letter, line in zip(letters, graph.lines, strict=True)]  # fmt: skip
+    known = any(not math.isnan(line.angle) for line in lines)
+    points = np.column_stack((graph.points, np.zeros(len(graph.points))))
+    edges = [(int(a), int(b)) for a, b in graph.edges.tolist()]
+    return replace(sheet_of_frame(Frame(points, edges, letters, angles if known else None, [])), kind="drawn")
+
+
+def read_graph(
+    path: str | os.PathLike[str],
+    *,
+    scale: float | None = None,
+    fit: float | None = None,
+    tolerance: float | None = None,
+    gap: float | None = None,
+    lines: Mapping[str, str] | None = None,
+) -> tuple[Graph, list[DrawnLine], list[str]]:
+    """The healed plane graph of a drawing, its lines, and remarks; arguments as `read_pattern`."""
+    for name, value in (("scale", scale), ("fit", fit), ("tolerance", tolerance), ("gap", gap)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise FileFormatError(f"{name} = {value} cannot be; give a positive number")
+    if scale is not None and fit is not None:
+        raise FileFormatError("scale and fit are both given; give one of them")
+    strokes, unit = _read(path)
+    rules = Rules(lines)
+    kept = [(stroke, kind) for stroke in strokes if (kind := rules.kind(stroke)) != "ignore"]
+    if not kept:
+        raise FileFormatError(
+            f"there is no line in the drawing ({len(strokes)} are ignored); draw the creases as strokes"
+        )
+    rough = _box([_finite(stroke, stroke.sample(math.inf)) for stroke, _ in kept])
+    fine = TOLERANCE * float(np.linalg.norm(rough[1] - rough[0])) or 1.0
+    sampled = [_finite(stroke, stroke.sample(fine)) for stroke, _ in kept]
+    low, high = _box(sampled)
+    if fit is not None:
+        scale = fit / float((high - low).max() or 1.0)
+    unit = unit if scale is None else scale
+    diagonal = unit * float(np.linalg.norm(high - low))
+    if not 0.0 < diagonal <= LONGEST:
+        raise FileFormatError(f"the drawing is {diagonal:.3g} mm across; set scale (mm a unit) or fit (mm)")
+    if tolerance is not None:
+        sampled = [_finite(stroke, stroke.sample(tolerance / unit)) for stroke, _ in kept]
+    moved = low if Path(path).suffix.lower() == ".svg" or fit is not None else np.zeros(2)
+    partly = any(stroke.opacity < 1.0 for stroke, kind in kept if kind in ("mountain", "valley"))
+    drawn = [
+        DrawnLine(_clean((points - moved) * unit, 1e-9 * diagonal), kind, stroke.name,
+                  math.pi * stroke.opacity if partly and kind in ("mountain", "valley") else math.nan)
+        for (stroke, kind), points in zip(kept, sampled, strict=True)
+    ]  # fmt: skip
+    drawn = [line for line in drawn if len(line.points) > 1]
+    lengths = np.array([_length(line.points) for line in drawn])
+    remarks = []
+    if gap is None:
+        gap = min(GAP * diagonal, SHORT * float(lengths.min()))
+    elif (lengths <= gap).any():
+        short = int((lengths <= gap).sum())
+        first = drawn[int(np.argmax(lengths <= gap))].name
+        remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
+        drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
+    return heal(drawn, gap), drawn, remarks
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
+    suffix = Path(path).suffix.lower()
+    if suffix == ".svg":
+        from meshes.io.svg import read_svg
+
+        return read_svg(path)
+    if suffix == ".dxf":
+        from meshes.io.dxf import read_dxf
+
+        return read_dxf(path)
+    raise FileFormatError(f"suffix '{suffix}' is no drawing; give one of {', '.join(FORMATS)}")
+
+
+def _finite(stroke: Stroke, points: Array) -> Array:
+    if not (np.isfinite(points).all() and np.abs(points).max(initial=0.0) < 1e12):
+        raise FileFormatError(f"{stroke.name} has coordinates that are not finite; remove or redraw it")
+    return points
+
+
+def _box(lines: list[Array]) -> tuple[Array, Array]:
+    points = np.vstack(lines)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _clean(points: Array, near: float) -> Array:
+    """The points without repetitions."""
+    keep = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > near)
+    return points[keep]
+
+
+def _length(points: Array) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

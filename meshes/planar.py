@@ -1,0 +1,296 @@
+"""Drawn lines made one plane graph: ends joined, T-junctions and crossings given a node, gaps healed. mm.
+
+Points that stand out (ends and corners of lines) within `gap` of each other become one node, the first drawn; a node
+within `gap` of a line becomes a node of that line, and moves onto it if it is the end of others; where lines cross
+without a node they get one. Nothing moves by much more than `gap`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshes.curves import Array
+from meshes.errors import PatternError
+from meshes.topology import Ints
+
+CORNER = 0.35  # rad; a line that turns by more at a vertex has a corner there
+ROUNDS = 4  # of crossings that show when lines have been moved
+RANK = (
+    "boundary",
+    "cut",
+    "mountain",
+    "valley",
+    "flat",
+    "facet",
+)  # what wins where lines are drawn over each other
+RIM = ("boundary", "cut")
+FOLDED = ("mountain", "valley")
+
+
+@dataclass(frozen=True)
+class DrawnLine:
+    """Points (k, 2) of a line in mm, what it stands for (one of `RANK`), its name, and its fold angle (rad or nan)."""
+
+    points: Array
+    kind: str
+    name: str
+    angle: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Graph:
+    """A plane graph: nodes (n, 2), edges (e, 2), and of every edge its kind and the number of its line.
+
+    `joined` counts the ends that were moved, `gap` is the distance that did it, mm.
+    """
+
+    points: Array
+    edges: Ints
+    kinds: tuple[str, ...]
+    lines: tuple[int, ...]
+    joined: int
+    gap: float
+
+    def select(self, kinds: Sequence[str]) -> Ints:
+        """Numbers of the edges of some kinds."""
+        return np.flatnonzero([kind in kinds for kind in self.kinds])
+
+
+def corners(points: Array, closed: bool = False) -> NDArray[np.bool_]:
+    """(k,) where a polyline turns sharply; its ends do not count."""
+    steps = np.diff(points, axis=0)
+    heading = np.arctan2(steps[:, 1], steps[:, 0])
+    turn = np.abs((np.diff(heading) + np.pi) % (2.0 * np.pi) - np.pi)
+    found = np.zeros(len(points), dtype=bool)
+    found[1:-1] = turn > CORNER
+    if closed and len(points) > 2:
+        around = abs((heading[0] - heading[-1] + np.pi) % (2.0 * np.pi) - np.pi)
+        found[0] = found[-1] = around > CORNER
+    return found
+
+
+def heal(lines: Sequence[DrawnLine], gap: float) -> Graph:
+    """The plane graph of some lines.
+
+    Raises:
+        PatternError: mountain and valley lie over each other, or lines do not come apart within the tolerance.
+    """
+    web = _Web(lines, gap)
+    web.attach(range(len(web.nodes)))
+    for _ in range(ROUNDS):
+        fresh = web.cross()
+        if not fresh:
+            return web.graph()
+        web.attach(fresh)
+    x, y = web.nodes[fresh[0]]
+    raise PatternError(
+        f"lines near ({x:.6g}, {y:.6g}) run together and cross within gap = {gap:.3g} mm; "
+        "draw them once, or choose a smaller gap"
+    )
+
+
+class _Web:
+    """Lines as sequences of vertices (place along the line, node or -1 for a vertex that only shapes it)."""
+
+    def __init__(self, lines: Sequence[DrawnLine], gap: float) -> None:
+        import shapely
+
+        self.lines = list(lines)
+        self.gap = gap
+        self.along = [_lengths(line.points) for line in self.lines]
+        self.marks: list[dict[float, int]] = [{} for _ in self.lines]  # place along the line: node
+        self.shapes = np.array([shapely.LineString(line.points) for line in self.lines], dtype=object)
+        self.nodes: list[tuple[float, float]] = []
+        self.moved = 0
+        self._join_ends()
+
+    def _join_ends(self) -> None:
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
+
+        owner: list[tuple[int, float]] = []
+        places: list[Array] = []
+        for number, line in enumerate(self.lines):
+            stands = corners(line.points)
+            stands[[0, -1]] = True
+            for k in np.flatnonzero(stands).tolist():
+                owner.append((number, float(self.along[number][k])))
+                places.append(line.points[k])
+        points = np.array(places)
+        pairs = cKDTree(points).query_pairs(self.gap, output_type="ndarray")
+        count = len(points)
+        near = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+        _, group = connected_components(near, directed=False)
+        first: dict[int, int] = {}
+        for (number, at), point, label in zip(owner, points, group.tolist(), strict=True):
+            if label not in first:
+                first[label] = self._new(point)
+            node = first[label]
+            self.moved += bool(np.any(point != self.nodes[node]))
+            self.marks[number][at] = node
+        self._hard = [(point, first[label]) for point, label in zip(points, group.tolist(), strict=True)]
+
+    def _new(self, point: Array) -> int:
+        self.nodes.append((float(point[0]), float(point[1])))
+        return len(self.nodes) - 1
+
+    def attach(self, nodes: Sequence[int]) -> None:
+        """Nodes that lie on lines, or nearly, become nodes of these lines."""
+        import shapely
+
+        wanted = set(nodes)
+        spots = [(point, node) for point, node in self._hard if node in wanted]
+        spots += [(np.array(self.nodes[node]), node) for node in nodes]
+        tree = shapely.STRtree(self.shapes)
+        points = shapely.points(np.array([point for point, _ in spots]))
+        at, on = tree.query(points, predicate="dwithin", distance=self.gap)
+        places = shapely.line_locate_point(self.shapes[on], points[at])
+        hosts: dict[int, dict[int, float]] = {}
+        for spot, number, place in zip(at.tolist(), on.tolist(), places.tolist(), strict=True):
+            node = spots[spot][1]
+            if node not in self.marks[number].values():
+                hosts.setdefault(node, {}).setdefault(number, place)
+        rims = [k for k, line in enumerate(self.lines) if line.kind in RIM]
+        fixed = {node for k in rims for node in self.marks[k].values()}
+        for node, met in hosts.items():
+            self._move(node, met, node in fixed)
+            for number, place in met.items():
+                self.moved += 1
+                self.marks[number][self._free(number, place)] = node
+
+    def _move(self, node: int, met: dict[int, float], fixed: bool) -> None:
+        """A T-junction: the end of a line goes to the line that it meets, so that this one stays straight."""
+        import shapely
+
+        if len(met) != 1:
+            return
+        ((number, place),) = met.items()
+        if self.lines[number].kind in RIM or not fixed:
+            point = shapely.line_interpolate_point(self.shapes[number], place)
+            self.nodes[node] = (float(point.x), float(point.y))
+
+    def _free(self, number: int, place: float) -> float:
+        """A place along a line that no other node has."""
+        while place in self.marks[number]:
+            place = float(np.nextafter(place, np.inf))
+        return place
+
+    def chain(self, number: int) -> tuple[Array, list[int], list[float]]:
+        """Vertices (k, 2) of a line, their nodes (-1: none) and places; none shapes the line next to a node."""
+        marks = sorted(self.marks[number].items())
+        points = self.lines[number].points
+        taken = np.array([place for place, _ in marks])
+        vertices = [(place, node, np.array(self.nodes[node])) for place, node in marks]
+        for place, point in zip(self.along[number].tolist(), points, strict=True):
+            if np.abs(taken - place).min() > self.gap:
+                vertices.append((place, -1, point))
+        vertices.sort(key=lambda vertex: vertex[0])
+        places = [place for place, _, _ in vertices]
+        return np.array([p for _, _, p in vertices]), [node for _, node, _ in vertices], places
+
+    def cross(self) -> list[int]:
+        """Give crossings without a node one; returns the new nodes."""
+        import shapely
+
+        starts, ends, number, place, ids = [], [], [], [], []
+        for line in range(len(self.lines)):
+            points, nodes, places = self.chain(line)
+            for k in range(len(points) - 1):
+                starts.append(points[k])
+                ends.append(points[k + 1])
+                number.append(line)
+                place.append((places[k], places[k + 1]))
+                ids.append((nodes[k], nodes[k + 1]))
+        a, b = np.array(starts), np.array(ends)
+        tree = shapely.STRtree(shapely.linestrings(np.stack((a, b), axis=1)))
+        one, two = tree.query(tree.geometries, predicate="intersects")
+        fresh: list[int] = []
+        for i, j in zip(one[one < two].tolist(), two[one < two].tolist(), strict=True):
+            same = number[i] == number[j] and abs(i - j) == 1
+            if same or ({*ids[i]} & {*ids[j]}) - {-1}:
+                continue
+            s, t = _meeting(a[i], b[i], a[j], b[j])
+            if s is None or t is None:
+                continue
+            point = a[i] + s * (b[i] - a[i])
+            node = self._node_at(point, fresh)
+            for line, part, (low, high) in ((number[i], s, place[i]), (number[j], t, place[j])):
+                if node not in self.marks[line].values():
+                    self.marks[line][self._free(line, low + part * (high - low))] = node
+        return fresh
+
+    def _node_at(self, point: Array, fresh: list[int]) -> int:
+        """The node within the gap of a crossing, or a new one."""
+        away = np.linalg.norm(np.array(self.nodes) - point, axis=1)
+        nearest = int(away.argmin())
+        if away[nearest] > self.gap:
+            nearest = self._new(point)
+        if nearest not in fresh:
+            fresh.append(nearest)
+        return nearest
+
+    def graph(self) -> Graph:
+        points: list[tuple[float, float]] = list(self.nodes)
+        shaping: dict[tuple[int, int], int] = {}  # curves that are drawn twice share their vertices too
+        found: dict[tuple[int, int], tuple[str, int]] = {}
+        for number, line in enumerate(self.lines):
+            places, nodes, _ = self.chain(number)
+            for k, node in enumerate(nodes):
+                if node < 0:
+                    key = (round(places[k, 0] / (0.01 * self.gap)), round(places[k, 1] / (0.01 * self.gap)))
+                    if key not in shaping:
+                        points.append((float(places[k, 0]), float(places[k, 1])))
+                        shaping[key] = len(points) - 1
+                    nodes[k] = shaping[key]
+            for a, b in pairwise(nodes):
+                if a != b:
+                    self._put(found, (min(a, b), max(a, b)), line.kind, number, points)
+        edges = np.array(list(found), dtype=np.int64).reshape(-1, 2)
+        used, renumbered = np.unique(edges, return_inverse=True)
+        return Graph(
+            points=np.array(points).reshape(-1, 2)[used],
+            edges=renumbered.reshape(-1, 2),
+            kinds=tuple(kind for kind, _ in found.values()),
+            lines=tuple(number for _, number in found.values()),
+            joined=self.moved,
+            gap=self.gap,
+        )
+
+    def _put(
+        self, found: dict[tuple[int, int], tuple[str, int]], pair: tuple[int, int], kind: str, number: int,
+        points: list[tuple[float, float]],
+    ) -> None:  # fmt: skip
+        """Remember an edge; of two lines that lie over each other the more telling one stays."""
+        if pair not in found:
+            found[pair] = kind, number
+            return
+        before, other = found[pair]
+        if before != kind and before in FOLDED and kind in FOLDED:
+            x, y = np.mean([points[pair[0]], points[pair[1]]], axis=0)
+            raise PatternError(
+                f"{self.lines[other].name} ({before}) and {self.lines[number].name} ({kind}) lie over each other "
+                f"at ({x:.6g}, {y:.6g}); remove one of them"
+            )
+        if RANK.index(kind) < RANK.index(before):
+            found[pair] = kind, number
+
+
+def _meeting(a: Array, b: Array, c: Array, d: Array) -> tuple[float | None, float | None]:
+    """Parameters where segments a-b and c-d meet, None where they are parallel."""
+    u, v, w = b - a, d - c, c - a
+    cross = float(u[0] * v[1] - u[1] * v[0])
+    if abs(cross) <= 1e-12 * float(np.linalg.norm(u) * np.linalg.norm(v)):
+        return None, None
+    s = float(w[0] * v[1] - w[1] * v[0]) / cross
+    t = float(w[0] * u[1] - w[1] * u[0]) / cross
+    return min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
+
+
+def _lengths(points: Array) -> Array:
+    return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))

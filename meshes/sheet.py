@@ -1,0 +1,308 @@
+"""From the plane graph of a drawing to a crease pattern: outline, holes, creases and facet lines. mm.
+
+The outline is the rim of what the lines enclose; a closed boundary that touches it nowhere is a hole. Creases are
+chains of edges of one kind (and one fold angle) from vertex to vertex, named m1, m2, ..., v1, ... and f1, ... (flat)
+in the order of the drawing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from meshes.curves import Array, Curve, Polyline
+from meshes.errors import PatternError
+from meshes.pattern import Crease, CreasePattern, FoldKind
+from meshes.planar import RIM, DrawnLine, Graph, corners
+from meshes.rails import curve_through, find_rails
+from meshes.topology import Ints
+
+CREASES: dict[str, tuple[str, FoldKind]] = {
+    "mountain": ("m", "mountain"), "valley": ("v", "valley"), "flat": ("f", "flat"),
+}  # fmt: skip
+SIDES = 12  # with more corners than that the sides of an outline get no names
+NEARLY = 20.0  # times the gap: a crease that ends so near another line was perhaps meant to meet it
+
+
+@dataclass(frozen=True)
+class Region:
+    """The sheet within a graph: its polygon, the rings of nodes that bound it, and the edges inside it."""
+
+    polygon: Any
+    rings: list[list[int]]
+    inside: Ints
+    remarks: list[str]
+
+
+def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
+    """The crease pattern of a drawing.
+
+    Raises:
+        PatternError: the outline is open, is no boundary line, or there are two; a line leaves the sheet; a cut
+            lies inside it. One line, with the name of the line and the place.
+    """
+    region = region_of(graph, lines)
+    creases: list[Crease] = []
+    for kind, (letter, fold) in CREASES.items():
+        numbers = [e for e in region.inside.tolist() if graph.kinds[e] == kind]
+        for i, chain in enumerate(_chains(graph, lines, numbers, _joints(graph, region))):
+            creases.append(Crease(f"{letter}{i + 1}", curve_through(graph.points[chain[0]]), fold, chain[1]))
+    facets = [e for e in region.inside.tolist() if graph.kinds[e] in ("facet", *RIM)]
+    facet_chains = _chains(graph, lines, facets, _met(graph, region.inside.tolist()))
+    edges, sides = _edges(graph.points, region.rings)
+    groups = [("crease:" + fold, tuple("crease:" + c.name for c in creases if c.fold == fold))
+              for _, fold in CREASES.values()]  # fmt: skip
+    if sides:
+        groups.append(("edge:boundary", sides))
+    pattern = CreasePattern(
+        rings=tuple(graph.points[ring] for ring in region.rings),
+        creases=tuple(creases),
+        edges=edges,
+        facets=tuple(curve_through(graph.points[chain]) for chain, _ in facet_chains),
+        groups=tuple((name, members) for name, members in groups if members),
+        remarks=tuple(region.remarks),
+    )
+    return find_rails(pattern)
+
+
+# --- the sheet ----------------------------------------------------------------------------------------------
+
+
+def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
+    """What the lines enclose; see `pattern_of`."""
+    import shapely
+
+    segments = shapely.linestrings(graph.points[graph.edges])
+    where = {tuple(point): k for k, point in enumerate(graph.points.tolist())}
+    faces = [
+        [
+            [where[tuple(at)] for at in np.asarray(ring.coords)[:-1].tolist()]
+            for ring in (f.exterior, *f.interiors)
+        ]
+        for f in shapely.get_parts(shapely.polygonize_full(segments)[0])
+    ]
+    _check_ends(graph, lines, segments)
+    if not faces:
+        raise PatternError("the drawing has no closed outline; draw one as a boundary (black) line")
+    number = {tuple(pair): e for e, pair in enumerate(np.sort(graph.edges, axis=1).tolist())}
+    around = [[number[min(a, b), max(a, b)] for ring in face for a, b in _sides(ring)] for face in faces]
+    keep = _without_holes(graph, around)
+    polygon = shapely.union_all(
+        [shapely.Polygon(graph.points[face[0]], [graph.points[r] for r in face[1:]])
+         for face, kept in zip(faces, keep, strict=True) if kept]
+    )  # fmt: skip
+    used = np.bincount([e for at, kept in zip(around, keep, strict=True) if kept for e in at],
+                       minlength=len(graph.edges))  # fmt: skip
+    if polygon.geom_type != "Polygon":
+        spots = ", ".join(_at(part.representative_point().coords[0]) for part in polygon.geoms)
+        raise PatternError(
+            f"the drawing holds {len(polygon.geoms)} separate sheets (at {spots}); keep one of them"
+        )
+    rim = np.flatnonzero(used == 1)
+    for e in rim.tolist():
+        if graph.kinds[e] not in RIM:
+            raise PatternError(
+                f"{_name(graph, lines, e)} is drawn as {graph.kinds[e]} but is the rim of the sheet at "
+                f"{_middle(graph, e)}; close the outline with a boundary (black) line"
+            )
+    inside = np.setdiff1d(np.arange(len(graph.edges)), rim)
+    inside = _check_inside(graph, lines, polygon, inside)
+    return Region(polygon, _rings(graph, rim), inside, _remarks(graph, lines, inside))
+
+
+def _without_holes(graph: Graph, around: list[list[int]]) -> list[bool]:
+    """Which faces are sheet: not those within boundary lines that touch the outline nowhere."""
+    count = np.bincount([e for at in around for e in at], minlength=len(graph.edges))
+    outline = set(graph.edges[count == 1].ravel().tolist())
+    keep = []
+    for at in around:
+        nodes = set(graph.edges[at].ravel().tolist())
+        hole = all(graph.kinds[e] in RIM and count[e] == 2 for e in at) and not nodes & outline
+        keep.append(not hole)
+    return keep
+
+
+def _check_ends(graph: Graph, lines: Sequence[DrawnLine], segments: Any) -> None:
+    """No boundary line ends loosely."""
+    import shapely
+
+    degree = np.bincount(graph.edges.ravel(), minlength=len(graph.points))
+    for e in graph.select(RIM).tolist():
+        for node in graph.edges[e].tolist():
+            if degree[node] > 1:
+                continue
+            point = shapely.Point(graph.points[node])
+            own = np.array([line == graph.lines[e] for line in graph.lines])
+            loose = [n for n in np.flatnonzero(degree == 1).tolist() if n != node]
+            away = [float(shapely.distance(point, segments[~own]).min())] if not own.all() else []
+            away += [float(np.linalg.norm(graph.points[n] - graph.points[node])) for n in loose]
+            hint = (
+                f"{min(away):.3g} mm from the nearest other end or line" if away else "and nothing is near it"
+            )
+            mend = f", heal it with gap = {1.05 * min(away):.2g}" if away else ""
+            raise PatternError(
+                f"{_name(graph, lines, e)} (boundary) ends loosely at {_at(graph.points[node])}, {hint}; close the "
+                f"outline{mend}, or draw a line that is no boundary in another colour"
+            )
+
+
+def _check_inside(graph: Graph, lines: Sequence[DrawnLine], polygon: Any, inside: Ints) -> Ints:
+    """The edges that lie in the sheet; creases outside of it are refused, lines within holes too."""
+    import shapely
+
+    middle = graph.points[graph.edges[inside]].mean(axis=1)
+    shapely.prepare(polygon)
+    within = shapely.contains_xy(polygon, middle)
+    for e in inside[~within].tolist():
+        raise PatternError(
+            f"{_name(graph, lines, e)} ({graph.kinds[e]}) leaves the sheet at {_middle(graph, e)}; "
+            "end it at the outline, or raise gap"
+        )
+    for e in inside.tolist():
+        if graph.kinds[e] == "cut":
+            raise PatternError(
+                f"{_name(graph, lines, e)} is a cut inside the sheet at {_middle(graph, e)}; slits cannot be opened: "
+                'draw it as a hole, or take it as something else: lines = { "green" = "ignore" }'
+            )
+    return inside
+
+
+def _remarks(graph: Graph, lines: Sequence[DrawnLine], inside: Ints) -> list[str]:
+    """What was taken for granted, one line each."""
+    found = []
+    black = sorted({graph.lines[e] for e in inside.tolist() if graph.kinds[e] == "boundary"})
+    if black:
+        found.append(
+            f"{len(black)} boundary lines lie inside the sheet (first {lines[black[0]].name}) and bound no hole: "
+            "taken as facet lines, along which the sheet neither ends nor folds"
+        )
+    degree = np.bincount(graph.edges.ravel(), minlength=len(graph.points))
+    creases = [e for e in inside.tolist() if graph.kinds[e] in CREASES]
+    ends = [(e, n) for e in creases for n in graph.edges[e].tolist() if degree[n] == 1]
+    if ends:
+        import shapely
+
+        tree = shapely.STRtree(shapely.linestrings(graph.points[graph.edges]))
+        for e, n in ends:
+            point = shapely.Point(graph.points[n])
+            near = tree.query(point, predicate="dwithin", distance=NEARLY * graph.gap)
+            others = [k for k in near.tolist() if graph.lines[k] != graph.lines[e]]
+            if others:
+                away = float(shapely.distance(point, tree.geometries[others]).min())
+                found.append(
+                    f"{_name(graph, lines, e)} ends inside the sheet at {_at(graph.points[n])}, only {away:.3g} mm "
+                    f"from another line; to join them: gap = {1.05 * away:.2g}"
+                )
+    return found
+
+
+# --- chains -------------------------------------------------------------------------------------------------
+
+
+def _sides(ring: Sequence[int]) -> Iterable[tuple[int, int]]:
+    return zip(ring, [*ring[1:], ring[0]], strict=True)
+
+
+def _rings(graph: Graph, rim: Ints) -> list[list[int]]:
+    """The boundary as rings of nodes, counter-clockwise, the outside first; each from its lower left corner."""
+    import shapely
+
+    parts = shapely.get_parts(shapely.polygonize(shapely.linestrings(graph.points[graph.edges[rim]])))
+    where = {tuple(point): k for k, point in enumerate(graph.points.tolist())}
+    outside = max(parts, key=lambda part: shapely.Polygon(part.exterior).area)
+    rings = []
+    for ring in (outside.exterior, *outside.interiors):
+        points = np.asarray(ring.coords)[:-1]
+        if not ring.is_ccw:
+            points = points[::-1]
+        first = int(np.argmin(points @ (1.0, 1.0)))
+        rings.append([where[tuple(point)] for point in np.roll(points, -first, axis=0).tolist()])
+    return rings
+
+
+def _joints(graph: Graph, region: Region) -> set[int]:
+    """Nodes where creases end: on the rim, and where other than two of them meet (facet lines end no crease)."""
+    telling = [e for e in region.inside.tolist() if graph.kinds[e] in CREASES]
+    return _met(graph, telling) | {node for ring in region.rings for node in ring}
+
+
+def _met(graph: Graph, numbers: Sequence[int]) -> set[int]:
+    degree = np.bincount(graph.edges[list(numbers)].ravel(), minlength=len(graph.points))
+    return set(np.flatnonzero(degree != 2).tolist())
+
+
+def _chains(
+    graph: Graph, lines: Sequence[DrawnLine], numbers: list[int], joints: set[int]
+) -> list[tuple[list[int], float | None]]:
+    """Nodes of the chains that edges make up, with their fold angle; closed ones name their first node twice."""
+    at: dict[int, list[int]] = {}
+    for e in numbers:
+        for node in graph.edges[e].tolist():
+            at.setdefault(node, []).append(e)
+    free = set(numbers)
+
+    def angle(e: int) -> float | None:
+        value = lines[graph.lines[e]].angle
+        return None if np.isnan(value) else value
+
+    def walk(e: int, node: int) -> list[int]:
+        found = []
+        while True:
+            node = int(graph.edges[e].sum()) - node
+            found.append(node)
+            ahead = [k for k in at[node] if k in free and angle(k) == angle(e)]
+            if node in joints or len(at[node]) != 2 or not ahead:
+                return found
+            e = ahead[0]
+            free.discard(e)
+
+    chains = []
+    for e in numbers:
+        if e in free:
+            free.discard(e)
+            a, b = graph.edges[e].tolist()
+            ahead = walk(e, a)
+            back = walk(e, b)[::-1] if ahead[-1] != a else [a]
+            chains.append(([*back, *ahead], angle(e)))
+    return chains
+
+
+def _edges(
+    points: Array, rings: Sequence[Sequence[int]]
+) -> tuple[tuple[tuple[str, Curve], ...], tuple[str, ...]]:
+    """The named boundary curves, and the names of the outline's sides if it has sides.
+
+    The sides are side-1, ... counter-clockwise from the lower left corner; without corners, or with very many of
+    them, the outline is one curve, "boundary". Holes are hole-1, ...
+    """
+    outline = points[[*rings[0], rings[0][0]]]
+    sharp = np.flatnonzero(corners(outline, closed=True)[:-1])
+    edges: list[tuple[str, Curve]] = []
+    if 2 <= len(sharp) <= SIDES:
+        turned = np.roll(outline[:-1], -int(sharp[0]), axis=0)
+        at = [*(sharp - sharp[0]).tolist(), len(turned)]
+        turned = np.vstack((turned, turned[:1]))
+        edges = [(f"side-{i + 1}", curve_through(turned[at[i] : at[i + 1] + 1])) for i in range(len(sharp))]
+    sides = tuple(f"edge:{name}" for name, _ in edges)
+    if not sides:
+        edges = [("boundary", Polyline(outline))]
+    edges += [(f"hole-{i + 1}", Polyline(points[[*ring, ring[0]]])) for i, ring in enumerate(rings[1:])]
+    return tuple(edges), sides
+
+
+# --- words --------------------------------------------------------------------------------------------------
+
+
+def _name(graph: Graph, lines: Sequence[DrawnLine], edge: int) -> str:
+    return lines[graph.lines[edge]].name
+
+
+def _at(point: Sequence[float] | Array) -> str:
+    return f"({point[0]:.6g}, {point[1]:.6g})"
+
+
+def _middle(graph: Graph, edge: int) -> str:
+    return _at(graph.points[graph.edges[edge]].mean(axis=0))

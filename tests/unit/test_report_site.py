@@ -1,0 +1,276 @@
+"""What the report is made of: chapters, claims of the source, changes, sheets to turn, schemas, the PDF."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shutil
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+import bh
+import meshes
+from bh import interactive
+from meshes.errors import InputError
+from reports.build import build, one_page
+from reports.changes import changes
+from reports.claims import claims
+from reports.pdf import browser, print_report
+from reports.records import Case, CaseInfo, Check, Frames, Results, read, schema
+from tests.unit.test_report import Page, record, results, write
+from verification.cases import ALL_CASES, LONG_CASES
+from verification.chapters import CHAPTERS, OTHER, chapter_of
+from verification.run import run
+
+
+def case(*records: dict[str, Any]) -> Case:
+    checks = [(n, Check.model_validate(r)) for n, r in enumerate(records, start=1)]
+    return Case(CaseInfo(name=records[0]["case"]), checks)
+
+
+# ------------------------------------------------------------------------------------------------- chapters
+
+
+@pytest.mark.parametrize("name", ALL_CASES)
+def test_every_case_has_a_chapter(name: str) -> None:
+    """A new case must be listed in verification/chapters.py, else it would land on the page of the others."""
+    assert chapter_of(name) != OTHER
+
+
+def test_chapters_are_those_of_the_source() -> None:
+    assert [chapter.key for chapter in CHAPTERS] == ["3", "4", "5", "6", "A", "B", "solver"]
+    found = {name: chapter_of(name).page for name in ("fig5_2", "tables4", "problem_c", "appendix_b_cross")}
+    assert list(found.values()) == ["chapter-5", "chapter-4", "chapter-6", "appendix-b"]
+    assert chapter_of("never heard of") == OTHER
+
+
+def test_a_case_of_no_chapter_is_shown_all_the_same(tmp_path: Path) -> None:
+    write(tmp_path, {"checks": [record("novelty", "energy", 1.0, True, tolerance=0.1, error=0.0)]})
+    build(tmp_path, tmp_path / "report.html")
+    assert "bh verify novelty" in (tmp_path / "report" / "other.html").read_text(encoding="utf-8")
+
+
+# --------------------------------------------------------------------------------------------------- claims
+
+
+def test_claims_are_what_the_source_says() -> None:
+    place = "source 3.5.1, Fig. 3.9: phi = 90 degrees"
+    found = claims(
+        [
+            case(
+                record(
+                    "a",
+                    "angle",
+                    91.0,
+                    True,
+                    source=place,
+                    reference=90.0,
+                    error=1 / 90,
+                    tolerance=0.1,
+                    unit="deg",
+                ),
+                record(
+                    "a",
+                    "angle",
+                    88.0,
+                    True,
+                    source=place,
+                    reference=90.0,
+                    error=2 / 90,
+                    tolerance=0.1,
+                    unit="deg",
+                ),
+                record("a", "angle", 10.0, source=place, reference=90.0, error=0.9, unit="deg"),
+                record("a", "energy", 1.0, source="Eq. 3.13", reference=1.0, error=0.0),
+                record("a", "reported only", 1.0, source=place),
+                record(
+                    "a", "stiffer", 1.0, True, source="source Fig. 3", reference=1.0, error=0.0, tolerance=0.0
+                ),
+            )
+        ]
+    )
+    assert [(claim.number, claim.count, claim.verdict) for claim in found] == [
+        (2, 3, "holds"),
+        (6, 1, "holds"),
+    ]
+    assert (found[0].place, found[0].words) == ("3.5.1, Fig. 3.9", "phi = 90 degrees")
+    assert [claim.yes_or_no for claim in found] == [False, True]
+
+
+def test_each_published_value_has_its_row_and_its_error_bar(tmp_path: Path) -> None:
+    rows = [
+        record("a", "energy", value, source="source Table B.1", reference=table, error=abs(value / table - 1),
+               unit="N mm", params={"actuation": name, "error_bar": bar})
+        for name, value, table, bar in (("a", 0.0537, 0.0547, 2.5e-4), ("d", 0.0504, 0.0513, None))
+    ]  # fmt: skip
+    assert [claim.check.bar for claim in claims([case(*rows)])] == [2.5e-4, None]
+    write(tmp_path, {"checks": rows})
+    words = Page(one_page(tmp_path)).text
+    assert "0.0547 N mm 0.0537 ± 0.00025 N mm off by 1.8" in words
+
+
+def test_a_claim_that_fails_stands_for_the_others() -> None:
+    def row(value: float, passed: bool) -> dict[str, Any]:
+        error = abs(value - 1.0)
+        return record(
+            "a", "ratio", value, passed, source="source 3", reference=1.0, error=error, tolerance=0.1
+        )
+
+    (claim,) = claims([case(row(1.09, True), row(1.2, False), row(1.01, True))])
+    assert (claim.number, claim.verdict) == (2, "differs")
+
+
+# -------------------------------------------------------------------------------------------------- changes
+
+
+def test_changes_against_the_last_results(tmp_path: Path) -> None:
+    before = results(tmp_path, failing=0)
+    shutil.copyfile(tmp_path / "checks.json", tmp_path / "previous.json")
+    now = json.loads(json.dumps(before))
+    now["checks"][3] |= {"passed": False, "error": 0.5, "value": 1.5}
+    now["checks"][8]["value"] *= 1.0 + 1e-9
+    now["checks"][12]["params"]["alpha"] = 99.0
+    write(tmp_path, now)
+    found = changes(tmp_path, read(tmp_path / "checks.json"))
+    assert found is not None
+    assert [number for number, _, _ in found.broken] == [4]
+    assert [row[0] for row in found.moved] == [4]
+    assert (found.new, found.gone, found.same) == (1, 1, len(now["checks"]) - 2)
+    assert "1 that passed then fails now." in one_page(tmp_path)
+
+
+def test_no_last_results_and_broken_ones(tmp_path: Path) -> None:
+    results(tmp_path)
+    assert changes(tmp_path, read(tmp_path / "checks.json")) is None
+    assert "Since the last results" not in one_page(tmp_path)
+    (tmp_path / "previous.json").write_text("{")
+    assert "cannot be compared" in one_page(tmp_path)
+
+
+def test_a_run_keeps_the_results_that_it_replaces(tmp_path: Path) -> None:
+    run(["shear_calibration"], tmp_path, quick=True)
+    first = (tmp_path / "checks.json").read_bytes()
+    assert not (tmp_path / "previous.json").exists()
+    run(["shear_calibration"], tmp_path, quick=True)
+    assert (tmp_path / "previous.json").read_bytes() == first
+    found = changes(tmp_path, read(tmp_path / "checks.json"))
+    assert found is not None
+    assert not found.moved
+    assert found.new == found.gone == 0
+
+
+# ---------------------------------------------------------------------------------------------- sheets to turn
+
+
+@pytest.fixture(scope="module")
+def path() -> bh.Path:
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=6, rows=1)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127)).support("rigid-body")
+    return bh.trace(model.fold("crease", to=2.6).fold("crease", to=2.0))
+
+
+def unpacked(text: str, kind: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+def test_frames_hold_the_states(path: bh.Path) -> None:
+    data = interactive.view(path).data
+    (model,) = data["models"]
+    mesh = path.model.mesh
+    points = unpacked(model["points"], "<f4").reshape(len(path), -1, 3)
+    assert points[-1] == pytest.approx(path[-1].points, abs=1e-5)
+    nodes, triangles = unpacked(model["nodes"], "<i4"), unpacked(model["triangles"], "<i4").reshape(-1, 3)
+    assert np.array_equal(nodes[triangles], mesh.triangles)
+    assert len(nodes) == len(mesh.points) + len(mesh.nodes("crease:crease"))  # cut open along the crease
+    density = unpacked(model["density"]["bending"], "<f4").reshape(len(path), -1)
+    assert density[-1] == pytest.approx(path[-1].nodal_energy_density("bending"), rel=1e-6)
+    assert model["energy"]["total"] == [state.energy.total for state in path]
+    assert data["lambdas"] == pytest.approx(path.lambdas)
+    jsonschema.validate(data, schema(Frames))
+
+
+def test_paths_side_by_side_share_their_lambdas(path: bh.Path) -> None:
+    data = interactive.view({"one": path, "two": path}).data
+    assert [model["name"] for model in data["models"]] == ["one", "two"]
+    with pytest.raises(bh.plotting.PlotError, match="no states at the same lambda"):
+        interactive.view({"one": path, "none": bh.Path(path.model)})
+
+
+def test_a_view_is_a_page_of_its_own(path: bh.Path, tmp_path: Path) -> None:
+    view = interactive.view(path, 'A <sheet> of "paper"')
+    text = view.save(tmp_path / "sheet.html").read_text(encoding="utf-8")
+    assert "A &lt;sheet&gt; of &quot;paper&quot;" in text
+    assert "plotly.js" in text[:200_000]
+    assert not re.search(r'<(script|link|img)[^>]+(src|href)="(?!data:)', text)
+    assert view._repr_html_().startswith("<iframe")
+    assert repr(view) == f"View(1 models, {len(path)} frames)"
+
+
+def test_sheets_are_in_the_chapter(path: bh.Path, tmp_path: Path) -> None:
+    data = results(tmp_path)
+    frames = interactive.view(path).data
+    (tmp_path / "cone.frames.json").write_text(json.dumps(frames))
+    scene = {"file": "cone.frames.json", "still": "sheet.png", "title": "A <cone>", "alt": "A cone, folded"}
+    data["cases"][1]["scenes"] = [scene]
+    write(tmp_path, data)
+    build(tmp_path, tmp_path / "report.html")
+    text = (tmp_path / "report" / "chapter-3.html").read_text(encoding="utf-8")
+    assert '<img src="data:image/webp' in text
+    assert 'alt="A cone, folded"' in text
+    assert "A &lt;cone&gt;" in text
+    assert sorted(file.name for file in (tmp_path / "report" / "assets").iterdir()) == [
+        "plotly.min.js",
+        "viewer.js",
+    ]
+    assert 'src="assets/plotly.min.js"' in text
+    assert "assets/plotly" not in (tmp_path / "report" / "solver.html").read_text(encoding="utf-8")
+    assert "<script" not in one_page(tmp_path).replace('<script type="application/json"', "")
+    for broken, message in (({**frames, "eye": "up"}, r"eye: .*list"), ({}, "format: field required")):
+        (tmp_path / "cone.frames.json").write_text(json.dumps(broken))
+        with pytest.raises(InputError, match=message):
+            build(tmp_path, tmp_path / "report.html")
+
+
+# ------------------------------------------------------------------------------------------------- schemas
+
+
+def test_results_obey_their_schema(tmp_path: Path) -> None:
+    run(["shear_calibration", "derivatives"], tmp_path, quick=True)
+    build(tmp_path, tmp_path / "report.html")
+    stored = json.loads((tmp_path / "checks.schema.json").read_text(encoding="utf-8"))
+    assert stored == schema(Results)
+    jsonschema.Draft202012Validator.check_schema(stored)
+    jsonschema.validate(json.loads((tmp_path / "checks.json").read_text(encoding="utf-8")), stored)
+    with pytest.raises(jsonschema.ValidationError, match="'yes'"):
+        jsonschema.validate({"checks": [record("a", "b", 1.0) | {"passed": "yes"}]}, stored)
+
+
+@pytest.mark.parametrize("name", LONG_CASES)
+def test_kept_records_obey_the_schema(name: str) -> None:
+    folder = Path(import_module("verification.run").__file__ or "").with_name("records")
+    file = folder / f"{name}.json"
+    jsonschema.validate(json.loads(file.read_text(encoding="utf-8")), schema(Results))
+
+
+# ------------------------------------------------------------------------------------------------------ PDF
+
+
+def test_a_pdf_needs_a_browser(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    results(tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(InputError, match="a PDF needs a browser"):
+        print_report(tmp_path, tmp_path / "report.pdf")
+
+
+@pytest.mark.skipif(browser() is None, reason="no chromium or chrome on this machine")
+def test_the_report_is_printed(tmp_path: Path) -> None:
+    results(tmp_path)
+    file = print_report(tmp_path, tmp_path / "report.pdf")
+    assert file.read_bytes()[:5] == b"%PDF-"
+    assert file.stat().st_size > 20_000

@@ -1,0 +1,165 @@
+"""Steps that end where an observable has a wanted value."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path as FilePath
+
+import numpy as np
+import pytest
+
+import bh
+import meshes
+from bh import Model, ModelError, Sheet, Until, trace
+from bh.observables import depth_of
+from bh.scene import parse_scene
+from bh.state import State
+
+SHEET = Sheet(E=4000.0, t=0.381)
+FORMULATIONS = ["bars-and-hinges", "consistent"]
+
+
+def corrugation(kind: str = "parabolic-edge", formulation: str = "bars-and-hinges", along: int = 20) -> Model:
+    mesh = meshes.structured(meshes.corrugation(kind), along=along)
+    return Model(mesh, SHEET, formulation=formulation)
+
+
+def folded(model: Model, until: Until | None, by: float = 1.4) -> bh.Path:
+    return trace(model.fold("all", by=by, Lstar=25.0, until=until))
+
+
+def height(state: State) -> float:
+    return float(np.ptp(state.points[:, 2]))
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("kind", ["straight", "parabolic-edge", "elliptical-edge"])
+def test_depth_is_met(kind: str, formulation: str) -> None:
+    path = folded(corrugation(kind, formulation), bh.depth(6.0))
+    assert path.outcome == "reached"
+    assert path.records[-1].lam < 1.0
+    assert depth_of(path[-1])[0] == pytest.approx(6.0, abs=1e-4)
+    assert path.records[-1].imbalance < 1e-8
+    assert path.stable
+
+
+def test_depth_of_straight_pleats_is_that_of_the_zigzag() -> None:
+    """Rigid panels 20 mm wide: depth = 20 sin(psi), with the fold angle 2 psi."""
+    path = folded(corrugation("straight"), bh.depth(6.0))
+    assert 20.0 * math.sin(0.5 * path[-1].fold_angle("crease-1").mean()) == pytest.approx(6.0, abs=2e-4)
+
+
+def test_depth_does_not_depend_on_rigid_motion() -> None:
+    state = folded(corrugation(), None, by=0.6)[-1]
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    moved = State(**{**vars(state), "points": state.points @ turn.T + 7.0})
+    (d, up), (e, other) = depth_of(state), depth_of(moved)
+    assert e == pytest.approx(d, abs=1e-9)
+    assert np.abs(turn @ up - other).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("observable", "of", "value"),
+    [("energy", None, 2.0), ("fold_angle", "crease-2", -0.4), ("bending", None, 1.0),
+     (height, None, 4.0), ("displacement_z", "corner:inner-start", None)],
+)  # fmt: skip
+def test_any_observable_ends_a_step(observable: str, of: str | None, value: float | None) -> None:
+    model = corrugation()
+    if value is None:
+        whole = folded(model, None, by=0.5)
+        value = 0.4 * float(whole[-1].displacement(str(of))[0, 2])
+    until = Until(observable, value, of, 1e-7)
+    path = folded(model, until)
+    assert path.outcome == "reached"
+    assert until.measure(path[-1]) == pytest.approx(value, abs=1e-7)
+
+
+def test_what_is_never_met_fails_with_its_reason() -> None:
+    path = folded(corrugation(), bh.depth(6.0), by=0.3)
+    assert path.outcome == "target-missed"
+    assert "missed by" in path.reason
+
+
+def test_the_next_step_goes_on_from_there(tmp_path: FilePath) -> None:
+    """Rest angles stay where the step ended; stored, loaded and resumed paths know it too."""
+    model = corrugation().fold("all", by=1.4, Lstar=25.0, until=bh.depth(4.0))
+    model = model.fold("all", by=1.4, Lstar=25.0, until=bh.depth(5.0))
+    path = trace(model, file=tmp_path / "a.bh")
+    ends = [i for i, r in enumerate(path.records) if i + 1 == len(path) or path.records[i + 1].step != r.step]
+    assert [depth_of(path[i])[0] for i in ends] == pytest.approx([4.0, 5.0], abs=1e-4)
+    direct = folded(corrugation(), bh.depth(5.0))
+    assert path[-1].energy.total == pytest.approx(direct[-1].energy.total, rel=1e-4)
+    loaded = bh.Path.load(tmp_path / "a.bh")
+    assert np.array_equal(loaded[-1].points, path[-1].points)
+    assert loaded[-1].energy.total == path[-1].energy.total
+
+
+def test_held_angles_and_loads_go_on_from_there() -> None:
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=16)
+    model = Model(mesh, Sheet(E=4000.0, t=0.127)).fold(
+        "crease", to=1.6, until=Until("fold_angle", 0.7, "crease")
+    )
+    path = trace(model.fold("crease", to=1.6))
+    assert path.outcome == "reached"
+    first = max(i for i, r in enumerate(path.records) if r.step == 0)
+    assert path[first].dihedral("crease") == pytest.approx(math.pi - 0.7, abs=1e-4)
+    assert path[-1].dihedral("crease") == pytest.approx(1.6, abs=1e-9)
+    direct = trace(Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=1.6))
+    assert path[-1].energy.total == pytest.approx(direct[-1].energy.total, rel=1e-8)
+    strip = meshes.structured(meshes.strip(50.0, 5.0), along=20)
+    beam = (
+        Model(strip, Sheet(E=4000.0, t=0.127))
+        .support("edge:start")
+        .support((strip.nodes("edge:start") + 1).tolist())
+    )
+    pulled = beam.displace("edge:end", "z", 8.0)
+    pulled = Model(
+        **{**vars(pulled), "steps": ((*pulled.steps[0], Until("displacement_z", 3.0, "edge:end")),)}
+    )
+    path = trace(pulled.displace("edge:end", "z", 5.0))
+    assert path.outcome == "reached"
+    assert path[-1].displacement("edge:end")[:, 2] == pytest.approx(5.0, abs=1e-9)
+
+
+def test_bad_targets_are_one_line() -> None:
+    for make, message in (
+        (lambda: Until("dept", 1.0), "observable 'dept' is not known"),
+        (lambda: Until("energy", float("nan")), "finite number"),
+        (lambda: Until("fold_angle", 1.0), "needs `of`, the name of a crease"),
+        (lambda: bh.depth(-1.0), "positive length"),
+        (lambda: Until(lambda state: 1.0, 1.0), "top of a module"),  # type: ignore[arg-type]
+        (lambda: corrugation().step(bh.depth(1.0)), "at least one actuation"),
+    ):
+        with pytest.raises(ModelError, match=message):
+            make()
+    flat = Model(meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=4), SHEET)
+    with pytest.raises(ModelError, match="the sheet has no valley"):
+        trace(flat.fold("crease", to=2.0, until=bh.depth(1.0)))
+
+
+SCENE = """
+[pattern]
+kind = "straight"
+[sheet]
+E = 4000.0
+t = 0.381
+[mesh]
+along = 8
+[[steps]]
+fold = { crease = "all", by = 1.2, Lstar = 25.0 }
+until = { UNTIL }
+"""
+
+
+def test_scene() -> None:
+    path = trace(parse_scene(SCENE.replace("UNTIL", "depth = 6.0")).model)
+    assert depth_of(path[-1])[0] == pytest.approx(6.0, abs=1e-4)
+    path = trace(
+        parse_scene(SCENE.replace("UNTIL", 'observable = "fold_angle", of = "crease-1", value = 0.5')).model
+    )
+    assert path[-1].fold_angle("crease-1").mean() == pytest.approx(0.5, abs=1e-4)
+    for text, message in (("depth = -1.0", r"until\.depth = -1"), ("value = 1.0", "needs either depth"),
+                          ('observable = "dept", value = 1.0', "not known")):  # fmt: skip
+        with pytest.raises(bh.SceneError, match=message):
+            parse_scene(SCENE.replace("UNTIL", text))

@@ -1,0 +1,75 @@
+"""Folded sheets by several formulations, stored frame by frame beside the results: what the report lets one turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from bh import Model, Path, trace
+from bh.interactive import frames
+from bh.plotting import picture
+from verification.checks import CaseResult, Check, Context, cost_of
+from verification.run import write_json
+
+FRAMES = 8  # steps that a folding is told in
+NAMES = {"bars-and-hinges": "bars and hinges", "consistent": "consistent", "shell": "shell"}
+Fold = Callable[[Model, float], Model]
+
+
+def in_frames(model: Model, fold: Fold, count: int = FRAMES) -> Path:
+    """The path of a model folded in `count` equal steps; `fold` adds the step to a fraction of the whole."""
+    for number in range(1, count + 1):
+        model = fold(model, number / count)
+    return trace(model)
+
+
+def compare(
+    result: CaseResult, params: dict[str, Any], path: Path, shell: Path, tolerance: float | None
+) -> None:
+    """Energies at the end of a path against the shell's; the total is judged where there is a tolerance."""
+    outcome = path.outcome if path.outcome != "reached" else shell.outcome
+    energy, reference = path[-1].energy.as_dict(), shell[-1].energy.as_dict()
+    for kind, value in energy.items():
+        if value or reference[kind]:
+            judged = tolerance if kind == "total" else None
+            result.checks.append(
+                Check(result.name, f"{kind} energy, folded", params, value, "N mm", reference[kind],
+                      "the shell on the same sheet", judged, outcome=outcome, **cost_of(path))
+            )  # fmt: skip
+
+
+def step_ends(path: Path) -> list[Any]:
+    """The state that the path begins with and the one at the end of every step that was reached."""
+    last = {record.step: index for index, record in enumerate(path.records)}
+    return [
+        path[0],
+        *(path[last[step]] for step in range(len(path.steps)) if path.steps[step].outcome == "reached"),
+    ]
+
+
+def store(
+    result: CaseResult,
+    context: Context,
+    name: str,
+    paths: Mapping[str, Path],
+    title: str,
+    caption: str,
+    alt: str,
+    fractions: Sequence[float] | None = None,
+) -> None:
+    """Write the frames of the paths (by formulation) and a picture of the first one, and tell the result of them.
+
+    Frames end where the first path ended early; there is nothing to show where none got beyond its start.
+    """
+    states = {NAMES.get(key, key): step_ends(path) for key, path in paths.items()}
+    count = min(len(found) for found in states.values())
+    if count < 2:
+        return
+    lambdas = (fractions or [number / (count - 1) for number in range(count)])[:count]
+    data = frames({key: found[:count] for key, found in states.items()}, lambdas)
+    write_json(context.folder / f"{name}.frames.json", data)
+    still = f"{name}.png"
+    picture(next(iter(states.values()))[count - 1], context.folder / still, size=(1000, 560), caption=caption)
+    result.scenes.append(
+        {"file": f"{name}.frames.json", "still": still, "title": title, "alt": alt, "caption": caption}
+    )
