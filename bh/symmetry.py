@@ -62,6 +62,12 @@ class Mirror:
         return np.asarray(self.edge_weight[self.mesh.topology.hinge_edges])
 
     @cached_property
+    def hinge_inside(self) -> NDArray[np.bool_]:
+        """(m,) hinges whose edge lies in the plane."""
+        ends = self.mesh.topology.hinges[:, 1:3]
+        return np.asarray((self.side[ends] == 0).all(axis=1))
+
+    @cached_property
     def triangle_weight(self) -> Array:
         return self._weight(self.triangle, self.side[self.mesh.triangles].sum(axis=1))
 

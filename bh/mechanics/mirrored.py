@@ -147,4 +147,10 @@ def pattern_nodes(displacements: Displacements, groups: tuple[Ints, ...]) -> tup
     """Numbers of the unknowns and nodes of elements as a pattern takes them: images stand for their originals."""
     if not isinstance(displacements, MirroredDisplacements):
         return displacements.number, groups
-    return displacements.own, tuple(displacements.original[group] for group in groups)
+    nodes, n = (
+        displacements.original,
+        len(displacements.original),
+    )  # beyond the nodes there may be more, all their own
+    return displacements.own, tuple(
+        np.where(group < n, nodes[np.minimum(group, n - 1)], group) for group in groups
+    )
