@@ -106,7 +106,10 @@ def mirror(mesh: SheetMesh, plane: Plane) -> Mirror:
 
 def _normal(mesh: SheetMesh, plane: Plane) -> Array:
     if not isinstance(plane, str):
-        vector = np.asarray(plane, dtype=float)
+        try:
+            vector = np.asarray(plane, dtype=float)
+        except (TypeError, ValueError):
+            vector = np.zeros(0)
         if vector.shape != (3,) or not np.isfinite(vector).all() or not vector[:2].any() or vector[2] != 0.0:
             raise ModelError(
                 f'symmetry = {plane} cannot be; give "x", "y" or a normal [x, y, 0] in the sheet'

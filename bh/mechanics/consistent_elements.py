@@ -184,8 +184,8 @@ def _number_rotations(
 ) -> tuple[Ints, Ints, int]:
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
 
-    There is one for each hinge between two patches, and two for each spring crease; but one for a spring in the plane of
-    a symmetric sheet, and none for what lies outside of its half.
+    There is one for each hinge between two patches, and two for each spring crease; but one for a spring in the plane
+    of a symmetric sheet, and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
     two_sided = spring.copy()

@@ -1,8 +1,8 @@
 """Half of a mirror-symmetric sheet of the consistent formulation: its patches, and its element arrays.
 
-- A triangle that is its own image counts half, and its angles at two edges that are images of each other are one angle.
-- An edge in the plane turns by as much on either side: theta = (phi - phi_rest) / 2, and has no rotation. A spring there
-  has one rotation for both sides.
+- A triangle that is its own image counts half, and its angles at two edges that are images of each other are one.
+- An edge in the plane turns by as much on either side: theta = (phi - phi_rest) / 2, and has no rotation. A spring
+  there has one rotation for both sides.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def half_patches(joined: Patches, spring: Bools, plane: Mirror) -> Patches:
     share = np.where(inside, 0.5, 1.0)
     B = share[:, :, None] * B * share[:, None, :]
 
-    # the image of an angle of a triangle that is its own image is the angle of the same triangle at the image of the edge
+    # in a triangle that is its own image, the image of an angle is the angle at the image of the edge
     own = (weight[keep] == 0.5)[:, None] & (edge >= 0)
     twice = own & (plane.edge_weight[edge] == 0.0)
     c, gone = np.nonzero(twice)

@@ -42,9 +42,10 @@ class MirroredDisplacements(Displacements):
         self._images = np.flatnonzero((image[:, None] & (self.number >= 0)).ravel())
         self._of = self.number.ravel()[self._images]
         self.weight = np.asarray(1.0 + np.bincount(self._of, minlength=len(self.free)), dtype=np.float64)
-        self._root = np.sqrt(self.weight)
+        self._weights = self.weight
         self._kept = np.flatnonzero(~image)
         self._fixed_kept = self.constraints.fixed[self._kept]
+        self._supported = bool(self._fixed_kept.sum() > (plane.side == 0).sum())
         self._turned_kept = np.flatnonzero(self.constraints.frame_of[self._kept] >= 0)
         self._axes_kept = self.constraints.frames[self.constraints.frame_of[self._kept[self._turned_kept]]]
 
@@ -77,15 +78,17 @@ class MirroredDisplacements(Displacements):
         )
         motions[:, :, 2] /= max(float(np.abs(arm).max()), 1e-300)
         motions[self._turned_kept] = self._axes_kept @ motions[self._turned_kept]
-        rows = motions[self._fixed_kept]
-        if len(
-            rows
-        ):  # what the supports leave of them; nodes in the plane are held across it, which they all obey
+        if self._supported:  # what the supports leave of them; all obey those across the plane
+            rows = motions[self._fixed_kept]
             _, size, right = np.linalg.svd(np.linalg.qr(rows, mode="r"), full_matrices=True)
             rank = int((size > 1e-7 * np.sqrt(len(rows))).sum())
             motions = motions @ right[rank:].T
-        root = self._root[:, None]
-        return np.asarray(np.linalg.qr(root * motions[~self._fixed_kept])[0] / root)
+        moving = motions[~self._fixed_kept]
+        if moving.shape[1] == 0:
+            return moving
+        # Gram-Schmidt by the factor of the Gram matrix, which three columns of like size do not spoil
+        gram = np.linalg.cholesky((moving * self._weights[:, None]).T @ moving)
+        return np.asarray(np.linalg.solve(gram, moving.T).T)
 
     @cached_property
     def ground_triangle(self) -> int:
