@@ -53,9 +53,11 @@ from bh.scene_tables import (
     within,
 )
 from bh.supports import Holding, RigidBody, Support, directions, select
+from bh.symmetry import Plane, check, mirror
 from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy")
+SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy",
+            "symmetry")  # fmt: skip
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
 COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
@@ -80,6 +82,7 @@ class Scene:
         model: checked; its steps can be programmed (`bh.program`), nothing is solved.
         outputs: what a run is to write.
         accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
+        symmetry: the plane of a scene to be solved by halves, or None: `bh.trace(..., symmetry=scene.symmetry)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -89,6 +92,7 @@ class Scene:
     name: str = "scene"
     source: Path | None = None
     accuracy: Goal | None = None
+    symmetry: Plane | None = None
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -188,7 +192,17 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
             pattern_of(model)
             if accuracy.at is not None:
                 model.mesh.nodes(accuracy.at)
-    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy)
+    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy,
+                 symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None)  # fmt: skip
+
+
+def _symmetry(model: Model, data: Any) -> Plane:
+    """A letter, or a normal."""
+    if not isinstance(data, str | list):
+        raise SceneError(f'symmetry = {shown(data)} cannot be; give "x", "y" or a normal [x, y, 0]')
+    with within("symmetry"):
+        check(model, program(model), mirror(model.mesh, data))
+    return data if isinstance(data, str) else tuple(data)
 
 
 def _accuracy(data: Any) -> Goal:
