@@ -37,8 +37,8 @@ _HOME = {
 }  # fmt: skip
 
 _SUBMODULES = {
-    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
-    "plotting": "bh.plotting", "scan": "bh.scan",
+    "contact": "bh.analysis.contact", "creases": "bh.analysis.creases", "interactive": "bh.interactive",
+    "isometric": "bh.analysis.isometric", "plotting": "bh.plotting", "scan": "bh.scan",
     "stiffness_probe": "bh.analysis.stiffness_probe",
 }  # fmt: skip
 

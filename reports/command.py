@@ -23,9 +23,9 @@ def report(
         bool, typer.Option("--pdf", help="print all of it to a PDF file beside the page; needs a browser")
     ] = False,
 ) -> None:
-    """Run the verification cases and write the report: a front page, and a folder of chapters beside it.
+    """Run the verification cases and write the report page.
 
-    They need nothing else, no network and no server.
+    It is the front page of a site: the chapters lie in a folder beside it. They need no network and no server.
     """
     from reports.build import build
     from reports.records import read, shortfall
