@@ -18,7 +18,7 @@ import numpy as np
 
 import bh
 from benchmarks.cases import SHEETS, STRIPS, array_problem, least, one_iteration, strip, wide
-from bh.path import versions
+from bh.provenance import versions
 from bh.solvers import pardiso
 from bh.threads import one_blas_thread
 from bh.warm_up import warm_up

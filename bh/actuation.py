@@ -204,7 +204,78 @@ class Displace:
                 raise ModelError(f"displacement at '{self.at}': the direction is the zero vector")
 
 
-Actuation = Fold | Pinch | Moment | Force | Displace
+@dataclass(frozen=True)
+class Bar:
+    """A rigid bar that the sheet can touch, without friction, in the step that names it (`bh.mechanics.touching`).
+
+    Its section is a rectangle with rounded edges, its axis as long as it needs to be. Bars take the place of the
+    rigid-body support in their step.
+
+    Attributes:
+        name: in `State.pressing`.
+        at: centre of the section where the step begins, mm.
+        azimuth: of the axis, from the x axis towards y, rad; tilt: of the axis, upwards, rad.
+        width, height: of the whole section, mm; radius: of its edges, mm. Width and height of twice the radius make a
+            cylinder.
+        by: how far it moves while lambda runs from 0 to 1, mm.
+        stiffness: of its surface, N/mm for every mm of the mesh's edges; gap: distance at which it begins to press, mm.
+    """
+
+    name: str
+    at: tuple[float, float, float]
+    azimuth: float
+    width: float
+    height: float
+    radius: float
+    by: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tilt: float = 0.0
+    stiffness: float = 50.0
+    gap: float = 0.05
+
+    def __post_init__(self) -> None:
+        for key in ("at", "by"):
+            _vector(f"bar '{self.name}': {key}", getattr(self, key))
+        _finite(f"bar '{self.name}': azimuth or tilt", (self.azimuth, self.tilt))
+        for key in ("width", "height", "radius", "stiffness", "gap"):
+            value = getattr(self, key)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ModelError(f"bar '{self.name}': {key} = {value} cannot be; give a positive number")
+        if 2.0 * self.radius > min(self.width, self.height) * (1.0 + 1e-12):
+            raise ModelError(
+                f"bar '{self.name}': its radius {self.radius:g} mm is more than half of its section"
+            )
+
+    @property
+    def half(self) -> tuple[float, float]:
+        """Half the width and height between the centres of the rounded edges, mm."""
+        return max(0.5 * self.width - self.radius, 0.0), max(0.5 * self.height - self.radius, 0.0)
+
+    @property
+    def across(self) -> tuple[float, float, float]:
+        """Unit vector of the width, horizontal."""
+        return -math.sin(self.azimuth), math.cos(self.azimuth), 0.0
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """Unit vector of the height."""
+        s = math.sin(self.tilt)
+        return -s * math.cos(self.azimuth), -s * math.sin(self.azimuth), math.cos(self.tilt)
+
+
+@dataclass(frozen=True)
+class Tether:
+    """Soft springs that hold nodes where the step begins; they share the `total` stiffness along x, y and z, N/mm."""
+
+    at: str | Sequence[int]
+    total: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        _vector(f"tether at '{self.at}'", self.total)
+        if min(self.total) < 0.0:
+            raise ModelError(f"tether at '{self.at}': {self.total} cannot be; stiffness is not negative")
+
+
+Actuation = Fold | Pinch | Moment | Force | Displace | Bar | Tether
 
 
 def _finite(what: str, values: Sequence[float]) -> None:

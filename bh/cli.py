@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
+    "segments": "Make the data set of pinched segments for inverse design.",
+    "sweep": "Solve a scene for many parameters into a labelled data set.",
     "verify": "Check the solvers against theory and published numbers.",
     "report": "Run the verification cases and write the report page.",
 }
@@ -141,6 +143,9 @@ def run(
         written.append(folder / name)
     if not quiet:
         _summary(path, loaded, written, contact)
+    if path.outcome == "reached" and path.accuracy is not None and not path.accuracy.met:
+        typer.echo(f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}", err=True)
+        raise typer.Exit(1)
     if path.outcome != "reached":
         why = f" ({path.reason})" if path.reason else ""
         kept = "; the finished result of an earlier run is kept" if names == UNFINISHED else ""
@@ -202,6 +207,40 @@ def view(
 
 
 @app.command()
+def export(
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="A scene (flat), or a path or run's folder (folded).")
+    ],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What to write; its suffix is the format.")],
+    state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
+    facets: Annotated[bool, typer.Option("--facets", help="Also the edges of the mesh (SVG, DXF).")] = False,
+) -> None:
+    """Write a flat pattern or a folded sheet for other programs."""
+    from bh.errors import InputError
+    from bh.export import write_flat, write_state
+
+    if source.suffix.lower() == ".toml":
+        from bh.scene import load_scene
+
+        done = write_flat(file, load_scene(source).model.mesh, facets)
+    else:
+        from bh.path import Path as Trace
+        from bh.run import path_file
+
+        solved = Trace.load(path_file(source) if source.is_dir() else source)
+        if not -len(solved) <= state < len(solved):
+            raise InputError(
+                f"--state {state}: '{source}' has the states 0 to {len(solved) - 1}; -1 is the last"
+            )
+        last = state % len(solved)
+        if file.suffix.lower() in (".svg", ".dxf"):
+            done = write_flat(file, solved.model.mesh, facets)
+        else:
+            done = write_state(file, [solved[k] for k in range(last + 1)], source.stem)
+    typer.echo(f"wrote {done}")
+
+
+@app.command()
 def formulations() -> None:
     """List the formulations that a scene can name."""
     from bh.formulations import names
@@ -253,17 +292,18 @@ def _summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contac
         f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
         f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
     )
+    if path.accuracy is not None:
+        typer.echo(str(path.accuracy))
     for remark in path.remarks[:6]:
         typer.echo(remark)
-    if scene.model.sheet.nu != 0.0 and not takes_nu(scene.model.formulation):
-        typer.echo(
-            f"{scene.model.formulation} take Poisson's ratio as 0, not as nu = {scene.model.sheet.nu:g}"
-        )
+    model = path.model
+    if model.sheet.nu != 0.0 and not takes_nu(model.formulation):
+        typer.echo(f"{model.formulation} take Poisson's ratio as 0, not as nu = {model.sheet.nu:g}")
     typer.echo(
         f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
         f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
     )
-    creases = scene.model.mesh.creases
+    creases = model.mesh.creases
     for crease in creases[:6]:
         a = last.fold_angle(crease)
         typer.echo(

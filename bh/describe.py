@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Displace, Fold, Force, Moment, Pinch
+from bh.actuation import Actuation, Bar, Displace, Fold, Force, Moment, Pinch, Tether
 from bh.errors import PathFileError
 from bh.model import CreaseLaw, ElementStiffness, Model, Sheet
 from bh.observables import Until
@@ -28,7 +28,12 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "displace": Displace,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
-STEP_ITEMS: dict[str, type[Actuation | Until]] = {**ACTUATIONS, "until": Until}
+STEP_ITEMS: dict[str, type[Actuation | Until]] = {
+    **ACTUATIONS,
+    "bar": Bar,
+    "tether": Tether,
+    "until": Until,
+}
 FORMAT = 1
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -64,6 +64,11 @@ class Until:
         except (ImportError, AttributeError, ValueError) as missing:
             raise ModelError(f"observable '{self.observable}' cannot be imported ({missing})") from missing
         return float(function(state))
+
+
+def until_of(actuations: Sequence[object]) -> Until | None:
+    """What ends a step early, if anything does."""
+    return next((item for item in actuations if isinstance(item, Until)), None)
 
 
 def depth(to: float, tolerance: float = 1e-4) -> Until:

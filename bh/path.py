@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import platform
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import astuple, dataclass
-from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path as FilePath
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.describe import describe, fingerprint, rebuild
-from bh.errors import ModelError, PathFileError
+from bh.describe import describe, rebuild
 from bh.formulations import Formulation, formulation
 from bh.model import Model
-from bh.observables import Until
+from bh.observables import until_of
 from bh.program import Ended, StepProgram, open_ends, program
-from bh.progress import ProgressMeter, meter
-from bh.solvers.automatic import Automatic
-from bh.solvers.increments import ARC, LOAD, CriticalPoint, Point, point
-from bh.solvers.trace import Strategy, Walk, walk
+from bh.provenance import provenance_of
+from bh.solvers.increments import ARC, LOAD, CriticalPoint
 from bh.state import State
 from bh.storage import CriticalRow, PathFile, StateRow, reading
-from bh.threads import one_blas_thread
 from meshes.mesh import count
+
+if TYPE_CHECKING:
+    from bh.accuracy import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -74,13 +69,17 @@ class Path:
     """The accepted states of a model, in order, and how each step ended.
 
     `path[i]` is the i-th `State` (read when asked for); `path[0]` is the state that the first step begins with.
+
+    Attributes:
+        accuracy: the estimate of its error, where an accuracy was asked for (`bh.accuracy.Accuracy`), else None.
     """
 
     def __init__(self, model: Model, provenance: dict[str, Any] | None = None) -> None:
         self.model = model
-        self.provenance = provenance or _provenance(model)
+        self.provenance = provenance or provenance_of(model)
         self.records: list[Record] = []
         self.steps: list[StepOutcome] = []
+        self.accuracy: Accuracy | None = None
         self._formulation: Formulation = formulation(model.formulation)
         self._programs: tuple[StepProgram, ...] = program(model)
         self._systems: dict[int, Any] = {}
@@ -123,6 +122,8 @@ class Path:
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
         ends = [line for step in self._programs for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
+        if self.accuracy is not None and not self.accuracy.met:
+            found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
@@ -196,7 +197,7 @@ class Path:
         Raises:
             PathFileError: the file cannot be written.
         """
-        target = _new_file(self, FilePath(file))
+        target = new_file(self, FilePath(file))
         for index, record in enumerate(self.records):
             target.add(self._row(index, record))
         for step, end in enumerate(self.steps):
@@ -254,160 +255,6 @@ class Path:
         return found
 
 
-def until_of(actuations: Sequence[object]) -> Until | None:
-    """What ends a step early, if anything does."""
-    return next((item for item in actuations if isinstance(item, Until)), None)
-
-
-def trace(
-    model: Model,
-    *,
-    progress: bool | ProgressMeter = False,
-    strategy: Strategy | None = None,
-    file: str | FilePath | None = None,
-    resume: bool = False,
-) -> Path:
-    """Follow the equilibrium of `model` through all its steps.
-
-    Args:
-        progress: True for a bar in the terminal, or an object that is told about every increment.
-        strategy: how increments are chosen; the default suits all scenes.
-        file: write every accepted state to this file before the next increment begins.
-        resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
-
-    Returns:
-        the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
-        its reason and keeps everything up to there.
-
-    Raises:
-        ModelError: the model has no steps, or cannot be solved as described.
-        PathFileError: the file cannot be written, or is of another model.
-    """
-    if not isinstance(model, Model):
-        what = "give scene.model" if hasattr(model, "model") else "give a bh.Model"
-        raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
-    if not model.steps:
-        raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
-    strategy = strategy or Automatic()
-    path = Path(model)
-    target: PathFile | None = None
-    if file is not None:
-        if resume:
-            path, target = _resume(model, FilePath(file))
-        else:
-            path._system(0)  # a model that cannot be solved must not replace the file of one that was
-            target = _new_file(path, FilePath(file))
-    report = meter(progress)
-    try:
-        for step in range(len(path.steps), len(model.steps)):
-            with one_blas_thread():
-                end = _run_step(path, step, strategy, report, target)
-            path.steps.append(end)
-            if target is not None:
-                target.finish_step(step, *astuple(end))
-            if end.outcome != "reached":
-                break
-    finally:
-        report.close(path.outcome)
-        if target is not None:
-            target.close()
-    return path
-
-
-def _run_step(
-    path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
-) -> StepOutcome:
-    system = path._system(step)
-    began = time.perf_counter()
-
-    def accept(record: Record) -> None:
-        path.records.append(record)
-        if target is not None:
-            target.add(path._row(len(path.records) - 1, record))
-
-    increment: float | None = None
-    done = [record for record in path.records if record.step == step]
-    origin = point(system, system.start(), 0.0)
-    if not done:
-        history = [origin]
-        if step == 0:
-            imbalance = system.evaluate(origin.q, 0.0).imbalance
-            accept(
-                Record(
-                    0, 0.0, origin.q, 0, imbalance, time.perf_counter() - began, strategy.limits(system)[0]
-                )
-            )
-            began = time.perf_counter()
-    else:
-        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in _recent(done)]
-        increment = done[-1].next_increment
-        if (
-            len(history) < 3 and step > 0 and not any(r.jumped for r in done)
-        ):  # later steps do not store their start
-            history.insert(0, origin)
-    goal, tolerance = _goal(path, step, system)
-    for item in walk(Walk(system, strategy, tuple(history), increment, origin, goal, tolerance)):
-        now = time.perf_counter()
-        if item.outcome != "reached":
-            return StepOutcome(item.outcome, item.note, item.iterations)
-        at = item.point
-        accept(
-            Record(
-                step, at.lam, at.q, item.iterations, item.imbalance, now - began, item.next_increment,
-                negative=at.negative, mode=at.mode, note=item.note, cuts=item.cuts, jumped=item.jumped,
-                critical=item.critical,
-            )
-        )  # fmt: skip
-        report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
-        began = time.perf_counter()
-    return StepOutcome("reached")
-
-
-def _goal(path: Path, step: int, system: Any) -> tuple[Callable[[Point], float] | None, float]:
-    """What is zero where the step ends early, and to which tolerance; None if nothing ends it early."""
-    until = until_of(path.model.steps[step])
-    if until is None:
-        return None, 0.0
-
-    def missed(at: Point) -> float:
-        return until.measure(path._formulation.observe(path.model, system, at.q, at.lam, step)) - until.value
-
-    return missed, until.tolerance
-
-
-def _recent(done: list[Record]) -> list[Record]:
-    """Records that a resumed step needs: three since the last jump, and all of a run by arc length that goes on."""
-    jumps = [index for index, record in enumerate(done) if record.jumped]
-    arc = len(done)
-    while arc > 0 and done[arc - 1].mode != LOAD:
-        arc -= 1
-    return done[max(arc - 3, jumps[-1] if jumps else 0, 0) :]
-
-
-def _new_file(path: Path, file: FilePath) -> PathFile:
-    data, arrays = describe(path.model)
-    return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)
-
-
-def _resume(model: Model, file: FilePath) -> tuple[Path, PathFile]:
-    path = Path.load(file)
-    if path.provenance.get("input") != fingerprint(model):
-        raise PathFileError(
-            f"'{file}' holds another model; run without --resume, or choose another output folder"
-        )
-    path = _with_model(path, model)
-    target = PathFile.open(file)
-    target.forget_failed_steps()
-    path.steps = [step for step in path.steps if step.outcome == "reached"]
-    return path, target
-
-
-def _with_model(path: Path, model: Model) -> Path:
-    other = Path(model, path.provenance)
-    other.records, other.steps = path.records, path.steps
-    return other
-
-
 def _record(row: StateRow) -> Record:
     return Record(
         row.step, row.lam, row.q, row.iterations, row.imbalance, row.wall_time_s, row.next_increment,
@@ -416,17 +263,7 @@ def _record(row: StateRow) -> Record:
     )  # fmt: skip
 
 
-@lru_cache(maxsize=1)
-def versions() -> dict[str, str]:
-    """Versions of the project and of what its numbers depend on."""
-    found = {"python": platform.python_version()}
-    for name in ("curved-crease-workbench", "numpy", "scipy", "numba"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
-
-
-def _provenance(model: Model) -> dict[str, Any]:
-    return {"input": fingerprint(model), "versions": versions(), "formulation": model.formulation}
+def new_file(path: Path, file: FilePath) -> PathFile:
+    """An empty path file for a path, which replaces an older one."""
+    data, arrays = describe(path.model)
+    return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Array, Displace, Fold, Force, Moment, Pinch, Ramp
+from bh.actuation import Actuation, Array, Bar, Displace, Fold, Force, Moment, Pinch, Ramp, Tether
 from bh.errors import ModelError
 from bh.model import CreaseLaw, Model
 from bh.observables import Until
@@ -40,6 +40,7 @@ class StepProgram:
         moment: couple a length that closes the dihedral angle below the sheet, N mm / mm.
         force: (n, 3) dead forces, N.
         constraints: supports and prescribed displacements.
+        bodies: bars and tethers that act in this step.
     """
 
     law: NDArray[np.int64]
@@ -51,6 +52,7 @@ class StepProgram:
     moment: Ramp
     force: Ramp
     constraints: Constraints
+    bodies: tuple[Bar | Tether, ...] = ()
 
     def held_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""
@@ -101,8 +103,8 @@ class _Builder:
         hinges, nodes = len(topology.hinges), len(model.mesh.points)
         self.law = np.zeros(hinges, dtype=np.int64)
         self.stiffness = np.zeros(hinges)
-        self.rest = np.full(hinges, math.pi)
-        self.made = np.full(hinges, math.pi)  # rest angles of the laws; they come in during the first step
+        self.rest = stress_free_angles(model.mesh)
+        self.made = self.rest.copy()  # rest angles of the laws; they come in during the first step
         self.held = np.full(hinges, np.nan)
         self.moment = np.zeros(hinges)
         self.steps = 0
@@ -209,6 +211,7 @@ class _Builder:
         for item in actuations:  # a pinch goes from where the fold of its step ends
             if isinstance(item, Pinch):
                 self._pinch(item, angles)
+        bodies = tuple(item for item in actuations if isinstance(item, Bar | Tether))
         rest, held, moment, force = before
         rest[self.released] = np.nan
         ends[self.released] = np.nan
@@ -221,7 +224,10 @@ class _Builder:
             pinch=self.pinch,
             moment=Ramp(moment, self.moment.copy()),
             force=Ramp(force, self.force.copy()),
-            constraints=resolve(self.mesh, self.model.supports, self._prescribed(displaced)),
+            constraints=resolve(
+                self.mesh, self.model.supports, self._prescribed(displaced), touching=bool(bodies)
+            ),
+            bodies=bodies,
         )
 
     def _begin_pinches(self, held: Array) -> None:
@@ -377,6 +383,19 @@ class _Builder:
             Prescribed(np.array([node]), direction, before.get((node, direction), start), end)
             for (node, direction), end in self.displaced.items()
         ]
+
+
+def stress_free_angles(mesh: SheetMesh) -> Array:
+    """(m,) dihedral angles of the mesh as it is made, rad: there springs are at rest before the first step."""
+    hinges = mesh.topology.hinges
+    if mesh.flat:
+        return np.full(len(hinges), math.pi)
+    wing, tail, head, other = (mesh.points[hinges[:, k]] for k in range(4))
+    edge = head - tail
+    one, two = np.cross(edge, wing - tail), np.cross(other - tail, edge)
+    length = np.linalg.norm(edge, axis=1)
+    turn = np.arctan2(length * np.einsum("mi,mi->m", one, other - tail), np.einsum("mi,mi->m", one, two))
+    return np.asarray(np.mod(math.pi + turn, 2.0 * math.pi))
 
 
 def program(model: Model, ended: Mapping[int, Ended] | None = None) -> tuple[StepProgram, ...]:

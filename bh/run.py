@@ -11,6 +11,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,12 +20,13 @@ import numpy as np
 from bh.analysis.contact import Contact, first_contact
 from bh.describe import fingerprint
 from bh.errors import InputError
+from bh.export import FOLDED, write_flat, write_state
 from bh.model import Model
 from bh.path import Path as Trace
-from bh.path import trace
 from bh.progress import ProgressMeter
 from bh.scene import Scene
 from bh.storage import PathFile, reading
+from bh.tracing import trace
 from meshes.io.export import replacing
 
 FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
@@ -61,7 +63,7 @@ def solve(
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
         (folder / names[1]).unlink(missing_ok=True)
     try:
-        path = trace(scene.model, progress=progress, file=file, resume=resume)
+        path = trace(scene.model, progress=progress, file=file, resume=resume, accuracy=scene.accuracy)
     except (InputError, KeyboardInterrupt):
         if not resume and not holds_states(file):
             _take_back(file, made)
@@ -187,10 +189,11 @@ def _move(file: Path, place: Path) -> None:
 
 def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, Any]:
     """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact."""
-    mesh, last = scene.model.mesh, path[-1]
+    model = path.model
+    mesh, last = model.mesh, path[-1]
     folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
     steps = []
-    for number in range(len(scene.model.steps)):
+    for number in range(len(model.steps)):
         records = [record for record in path.records if record.step == number]
         tried = number < len(path.steps)
         steps.append(
@@ -233,7 +236,8 @@ def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, Any]
             "triangles": len(mesh.triangles),
             "aspect_ratio": _number(mesh.aspect_ratio),
         },
-        "formulation": scene.model.formulation,
+        "formulation": model.formulation,
+        "accuracy": path.accuracy.as_dict() if path.accuracy is not None else None,
         "versions": path.provenance["versions"],
         "input": path.provenance["input"],
         "scene": str(scene.source),
@@ -264,7 +268,7 @@ def _number(value: float) -> float | None:
 def remove_extras(folder: Path, mark: str) -> None:
     """Remove what `extras` has written for another run, as far as it can be removed; nothing else."""
     with contextlib.suppress(OSError):
-        for name in (f"folded{mark}.png", f"folded{mark}.fold", f"path{mark}.pvd"):
+        for name in (f"folded{mark}.png", f"path{mark}.pvd", *(f"folded{mark}{suffix}" for suffix in FOLDED)):
             (folder / name).unlink(missing_ok=True)
         for file in (folder / f"path{mark}").glob("[0-9][0-9][0-9][0-9]*.vtu"):
             file.unlink()
@@ -291,7 +295,7 @@ def extras(
     def fold() -> None:
         from meshes.io import write_fold
 
-        mesh, last = scene.model.mesh, path[-1]
+        mesh, last = path.model.mesh, path[-1]
         angles = np.zeros(len(mesh.topology.edges))
         angles[mesh.topology.hinge_edges] = np.pi - last.dihedral_angles
         frame = ("folded", last.points, angles)
@@ -302,4 +306,10 @@ def extras(
         f"path{mark}.pvd": (series, vtu or scene.outputs.vtu),
         f"folded{mark}.fold": (fold, scene.outputs.fold),
     }
-    return {name: write for name, (write, asked) in wanted.items() if asked}
+    files: dict[str, Callable[[], Any]] = {name: write for name, (write, asked) in wanted.items() if asked}
+    for suffix in scene.outputs.folded:
+        name = f"folded{mark}.{suffix}"
+        files[name] = partial(write_state, folder / name, [path[-1]], scene.name)
+    for suffix in scene.outputs.flat:
+        files[f"flat.{suffix}"] = partial(write_flat, folder / f"flat.{suffix}", scene.model.mesh)
+    return files

@@ -13,20 +13,24 @@ from typing import Any
 
 import numpy as np
 
-from bh.actuation import Actuation, Fold, Moment, Pinch
+from bh.actuation import Actuation, Bar, Fold, Moment, Pinch, Tether
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
 from bh.observables import Until
 from bh.program import program
+from bh.refinement import Goal, pattern_of
+from bh.scene_patterns import (
+    LIBRARY,
+    DrawingPattern,
+    FilePattern,
+)
 from bh.scene_schema import (
     ACTUATIONS,
-    LIBRARY,
+    AccuracyTable,
     CreaseTable,
-    DrawingPattern,
     DrawnTable,
-    FilePattern,
     GmshTable,
     MeshTable,
     ModelTable,
@@ -34,6 +38,8 @@ from bh.scene_schema import (
     SheetTable,
     SupportTable,
     UntilTable,
+)
+from bh.scene_tables import (
     as_table,
     as_tables,
     check_keys,
@@ -48,18 +54,21 @@ from bh.scene_schema import (
 from bh.supports import RigidBody, Support, directions, select
 from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs")
+SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy")
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
+COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet (FOLD)."""
+    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet, the flat pattern."""
 
     pictures: bool = False
     vtu: bool = False
     fold: bool = False
+    folded: tuple[str, ...] = ()
+    flat: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,7 @@ class Scene:
     Attributes:
         model: checked; its steps can be programmed (`bh.program`), nothing is solved.
         outputs: what a run is to write.
+        accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -77,6 +87,7 @@ class Scene:
     outputs: Outputs
     name: str = "scene"
     source: Path | None = None
+    accuracy: Goal | None = None
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -130,8 +141,23 @@ def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Sce
         raise SceneError(one_line(f"{name}: {error}")) from error
 
 
+def scene_from_tables(tables: dict[str, Any], folder: str | Path = ".", name: str = "scene") -> Scene:
+    """A scene from its tables as `tomllib` reads them: what a sweep changes between points.
+
+    Raises:
+        SceneError: as `parse_scene`.
+    """
+    try:
+        return replace(_from_tables(tables, Path(folder)), name=name)
+    except InputError as error:
+        raise SceneError(one_line(f"{name}: {error}")) from error
+
+
 def _scene(text: str, folder: Path) -> Scene:
-    data = read_toml(text)
+    return _from_tables(read_toml(text), folder)
+
+
+def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
     check_keys("", data, SECTIONS)
     for key in ("pattern", "sheet", "steps"):
         if key not in data:
@@ -142,8 +168,12 @@ def _scene(text: str, folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
+    accuracy = _accuracy(data["accuracy"]) if "accuracy" in data else None
+    how_meshed = data.get("mesh")
+    if accuracy is not None and how_meshed is None and "file" not in as_table(data["pattern"], "pattern"):
+        how_meshed = COARSEST  # only to check the scene on
     model = Model(
-        mesh=_mesh(data["pattern"], data.get("mesh"), folder),
+        mesh=_mesh(data["pattern"], how_meshed, folder),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
@@ -152,7 +182,22 @@ def _scene(text: str, folder: Path) -> Scene:
         hinge_lock=how.hinge_lock,
     )
     _check(model)
-    return Scene(model, Outputs(outputs.pictures, outputs.vtu, outputs.fold))
+    if accuracy is not None:
+        with within("accuracy"):
+            pattern_of(model)
+            if accuracy.at is not None:
+                model.mesh.nodes(accuracy.at)
+    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy)
+
+
+def _accuracy(data: Any) -> Goal:
+    """A number, or a table."""
+    with within("accuracy"):
+        if not isinstance(data, dict):
+            return Goal(data)
+        table = read_table(AccuracyTable, data, "accuracy")
+        direction = None if table.direction is None else tuple(table.direction)
+        return Goal(table.within, table.of, table.at, direction)  # type: ignore[arg-type]
 
 
 # --- from tables to descriptions ----------------------------------------------------------------------------
@@ -348,7 +393,7 @@ def _check(model: Model) -> None:
                 select(mesh, support.at)
     for i, actuations in enumerate(model.steps):
         for item in actuations:
-            if isinstance(item, Until):
+            if isinstance(item, Until | Bar | Tether):
                 continue
             key = type(item).__name__.lower()
             if isinstance(item, Fold | Moment | Pinch):

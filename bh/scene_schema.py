@@ -7,225 +7,31 @@ used.
 
 from __future__ import annotations
 
-import difflib
 import math
-import tomllib
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-import meshes
-from bh.errors import InputError, SceneError
 from bh.pinch_zone import Profile
-from meshes import CreasePattern
-from meshes.corrugations import KINDS as CORRUGATIONS
-from meshes.pattern import FoldKind
+from bh.refinement import LEAST, MOST
+from bh.scene_tables import (
+    DENSITY,
+    LSTAR,
+    PLACE,
+    VECTOR,
+    Count,
+    Dihedral,
+    FoldAngle,
+    Length,
+    Number,
+    Place,
+    Positive,
+    Rest,
+    Stiffness,
+    Table,
+    Vector,
+)
 from meshes.structured import Kind
-
-LONGEST, SHORTEST = 1e6, 1e-6  # mm; beyond, sampling a curve to a thousandth of a millimetre loses its sense
-LARGEST = 1e9  # of any number
-TURN = 2.0 * math.pi
-
-Length = Annotated[float, Field(ge=SHORTEST, le=LONGEST)]
-Height = Annotated[float, Field(gt=0.0, le=LONGEST)]
-Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(ge=1e-12, le=LARGEST)]
-Stiffness = Annotated[float, Field(ge=0.0, le=LARGEST)]
-Dihedral = Annotated[float, Field(gt=0.0, lt=TURN)]
-Rest = Annotated[float, Field(ge=0.0, le=TURN)]
-FoldAngle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
-Count = Annotated[int, Field(ge=1, le=1_000_000)]
-Few = Annotated[int, Field(ge=1, le=1000)]
-Node = Annotated[int, Field(ge=0, le=2**62)]
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Folds = FoldKind | Annotated[list[FoldKind], Field(min_length=1)]
-Panels = Annotated[int, Field(ge=2, le=100)]
-Power = Annotated[float, Field(ge=1.0, le=100.0)]
-Place = str | Annotated[list[Node], Field(min_length=1)]
-
-FOLDS = '"mountain", "valley" or "flat", or a list with one of them a crease'
-PLACE = 'a place ("corner:inner-start", "edge:inner", "crease:NAME", "node:N", "all", ...) or a list of nodes'
-RADII = "the radius of the crease in mm, or a list of rising radii"
-ALTERNATING = FOLDS + "; alternating where it is left out"
-ALONG, ACROSS = "the side along x in mm", "the side along y in mm"
-DENSITY = "cell height across over width along the crease, a positive number, best 5 to 12"
-LSTAR = "the length scale of the crease in mm, a positive number"
-VECTOR = "three numbers [x, y, z]"
-
-
-class Table(BaseModel):
-    """A table of the scene; values keep their TOML type, so that true is no number and "4" is none either."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-
-
-T = TypeVar("T", bound=Table)
-
-
-# --- pattern: the class is chosen by `kind`, or is FilePattern where there is `file` ------------------------
-
-
-class PatternTable(Table):
-    """A pattern of the library, drawn by the function of `meshes` that has the name of its kind."""
-
-    def draw(self) -> CreasePattern:
-        given = dict(self)
-        kind, folds = given.pop("kind"), given.pop("fold")
-        drawn: CreasePattern = getattr(meshes, kind.replace("-", "_"))(folds=folds, **given)
-        return drawn
-
-
-class StripPattern(PatternTable):
-    kind: Literal["strip"]
-    length: Length = Field(description="a positive length along x in mm")
-    width: Length = Field(description="a positive width along y in mm")
-    creases: list[Number] = Field([], description="a list of rising heights y in mm between 0 and the width")
-    fold: Folds = Field("mountain", description=FOLDS)
-
-
-class AnnulusSectorPattern(PatternTable):
-    kind: Literal["annulus_sector"]
-    radius: Length | list[Length] = Field(description=RADII)
-    width: Length = Field(description="a positive width each side of the creases in mm")
-    angle: Annotated[float, Field(ge=SHORTEST, lt=TURN)] = Field(
-        description='a sector angle in rad inside (0, 2 pi); kind = "full_annulus" is the whole turn'
-    )
-    fold: Folds = Field("mountain", description=FOLDS)
-
-
-class FullAnnulusPattern(PatternTable):
-    kind: Literal["full_annulus"]
-    radius: Length | list[Length] = Field(description=RADII)
-    width: Length = Field(description="a positive width each side of the creases in mm")
-    fold: Folds = Field("mountain", description=FOLDS)
-
-
-class ParallelPattern(PatternTable):
-    kind: Literal["parallel_creases"]
-    curvature: Number | Annotated[list[Number], Field(min_length=1)] = Field(
-        description="the curvature of the first crease in 1/mm, of any sign, or a list with one of them a piece"
-    )
-    length: Length | Annotated[list[Length], Field(min_length=1)] = Field(
-        description="the length of the first crease in mm, or a list with one of them a piece"
-    )
-    spacing: Length = Field(5.0, description="a positive distance between creases and to the edges in mm")
-    creases: Annotated[int, Field(ge=1, le=1000)] = Field(1, description="a whole number of creases, from 1")
-    fold: Folds | None = Field(None, description=FOLDS + "; alternating from mountain unless given")
-
-
-class CorrugationPattern(PatternTable):
-    """One of the five corrugations of the source (4.3)."""
-
-    kind: Literal["straight", "parabolic-point", "parabolic-edge", "elliptical-point", "elliptical-edge"] = (
-        Field(
-            description='"straight", "parabolic-point", "parabolic-edge", "elliptical-point" or "elliptical-edge"'
-        )
-    )
-    width: Length = Field(100.0, description="a positive length W along x in mm")
-    height: Length = Field(100.0, description="a positive length H along y in mm")
-    panels: Panels = Field(5, description="a whole number of sheets between creases, from 2 to 100")
-    fold: Folds | None = Field(None, description=FOLDS)
-
-    def draw(self) -> CreasePattern:
-        return meshes.corrugation(self.kind, self.width, self.height, self.panels, self.fold)
-
-
-class CurvedCorrugationPattern(PatternTable):
-    """Any corrugation of the family of `meshes.curved_corrugation`."""
-
-    kind: Literal["curved-corrugation"]
-    exponent: Power = Field(2.0, description="a number p from 1 to 100 (2 for parabolas and ellipses)")
-    root: Power = Field(1.0, description="a number q from 1 to 100 (1 for parabolas, 2 for ellipses)")
-    spread: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
-        0.0, description="a number from 0 (creases end at the straight edge) to 1 (in the corners)"
-    )
-    width: Length = Field(100.0, description="a positive length W along x in mm")
-    height: Length = Field(100.0, description="a positive length H along y in mm")
-    panels: Panels = Field(5, description="a whole number of sheets between creases, from 2 to 100")
-    fold: Folds | None = Field(None, description=FOLDS)
-
-
-class TwoArcsPattern(PatternTable):
-    kind: Literal["two_arcs"]
-    width: Length = Field(100.0, description=ALONG)
-    height: Length = Field(100.0, description=ACROSS)
-    radii: list[Length] = Field(
-        [80.0, 250.0], description="radii in mm, each at least half the width, from below"
-    )
-    at: list[Number] = Field([35.0, 70.0], description="heights in mm of the tops of the arcs, rising")
-    fold: Folds = Field(["mountain", "valley"], description=FOLDS)
-
-
-class SineTessellationPattern(PatternTable):
-    kind: Literal["sine_tessellation"]
-    width: Length = Field(100.0, description=ALONG)
-    height: Length = Field(100.0, description=ACROSS)
-    creases: Few = Field(5, description="a whole number of creases, from 1")
-    amplitude: Length = Field(4.0, description="the amplitude of the sines in mm")
-    waves: Positive = Field(2.0, description="how many waves fit into the width, a positive number")
-    fold: Folds | None = Field(None, description=ALTERNATING)
-
-
-class ParabolicCanopyPattern(PatternTable):
-    kind: Literal["parabolic_canopy"]
-    width: Length = Field(100.0, description=ALONG)
-    height: Length = Field(100.0, description=ACROSS)
-    creases: Few = Field(3, description="a whole number of creases, from 1")
-    sag: Number = Field(15.0, description="how much lower the ends of a parabola are than its top, mm")
-    fold: Folds | None = Field(None, description=ALTERNATING)
-
-
-class OppositeParabolasPattern(PatternTable):
-    kind: Literal["opposite_parabolas"]
-    side: Length = Field(100.0, description="the side of the square in mm")
-    gap: Length = Field(30.0, description="the distance between the tops in mm")
-    sag: Length = Field(20.0, description="from a top to the ends of its parabola in mm")
-    fold: Folds = Field("mountain", description=FOLDS)
-
-
-class FilePattern(Table):
-    file: Annotated[str, Field(min_length=1)] = Field(
-        description="the name of a .fold file, from the folder of the scene"
-    )
-    frame: Annotated[int, Field(ge=0, le=1_000_000)] | None = Field(
-        None, description="a frame number from 0 (the key frame)"
-    )
-
-
-class DrawingPattern(Table):
-    file: Annotated[str, Field(min_length=1)] = Field(
-        description="the name of an .svg or .dxf file, from the folder of the scene"
-    )
-    scale: Positive | None = Field(
-        None, description="how many mm a unit of the drawing is, a positive number"
-    )
-    fit: Length | None = Field(None, description="the longer side of the sheet in mm, in place of scale")
-    tolerance: Length | None = Field(None, description="how far chords may stay off curves, in mm")
-    gap: Length | None = Field(
-        None, description="up to which distance lines that miss each other are joined, in mm"
-    )
-    lines: dict[str, str] = Field(
-        {}, description='what lines stand for, such as { "#00aa00" = "valley", "layer:score" = "mountain" }'
-    )
-
-
-LIBRARY: dict[str, type[PatternTable]] = {
-    "strip": StripPattern,
-    "parallel_creases": ParallelPattern,
-    "annulus_sector": AnnulusSectorPattern,
-    "full_annulus": FullAnnulusPattern,
-    **dict.fromkeys(CORRUGATIONS, CorrugationPattern),
-    "curved-corrugation": CurvedCorrugationPattern,
-    "two_arcs": TwoArcsPattern,
-    "sine_tessellation": SineTessellationPattern,
-    "parabolic_canopy": ParabolicCanopyPattern,
-    "opposite_parabolas": OppositeParabolasPattern,
-}
-
-
-# --- sheet, mesh, model, outputs ----------------------------------------------------------------------------
 
 
 class SheetTable(Table):
@@ -282,9 +88,24 @@ class OutputsTable(Table):
     pictures: bool = Field(False, description="true or false")
     vtu: bool = Field(False, description="true or false")
     fold: bool = Field(False, description="true or false")
+    folded: list[Literal["glb", "obj", "off", "ply", "stl", "vtk", "msh", "inp"]] = Field(
+        [],
+        description='formats of the folded sheet: "glb" (glTF), "obj", "off", "ply", "stl", "vtk", "msh", "inp"',
+    )
+    flat: list[Literal["svg", "dxf", "fold"]] = Field(
+        [], description='formats of the flat pattern: "svg", "dxf" (mm, a layer a kind of line), "fold"'
+    )
 
 
-# --- supports, creases, steps -------------------------------------------------------------------------------
+class AccuracyTable(Table):
+    """Keys of `bh.Goal`; a number alone is `within`."""
+
+    within: Annotated[float, Field(ge=LEAST, le=MOST)] = Field(
+        description=f"a relative error from {LEAST:g} to {MOST:g} (0.02 is 2 %)"
+    )
+    of: Literal["energy", "tip", "stiffness"] = Field("energy", description='"energy", "tip" or "stiffness"')
+    at: str | None = Field(None, description='the place of a tip or a stiffness, such as "corner:outer-end"')
+    direction: Vector | None = Field(None, description=VECTOR + ", of the force on a stiffness")
 
 
 class SupportTable(Table):
@@ -401,123 +222,3 @@ ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | D
     "force": ForceTable,
     "displace": DisplaceTable,
 }
-
-
-# --- reading tables -----------------------------------------------------------------------------------------
-
-
-def read_toml(text: str) -> dict[str, Any]:
-    if not text.strip():
-        raise SceneError("the file is empty; give a scene (see examples/)")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"this is not TOML: {error}") from error
-    except RecursionError as error:
-        raise SceneError("this is not a scene: brackets are nested too deeply") from error
-    except ValueError as error:  # such as an integer of thousands of digits
-        raise SceneError(f"this is not TOML: {str(error).split(';')[0]}") from error
-
-
-def read_table(kind: type[T], data: Any, at: str) -> T:
-    """The table `data` as `kind`.
-
-    Raises:
-        SceneError: the first thing that is wrong with it, with its dotted path (`at` is the table's).
-    """
-    table = as_table(data, at)
-    check_keys(at, table, kind.model_fields)
-    try:
-        return kind.model_validate(table)
-    except ValidationError as errors:
-        first = errors.errors(include_url=False)[0]
-        if not first["loc"]:  # a rule of the whole table
-            raise SceneError(f"{at}: {first['ctx']['error']}") from errors
-        key = str(first["loc"][0])
-        allowed = str(kind.model_fields[key].description)
-        if first["type"] == "missing":
-            raise SceneError(f"{at}.{key} is missing; give {allowed}") from errors
-        hint = "; angles are radians, not degrees" if " rad" in allowed and _like_degrees(table[key]) else ""
-        raise SceneError(f"{at}.{key} = {shown(table[key])} cannot be; give {allowed}{hint}") from errors
-
-
-def check_keys(at: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
-    allowed = list(known)
-    for key, value in table.items():
-        if key not in allowed:
-            dotted = f"{at}.{key}" if at else key
-            raise SceneError(
-                f"unknown key {dotted} = {shown(value)}{nearest(key, allowed)}; "
-                f"known keys are {', '.join(allowed)}"
-            )
-
-
-def as_table(data: Any, at: str) -> dict[str, Any]:
-    if not isinstance(data, dict):
-        example = f"[{at}]" if at.isalpha() else "{ key = value }"
-        raise SceneError(f"{at} = {shown(data)} is not a table; write {example}")
-    return data
-
-
-def as_tables(data: Any, at: str) -> list[Any]:
-    if isinstance(data, dict):
-        raise SceneError(f"{at} is one table; it is a list of tables, so write [[{at}]] with double brackets")
-    if not isinstance(data, list):
-        raise SceneError(f"{at} = {shown(data)} is not a list of tables; write [[{at}]]")
-    if not data and at == "steps":
-        raise SceneError("steps is empty; add a table [[steps]]")
-    return data
-
-
-def one_or_more(value: Any, at: str) -> list[tuple[str, Any]]:
-    """A table, or the tables of a list, each with its path."""
-    if not isinstance(value, list):
-        return [(at, value)]
-    if not value:
-        raise SceneError(f"{at} is an empty list; give a table or a list of tables")
-    return [(f"{at}[{i}]", each) for i, each in enumerate(value)]
-
-
-# --- words --------------------------------------------------------------------------------------------------
-
-
-@contextmanager
-def within(at: str) -> Iterator[None]:
-    try:
-        yield
-    except InputError as error:
-        raise SceneError(f"{at}: {error}") from error
-
-
-def nearest(key: object, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(str(key), list(known), n=1) or [
-        name for name in known if name.lower() == str(key).lower()
-    ]
-    return f" (did you mean '{close[0]}'?)" if close else ""
-
-
-def _like_degrees(value: Any) -> bool:
-    numbers = [v for v in (value if isinstance(value, list) else [value]) if isinstance(v, int | float)]
-    return any(7.0 < abs(v) <= 360.0 for v in numbers)
-
-
-def shown(value: Any) -> str:
-    """A value as TOML writes it, in a few characters."""
-    if isinstance(value, dict):
-        return "{...}" if value else "{}"
-    if isinstance(value, list):
-        inner = ", ".join(shown(item) for item in value[:4])
-        return f"[{inner}{', ...' if len(value) > 4 else ''}]"[:80]
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int) and abs(value) >= 10**18:
-        return "an integer of many digits"
-    text = f'"{value}"' if isinstance(value, str) else str(value)
-    return text if len(text) <= 60 else text[:56] + " ..."
-
-
-def one_line(text: str) -> str:
-    """One printable line of a bearable length."""
-    words = " ".join(text.split())
-    clean = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
-    return clean if len(clean) <= 600 else clean[:596] + " ..."

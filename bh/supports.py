@@ -112,11 +112,14 @@ def select(mesh: SheetMesh, at: str | Sequence[int]) -> Ints:
 
 
 def resolve(
-    mesh: SheetMesh, supports: Iterable[Support | RigidBody], prescribed: Iterable[Prescribed] = ()
+    mesh: SheetMesh,
+    supports: Iterable[Support | RigidBody],
+    prescribed: Iterable[Prescribed] = (),
+    touching: bool = False,
 ) -> Constraints:
     """Collect all supports and prescribed displacements into local axes a node.
 
-    A sheet without any support gets the rigid-body support by itself.
+    A sheet without any support gets the rigid-body support by itself, unless it is `touching` something that holds it.
 
     Raises:
         ModelError: supports contradict each other, or leave rigid motions free.
@@ -163,8 +166,9 @@ def resolve(
     stacked = np.array(frames).reshape(-1, 3, 3)
     held = [clamped_edges(mesh, item.at) for item in supports if isinstance(item, Support) and item.clamp]
     clamped = mesh.topology.edges[np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))]
-    constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body, clamped)
-    _check_rigid_motions(mesh, constraints)
+    constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body and not touching, clamped)
+    if not touching:
+        _check_rigid_motions(mesh, constraints)
     return constraints
 
 

@@ -9,8 +9,9 @@ from bh.analysis.contact import candidates
 from bh.analysis.triangles import intersecting
 from bh.formulations import names
 from bh.model import Model, Sheet
-from bh.path import Path, trace
+from bh.path import Path
 from bh.solvers.linear import linear_response
+from bh.tracing import trace
 
 
 def warm_up() -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.model import Model, Sheet
 from bh.program import StepProgram, program
+from bh.refinement import Refinement
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
 from bh.solvers.trace import Strategy, Walk, walk
@@ -33,6 +34,9 @@ class Shell:
     name = "shell"
     takes_nu = True
     degree = 2
+    refinement: Refinement | None = Refinement(
+        "mirrored", ((0.5, 0.075), (1.0, 0.027), (2.0, 0.011), (4.0, 0.001)), 40.0, 1.95
+    )
 
     def system(
         self, model: Model, program: StepProgram, start: State | None, moments: EdgeMoments = FREE
@@ -66,6 +70,7 @@ class LinearShell(Shell):
 
     name = "linear-shell"
     degree = 1
+    refinement = None  # it is the consistent formulation, at a higher price
 
 
 @lru_cache(maxsize=4)

@@ -74,6 +74,10 @@ class ShellSystem:
             raise ModelError(
                 "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
             )
+        if program.bodies:
+            raise ModelError(
+                "the shell knows no bars and tethers; take formulation consistent or bars-and-hinges"
+            )
         self.program, self.elements = program, elements
         mesh = self.mesh = elements.mesh
         step = 0 if start is None else start.step + 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -11,13 +12,25 @@ import numpy as np
 
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
-from meshes.pattern import FOLD_KINDS, FoldKind
+from meshes.pattern import FOLD_KINDS, CreasePattern, FoldKind
 from meshes.topology import Ints, Topology, build
 
 
 def count(number: int, what: str) -> str:
     """ "1 crease", "2 creases" """
     return f"{number} {what}" + ("" if number == 1 else "s")
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """What a mesh was made of, and the `mark` of what came out: a copy that was changed is told by it."""
+
+    pattern: CreasePattern
+    mark: int
+
+    @classmethod
+    def of(cls, pattern: CreasePattern, points: Array, triangles: Ints) -> Origin:
+        return cls(pattern, _mark(points, triangles))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,6 +49,7 @@ class SheetMesh:
             None where the mesh has no such directions.
         kind: how it was meshed ("staggered", "alternating", "one-way", "mirrored", "gmsh", "imported", ...).
         aspect_ratio: mean panel height across the crease over width along it (alpha = H / W), or nan.
+        origin: the pattern that it was made of, where there is one; see `pattern`.
 
     Raises:
         MeshError: indices out of range, degenerate triangles, non-manifold edges, sets that are no edges.
@@ -51,6 +65,7 @@ class SheetMesh:
     spans: Array | None = None
     kind: str = "imported"
     aspect_ratio: float = float("nan")
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=float)
@@ -122,6 +137,13 @@ class SheetMesh:
             if angles.shape != (len(self.crease_edges(name)),):
                 raise MeshError(f"crease '{name}' has {angles.size} fold angles; give one an edge")
 
+    @property
+    def pattern(self) -> CreasePattern | None:
+        """The pattern that this mesh was made of, so that it can be meshed anew; None for others and changed copies."""
+        if self.origin is None or self.origin.mark != _mark(self.points, self.triangles):
+            return None
+        return self.origin.pattern
+
     @cached_property
     def topology(self) -> Topology:
         return build(self.triangles, len(self.points))
@@ -178,6 +200,14 @@ class SheetMesh:
             names = ", ".join(self.creases) or "none (the sheet has no crease)"
             raise MeshError(f"the sheet has no crease '{crease}'; its creases: {names}")
         return pairs
+
+
+def _mark(points: Array, triangles: Ints) -> int:
+    """Checksum of nodes and triangles; a flat sheet has the same in two and in three columns."""
+    used = points if points[:, 2:].any() else points[:, :2]
+    return zlib.crc32(
+        np.ascontiguousarray(triangles).tobytes(), zlib.crc32(np.ascontiguousarray(used).tobytes())
+    )
 
 
 def _check_triangles(points: Array, triangles: Ints) -> None:

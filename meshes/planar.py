@@ -1,8 +1,8 @@
 """Drawn lines made one plane graph: ends joined, T-junctions and crossings given a node, gaps healed. mm.
 
 Points that stand out (ends and corners of lines) within `gap` of each other become one node, the first drawn; a node
-within `gap` of a line becomes a node of that line; where lines cross without a node they get one. Nothing moves by
-more than `gap`.
+within `gap` of a line becomes a node of that line, and moves onto it if it is the end of others; where lines cross
+without a node they get one. Nothing moves by much more than `gap`.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ RANK = (
     "flat",
     "facet",
 )  # what wins where lines are drawn over each other
+RIM = ("boundary", "cut")
 FOLDED = ("mountain", "valley")
 
 
@@ -150,11 +151,29 @@ class _Web:
         points = shapely.points(np.array([point for point, _ in spots]))
         at, on = tree.query(points, predicate="dwithin", distance=self.gap)
         places = shapely.line_locate_point(self.shapes[on], points[at])
+        hosts: dict[int, dict[int, float]] = {}
         for spot, number, place in zip(at.tolist(), on.tolist(), places.tolist(), strict=True):
             node = spots[spot][1]
             if node not in self.marks[number].values():
+                hosts.setdefault(node, {}).setdefault(number, place)
+        rims = [k for k, line in enumerate(self.lines) if line.kind in RIM]
+        fixed = {node for k in rims for node in self.marks[k].values()}
+        for node, met in hosts.items():
+            self._move(node, met, node in fixed)
+            for number, place in met.items():
                 self.moved += 1
                 self.marks[number][self._free(number, place)] = node
+
+    def _move(self, node: int, met: dict[int, float], fixed: bool) -> None:
+        """A T-junction: the end of a line goes to the line that it meets, so that this one stays straight."""
+        import shapely
+
+        if len(met) != 1:
+            return
+        ((number, place),) = met.items()
+        if self.lines[number].kind in RIM or not fixed:
+            point = shapely.line_interpolate_point(self.shapes[number], place)
+            self.nodes[node] = (float(point.x), float(point.y))
 
     def _free(self, number: int, place: float) -> float:
         """A place along a line that no other node has."""

@@ -165,10 +165,10 @@ def _from_lower_left(pattern: CreasePattern, order: list[int], rails: list[Curve
     first = rails[0].point(ends)
     if (first[0] - first[1]).sum() > 0.0:
         rails = [Line(r.end, r.start) if isinstance(r, Line) else Polyline(sample(r)[::-1]) for r in rails]
-    (a, b), (c, d) = rails[0].point(ends), rails[-1].point(ends)
+    start, end = np.stack([rail.point(ends) for rail in rails], axis=1)
     edges: tuple[tuple[str, Curve], ...] = (
         ("inner", rails[0]), ("outer", rails[-1]),
-        ("start", Line(tuple(a.tolist()), tuple(c.tolist()))), ("end", Line(tuple(b.tolist()), tuple(d.tolist()))),
+        ("start", curve_through(start)), ("end", curve_through(end)),
     )  # fmt: skip
     return _named(pattern, order, rails, edges)
 

@@ -16,11 +16,10 @@ import numpy as np
 from meshes.curves import Array, Curve, Polyline
 from meshes.errors import PatternError
 from meshes.pattern import Crease, CreasePattern, FoldKind
-from meshes.planar import DrawnLine, Graph, corners
+from meshes.planar import RIM, DrawnLine, Graph, corners
 from meshes.rails import curve_through, find_rails
 from meshes.topology import Ints
 
-RIM = ("boundary", "cut")
 CREASES: dict[str, tuple[str, FoldKind]] = {
     "mountain": ("m", "mountain"), "valley": ("v", "valley"), "flat": ("f", "flat"),
 }  # fmt: skip

@@ -19,7 +19,7 @@ import numpy as np
 
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
-from meshes.mesh import SheetMesh
+from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.tapered import tapered_mesh, tapers
 from meshes.topology import Ints, build
@@ -93,6 +93,7 @@ def structured(
         spans=spans,
         kind=kind,
         aspect_ratio=alpha,
+        origin=Origin.of(pattern, points, triangles),
     )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from meshes.curves import Array, Curve, Polyline
 from meshes.errors import MeshError
-from meshes.mesh import SheetMesh
+from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.planar import corners
 from meshes.topology import Ints
@@ -111,6 +111,7 @@ def unstructured(
         fold_angles=drawn_angles(pattern, chains),
         curves=curves,
         kind="gmsh",
+        origin=Origin.of(pattern, points, triangles),
     )
 
 
@@ -213,6 +214,7 @@ def _faces(pattern: CreasePattern, points: Array, segments: Ints) -> Faces:
     sheet = shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:]))
 
     lines = shapely.linestrings(points[segments])
+    _check_apart(points, segments, lines)
     polygons, bridges, dangles, _ = shapely.polygonize_full(lines)
     where = {tuple(point): k for k, point in enumerate(points.tolist())}
 
@@ -239,6 +241,20 @@ def _faces(pattern: CreasePattern, points: Array, segments: Ints) -> Faces:
     if abs(covered - sheet.area) > 0.05 * sheet.area:
         raise MeshError("the named boundary curves do not enclose the sheet; name all of its edges")
     return found
+
+
+def _check_apart(points: Array, segments: Ints, lines: Any) -> None:
+    """No two segments cross, or lie over each other."""
+    import shapely
+
+    one, two = shapely.STRtree(lines).query(lines, predicate="intersects")
+    one, two = one[one < two], two[one < two]
+    apart = (segments[one][:, :, None] != segments[two][:, None, :]).all(axis=(1, 2))
+    if apart.any():
+        x, y = points[segments[one[apart][0]]].mean(axis=0)
+        raise MeshError(
+            f"chords of two curves cross near ({x:.6g}, {y:.6g}); use a smaller size, or part the curves there"
+        )
 
 
 def _fill(

@@ -15,19 +15,19 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 HOUSE = ("meshes", "bh", "fem", "verification", "reports")
 LONGEST_MODULE, LONGEST_FUNCTION = 450, 80
-HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "pymoo")
+HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "distributed", "pymoo", "xarray", "h5py")
 
 DESCRIPTION = (
-    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.program", "bh.scene", "bh.scene_schema",
-    "bh.describe", "bh.state", "bh.formulations",
-    "bh.pinch_zone",
-    "bh.describe", "bh.state", "bh.formulations", "bh.observables",
+    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.program", "bh.observables",
+    "bh.describe", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state", "bh.formulations",
+    "bh.refinement",
 )  # fmt: skip
-PATH = ("bh.path", "bh.storage", "bh.progress", "bh.threads")
+PATH = ("bh.path", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = (
     "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.charts", "bh.animation",
     "bh.offscreen", "bh.warm_up",
+    "bh.accuracy", "bh.advice", "bh.check", "bh.example", "bh.export", "bh.schema",
 )  # fmt: skip
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,
@@ -37,8 +37,12 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("bh.mechanics", ("meshes", *DESCRIPTION, "bh.mechanics", *PROTOCOL)),
     ("bh.solvers", ("meshes", "bh.solvers")),
     *((module, ("meshes", *DESCRIPTION)) for module in DESCRIPTION),
-    # `path.plot()` is the user's word; it loads the plotting when it is called
-    *((module, ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.plotting")) for module in PATH),
+    # `path.plot()` and `bh.trace(..., accuracy=...)` are the user's words; what they need is loaded when it is called
+    *(
+        (module, ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.plotting", "bh.accuracy"))
+        for module in PATH
+    ),
+    ("bh.accuracy", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.accuracy", "bh.analysis")),
     ("bh.analysis", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis")),
     ("bh.applications", ("meshes", *DESCRIPTION, "bh.solvers", *PATH, "bh.analysis", "bh.applications")),
     *(

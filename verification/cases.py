@@ -22,6 +22,13 @@ ALL_CASES = {
     "fig3_9": "verification.fig3_9",
     "fig3_11": "verification.fig3_11",
     "sheets_3": "verification.sheets_3",
+    "fig5_5": "verification.fig5_5",
+    "fig5_9": "verification.fig5_9",
+    "fig5_10": "verification.fig5_10",
+    "fig5_11": "verification.fig5_11",
+    "fig5_3": "verification.fig5_3",
+    "appendix_a": "verification.appendix_a",
+    "pinch_shell": "verification.pinch_shell",
     "scan": "verification.scan",
     "hard_cases": "verification.hard_cases",
     "appendix_b_shell": "verification.appendix_b_shell",
@@ -30,10 +37,12 @@ ALL_CASES = {
     "appendix_b_sheets": "verification.appendix_b_sheets",
     "shell_benchmarks": "verification.shell_benchmarks",
     "tables4": "verification.tables4",
+    "speed_error": "verification.speed_error",
+    "honesty": "verification.honesty",
     "campaign": "verification.campaign",
 }
 # run only when named: minutes, not seconds; `records` keeps a run of each
-LONG = {"campaign", "fig3_8", "fig3_10"}
+LONG = {"campaign", "speed_error", "honesty", "fig3_8", "fig3_10"}
 LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
 CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
 # run with the case by `bh verify`

@@ -7,7 +7,7 @@ import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from bh.path import versions
+from bh.provenance import versions
 
 PROJECT = Path(__file__).resolve().parents[1]
 

@@ -1,11 +1,11 @@
 """Sheets folded along one curved crease without any stretching (source App. A, 5.2.2; docs/isometric.md derives it).
 
 `of_crease` begins with the folded crease c(u) and the dihedral angle phi(u), as the source does; `of_flat` and
-`of_mesh` with the flat crease, as an engineer does. All give a `FoldedCrease`: frames, generators, the two developable
-panels, their development, widths, curvatures and bending energy. Signs are those of `bh.creases`: seen from
-above (mountain creases push up) n points to the left of t, b up, and the signed curvature is positive where the crease
-turns to the left. The frame is Frenet's but for its sign, so it goes smoothly through inflections, where Frenet's
-turns over.
+`of_mesh` with the flat crease, as an engineer does. All give a `FoldedCrease`: frames, generators, the two
+developable panels, their development to the flat sheet, widths, curvatures and bending energy. Signs are those of
+`bh.creases`: seen from above (mountain creases push up) n points to the left of t, b up, and the signed curvature is
+positive where the crease turns to the left. The frame is Frenet's but for its sign, so it goes smoothly through
+inflections, where Frenet's turns over.
 """
 
 from __future__ import annotations

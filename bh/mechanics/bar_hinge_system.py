@@ -16,6 +16,7 @@ from bh.mechanics.assembly import (
     tangent_times,
     tangent_values,
 )
+from bh.mechanics.bar_hinge_design import BarHingeDesign
 from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.supported import SupportedSheet
@@ -84,6 +85,8 @@ class BarsAndHingesSystem(SupportedSheet):
         load = (1.0 - lam) * self.force.start + lam * self.force.end
         energy -= float(np.vdot(load, x - self.reference))
         f -= load
+        if self.touching is not None:
+            energy += self.touching.forces(x, lam, f)
         residual = np.empty(self.size)
         residual[: self.primal] = self.displacements.components(f)
         gap = penalty = 0.0
@@ -151,6 +154,10 @@ class BarsAndHingesSystem(SupportedSheet):
             self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge, self._k_hinge,
         )  # fmt: skip
         matrix: Matrix
+        if self.touching is not None:
+            self.touching.tangent(
+                x, lam, self.constraints.frame_of, self.constraints.frames, pattern.slots[-1], data
+            )
         if self.constraints.rigid_body:
             Z = self.displacements.rigid(x)
             ground = self._ground(Z, data)
@@ -184,6 +191,8 @@ class BarsAndHingesSystem(SupportedSheet):
         moving = self.displacements.prescribed_motion
         if moving.any():
             out += self._tangent_times(x, moving, forces)
+        if self.touching is not None:
+            self.touching.force_rates(x, moving, lam, 1.0, out)
         rate = np.empty(self.size)
         rate[: self.primal] = self.displacements.components(out)
         if e.held:
@@ -198,6 +207,9 @@ class BarsAndHingesSystem(SupportedSheet):
         moment = e.hinge_stiffness * turn + self.couple(q, lam)  # without the lock, which knows no rest angle
         total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.reference))
+        if self.touching is not None:
+            total += self.touching.power(x, lam)
+            self.touching.forces(x, lam, f)
         return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
@@ -213,7 +225,11 @@ class BarsAndHingesSystem(SupportedSheet):
             turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
             total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
             total += 2.0 * float((e.couple.rate - e.hinge_stiffness * e.rest.rate) @ turn)
-        return total
+        return total if self.touching is None else total + self.touching.control_stiffness(x, lam)
+
+    def design(self, q: Array, lam: float) -> BarHingeDesign:
+        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
+        return BarHingeDesign(self, q, lam)
 
     def _tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
         """Tangent of all elements times v (n, 3), in global axes and with no support left out."""
@@ -232,6 +248,8 @@ class BarsAndHingesSystem(SupportedSheet):
         groups: tuple[Ints, ...] = (self.elements.bars, self.elements.hinges)
         if self.constraints.rigid_body:
             groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
+        if self.touching is not None:
+            groups += (self.mesh.triangles,)
         return build_pattern(self.displacements.number, groups, self.reference)
 
     @cached_property

@@ -69,6 +69,7 @@ class BarsAndHinges:
             ),
             dihedral_angles=angles, energy_density=density, reactions=reactions,
             crease_moments=moments, stable=stable,
+            pressing={} if system.touching is None else system.touching.pressing(x, lam),
         )  # fmt: skip
 
 

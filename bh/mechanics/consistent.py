@@ -16,6 +16,7 @@ from bh.mechanics.consistent_system import ConsistentSystem
 from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
 from bh.program import StepProgram
+from bh.refinement import Refinement
 from bh.state import Energy, State
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ class Consistent:
 
     name = "consistent"
     takes_nu = True
+    refinement = Refinement("staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9)
 
     def system(self, model: Model, program: StepProgram, start: State | None) -> ConsistentSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
@@ -76,4 +78,5 @@ class Consistent:
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable,
+            pressing={} if system.touching is None else system.touching.pressing(x, lam),
         )  # fmt: skip

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bh.mechanics import closing as closings
 from bh.mechanics import consistent_kernels as kernels
 from bh.mechanics import consistent_setup as setup
+from bh.mechanics.consistent_design import ConsistentDesign
 from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent_pattern import rotation_pattern
 from bh.mechanics.hinge_lock import lock_terms
@@ -162,11 +163,13 @@ class ConsistentSystem(SupportedSheet):
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
+        touched = 0.0 if self.touching is None else self.touching.forces(x, lam, now.f)
         energy = (
             float(now.stretching.sum())
             + now.bending
             + now.springs
             + now.lock
+            + touched
             - float(np.vdot(load, x - self.mesh.points))
         )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
@@ -216,6 +219,8 @@ class ConsistentSystem(SupportedSheet):
         closing |= kernels.spring_tangent(
             x, e.hinges, e.spring_stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
         )
+        if self.touching is not None:
+            self.touching.tangent(x, lam, *axes, pattern.slots[0], data)
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
         self._closing = bool(closing)
@@ -295,6 +300,8 @@ class ConsistentSystem(SupportedSheet):
         kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
         if L.any():
             closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
+        if self.touching is not None:
+            self.touching.force_rates(x, v, lam, 1.0, f)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         return f, r, second
 
@@ -314,10 +321,18 @@ class ConsistentSystem(SupportedSheet):
         _, M, S, _ = self.split(now.forces)
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
         total -= float(np.vdot(self.force.rate, x - self.mesh.points))
+        if self.touching is not None:
+            total += self.touching.power(x, lam)
+            self.touching.forces(x, lam, now.f)
         unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
         """d^2 energy / d lambda^2 at fixed q, N mm."""
         v = self.displacements.prescribed_motion
-        return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v))
+        more = 0.0 if self.touching is None else self.touching.control_stiffness(self.positions(q, lam), lam)
+        return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more
+
+    def design(self, q: Array, lam: float) -> ConsistentDesign:
+        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
+        return ConsistentDesign(self, q, lam)

@@ -11,6 +11,7 @@ from bh.mechanics import closing
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.motions import describe_motion
+from bh.mechanics.touching import Touching
 from bh.model import Model
 from bh.program import HELD, StepProgram
 from bh.solvers.system import System, grows_ahead
@@ -38,6 +39,7 @@ class SupportedSheet:
         self.moving = len(self.displacements.free)
         if self.constraints.rigid_body:
             self.displacements.check_balance(self.force)
+        self.touching = Touching(self.mesh, program.bodies, start_points) if program.bodies else None
 
     @property
     def rotation(self) -> float:

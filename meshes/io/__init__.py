@@ -1,7 +1,17 @@
-"""File formats: FOLD, SVG and DXF in, FOLD and triangles out (through meshio)."""
+"""File formats: FOLD, SVG and DXF in, FOLD, SVG, DXF and triangles (through meshio) out."""
 
+from meshes.io.draw import write_pattern
 from meshes.io.drawing import read_drawn, read_pattern
 from meshes.io.export import write_mesh
 from meshes.io.fold import read_fold, write_fold
+from meshes.io.gltf import write_gltf
 
-__all__ = ["read_drawn", "read_fold", "read_pattern", "write_fold", "write_mesh"]
+__all__ = [
+    "read_drawn",
+    "read_fold",
+    "read_pattern",
+    "write_fold",
+    "write_gltf",
+    "write_mesh",
+    "write_pattern",
+]

@@ -109,9 +109,14 @@ def _dash(shape: Any) -> Dash:
 
 
 def _sampler(se: Any, segments: list[Any]) -> Any:
+    curved = (se.CubicBezier, se.QuadraticBezier, se.Arc)
+
     def sample(tolerance: float) -> Array:
         points = [np.array([[segments[0].start.x, segments[0].start.y]])]
         for segment in segments:
+            if not isinstance(segment, curved):
+                points.append(np.array([[segment.end.x, segment.end.y]]))
+                continue
             t = np.linspace(0.0, 1.0, _pieces(se, segment, tolerance) + 1)[1:]
             points.append(np.array([[p.x, p.y] for p in map(segment.point, t)]))
             points[-1][-1] = segment.end.x, segment.end.y
@@ -129,8 +134,6 @@ def _pieces(se: Any, segment: Any, tolerance: float) -> int:
     elif isinstance(segment, se.QuadraticBezier):
         p = [np.array([q.x, q.y]) for q in (segment.start, segment.control, segment.end)]
         bend = 2.0 * np.linalg.norm(p[0] - 2 * p[1] + p[2])
-    elif isinstance(segment, se.Arc):
-        bend = max(abs(segment.rx), abs(segment.ry)) * float(segment.sweep) ** 2
     else:
-        return 1
+        bend = max(abs(segment.rx), abs(segment.ry)) * float(segment.sweep) ** 2
     return int(min(max(np.ceil(np.sqrt(bend / (8.0 * tolerance))), 1 if bend < tolerance else 2), 20_000))

@@ -1,4 +1,4 @@
-"""docs/scenes.md lists every key that a scene can have, with what `bh.scene_schema` says of it."""
+"""docs/scenes.md lists every key that a scene can have, with what its schema says of it."""
 
 from __future__ import annotations
 
@@ -7,21 +7,28 @@ from pathlib import Path
 
 import pytest
 
+from bh import scene_patterns, scene_tables
 from bh import scene_schema as schema
 from bh.scene import SECTIONS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
-TABLES: dict[str, type[schema.Table]] = {
-    'pattern, kind = "strip"': schema.StripPattern,
-    'pattern, kind = "annulus_sector"': schema.AnnulusSectorPattern,
-    'pattern, kind = "full_annulus"': schema.FullAnnulusPattern,
-    'pattern, kind = "parallel_creases"': schema.ParallelPattern,
-    "pattern, corrugations": schema.CorrugationPattern,
-    'pattern, kind = "curved-corrugation"': schema.CurvedCorrugationPattern,
-    "pattern, file": schema.FilePattern,
+TABLES: dict[str, type[scene_tables.Table]] = {
+    'pattern, kind = "strip"': scene_patterns.StripPattern,
+    'pattern, kind = "annulus_sector"': scene_patterns.AnnulusSectorPattern,
+    'pattern, kind = "full_annulus"': scene_patterns.FullAnnulusPattern,
+    'pattern, kind = "parallel_creases"': scene_patterns.ParallelPattern,
+    "pattern, corrugations": scene_patterns.CorrugationPattern,
+    'pattern, kind = "curved-corrugation"': scene_patterns.CurvedCorrugationPattern,
+    "pattern, file": scene_patterns.FilePattern,
+    'pattern, kind = "two_arcs"': scene_patterns.TwoArcsPattern,
+    'pattern, kind = "sine_tessellation"': scene_patterns.SineTessellationPattern,
+    'pattern, kind = "parabolic_canopy"': scene_patterns.ParabolicCanopyPattern,
+    'pattern, kind = "opposite_parabolas"': scene_patterns.OppositeParabolasPattern,
+    "pattern, drawing": scene_patterns.DrawingPattern,
     "sheet": schema.SheetTable,
     "mesh": schema.MeshTable,
     "mesh by gmsh": schema.GmshTable,
+    "mesh as drawn": schema.DrawnTable,
     "model": schema.ModelTable,
     "supports": schema.SupportTable,
     "creases.NAME": schema.CreaseTable,
@@ -35,11 +42,11 @@ TABLES: dict[str, type[schema.Table]] = {
 }
 
 
-def rows(table: type[schema.Table]) -> list[str]:
+def rows(table: type[scene_tables.Table]) -> list[str]:
     """The lines that the page has for a table of the scene."""
     found = ["| Key | Default | Give |", "|---|---|---|"]
     for key, field in table.model_fields.items():
-        value = "pi" if field.default == math.pi else schema.shown(field.default)
+        value = "pi" if field.default == math.pi else scene_tables.shown(field.default)
         default = (
             "needed" if field.is_required() else {"None": "", "[]": "none", "{}": "none"}.get(value, value)
         )
@@ -62,11 +69,13 @@ def test_tables_are_those_of_the_schema(title: str) -> None:
 
 def test_nothing_is_left_out() -> None:
     every = {
-        kind for kind in vars(schema).values() if isinstance(kind, type) and issubclass(kind, schema.Table)
+        kind
+        for kind in (vars(schema) | vars(scene_patterns)).values()
+        if isinstance(kind, type) and issubclass(kind, scene_tables.Table)
     }
-    assert set(TABLES.values()) == every - {schema.Table, schema.PatternTable}
+    assert set(TABLES.values()) == every - {scene_tables.Table, scene_patterns.PatternTable}
     named = {title.split(",")[0].split(":")[0].split(".")[0] for title in TABLES}
-    assert {name.split(" by ")[0] for name in named} == set(SECTIONS)
+    assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS)
     assert PAGE.count("\n### ") == len(TABLES)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -375,6 +376,13 @@ def test_a_thin_sheet_folds_isometrically() -> None:
     flat = mesh.points[nodes]
     shortened = np.linalg.norm(flat[-1] - flat[0]) - np.linalg.norm(found[-1] - found[0])
     assert shortened == pytest.approx(0.18, abs=0.005)
+
+
+def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    """What docs/isometric.md shows first."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "isometric.md").read_text(encoding="utf-8")
+    exec(page.split("```python\n")[1].split("```")[0], {})
+    assert len(capsys.readouterr().out.splitlines()) > 5
 
 
 def test_bad_input() -> None:

@@ -28,6 +28,7 @@ SLOW = {
     "fig3_9",
     "fig3_8",
     "fig3_10",
+    "fig5_3",
     "hard_cases",
     "scan",
 }  # over some five seconds on a slow machine

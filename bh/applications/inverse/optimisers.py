@@ -1,0 +1,230 @@
+"""How a design is searched: genetic algorithm (pymoo), differential evolution (SciPy), polish by gradients. All seeded.
+
+A problem has continuous variables in a box and switches (pinched or not); an optimiser is an object with `minimise`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.applications.inverse.segments import DesignError
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+FORBIDDEN = 1e6  # added to the value of a design that breaks a rule, where an optimiser takes no constraints
+
+
+class Problem(Protocol):
+    """What is minimised: values (N,) and violations (N,) (0: allowed) of candidates x (N, m) in a box and on (N, b)."""
+
+    @property
+    def lower(self) -> Array: ...
+
+    @property
+    def upper(self) -> Array: ...
+
+    @property
+    def switches(self) -> int: ...
+
+    def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The best candidate of a search: variables, switches, value, whether it is allowed, and candidates evaluated."""
+
+    x: Array
+    on: Bools
+    value: float
+    allowed: bool
+    evaluations: int
+
+    def better(self, other: Found | None) -> bool:
+        """Allowed before forbidden, then the smaller value."""
+        return other is None or (not self.allowed, self.value) < (not other.allowed, other.value)
+
+
+class Optimiser(Protocol):
+    def minimise(
+        self,
+        problem: Problem,
+        seed: int = 1,
+        start: Sequence[tuple[Array, Bools]] = (),
+        enough: float = -np.inf,
+    ) -> Found:
+        """Search from some candidates (or none), until a value of `enough` is met."""
+        ...
+
+
+def best(problem: Problem, x: Array, on: Bools) -> Found:
+    """The best of some candidates."""
+    value, violation = problem.evaluate(x, on)
+    i = int(np.lexsort((value, violation))[0])
+    return Found(x[i], on[i], float(value[i]), bool(violation[i] <= 0.0), len(x))
+
+
+@dataclass(frozen=True)
+class Genetic:
+    """pymoo's genetic algorithm for mixed variables; the source used MATLAB's `ga` with 100 generations (6.3.3)."""
+
+    population: int = 100
+    generations: int = 100
+    patience: int = 25
+
+    def minimise(
+        self,
+        problem: Problem,
+        seed: int = 1,
+        start: Sequence[tuple[Array, Bools]] = (),
+        enough: float = -np.inf,
+    ) -> Found:
+        ea = _pymoo()
+        m, b = len(problem.lower), problem.switches
+        names = [f"x{i:03d}" for i in range(m)], [f"on{i:03d}" for i in range(b)]
+
+        def arrays(rows: Any) -> tuple[Array, Bools]:
+            x = np.array([[row[n] for n in names[0]] for row in rows], dtype=float).reshape(len(rows), m)
+            on = np.array([[row[n] for n in names[1]] for row in rows], dtype=bool).reshape(len(rows), b)
+            return x, on
+
+        class Wrapped(ea.Problem):  # type: ignore[name-defined]
+            def __init__(self) -> None:
+                bounds = zip(problem.lower, problem.upper, strict=True)
+                real = {n: ea.Real(bounds=(lo, hi)) for n, (lo, hi) in zip(names[0], bounds, strict=True)}
+                super().__init__(vars=real | {n: ea.Binary() for n in names[1]}, n_obj=1, n_ieq_constr=1)
+
+            def _evaluate(self, rows: Any, out: dict[str, Any], *_: Any, **__: Any) -> None:
+                value, violation = problem.evaluate(*arrays(rows))
+                out["F"], out["G"] = value[:, None], violation[:, None]
+
+        algorithm = ea.MixedVariableGA(pop_size=self.population)
+        algorithm.setup(Wrapped(), termination=("n_gen", self.generations), seed=seed, verbose=False)
+        top: Found | None = None
+        count, since = 0, 0
+        for x, on in start:
+            found = best(problem, x[None], on[None])
+            top = found if found.better(top) else top
+        while algorithm.has_next() and since < self.patience:
+            algorithm.next()
+            count = algorithm.evaluator.n_eval
+            now = algorithm.opt[0]
+            x, on = arrays([now.X])
+            found = Found(x[0], on[0], float(now.F[0]), bool(now.CV[0] <= 0.0), count)
+            better = top is None or not top.allowed or found.value < top.value - 1e-3 * abs(top.value)
+            since = 0 if found.better(top) and better else since + 1
+            top = found if found.better(top) else top
+            if top is not None and top.allowed and top.value <= enough:
+                break
+        assert top is not None
+        return Found(top.x, top.on, top.value, top.allowed, count)
+
+
+@dataclass(frozen=True)
+class Evolution:
+    """SciPy's differential evolution; switches are integer variables, rules a penalty."""
+
+    population: int = 15
+    generations: int = 200
+
+    def minimise(
+        self,
+        problem: Problem,
+        seed: int = 1,
+        start: Sequence[tuple[Array, Bools]] = (),
+        enough: float = -np.inf,
+    ) -> Found:
+        from scipy.optimize import differential_evolution
+
+        m, b = len(problem.lower), problem.switches
+        count = 0
+
+        def cost(columns: Array) -> Array:
+            nonlocal count
+            rows = np.atleast_2d(columns.T)
+            count += len(rows)
+            value, violation = problem.evaluate(rows[:, :m], rows[:, m:] > 0.5)
+            return value + FORBIDDEN * violation
+
+        bounds = [*zip(problem.lower, problem.upper, strict=True), *([(0.0, 1.0)] * b)]
+        found = differential_evolution(
+            cost, bounds, popsize=self.population, maxiter=self.generations, rng=seed, vectorized=True,
+            updating="deferred", polish=False, integrality=[False] * m + [True] * b,
+            x0=np.concatenate([start[0][0], start[0][1].astype(float)]) if start else None,
+            callback=lambda intermediate_result: bool(intermediate_result.fun <= enough),
+        )  # fmt: skip
+        top = best(problem, found.x[None, :m], found.x[None, m:] > 0.5)
+        return Found(top.x, top.on, top.value, top.allowed, count)
+
+
+@dataclass(frozen=True)
+class Polished:
+    """Another optimiser's answer, then steepest ways down inside the box with its switches kept.
+
+    Least squares (trust region) where the problem has `residual(x, on)`, else L-BFGS-B on the value.
+    """
+
+    first: Optimiser = field(default_factory=Genetic)
+
+    def minimise(
+        self,
+        problem: Problem,
+        seed: int = 1,
+        start: Sequence[tuple[Array, Bools]] = (),
+        enough: float = -np.inf,
+    ) -> Found:
+        found = self.first.minimise(problem, seed, start, enough)
+        better = polish(problem, found.x, found.on)
+        more = found.evaluations + better.evaluations
+        top = better if better.better(found) else found
+        return Found(top.x, top.on, top.value, top.allowed, more)
+
+
+def polish(problem: Problem, x: Array, on: Bools) -> Found:
+    """The local minimum next to a candidate with the same switches; the candidate itself where rules forbid that."""
+    from scipy.optimize import least_squares, minimize
+
+    lower, upper = problem.lower, problem.upper
+    width = np.maximum(upper - lower, 1e-300)
+    z0 = np.clip((x - lower) / width, 1e-9, 1.0 - 1e-9)
+    residual = getattr(problem, "residual", None)
+    if residual is not None:
+        done = least_squares(
+            lambda z: residual(lower + width * z, on), z0, bounds=(0.0, 1.0), xtol=1e-12, ftol=1e-12
+        )
+    else:
+        steps = np.eye(len(x)) * 1e-6
+
+        def value(z: Array) -> tuple[float, Array]:
+            inward = np.where(z > 0.5, -1.0, 1.0)  # differences that stay inside the box
+            trial = lower + width * np.vstack((z, z + steps * inward[:, None]))
+            found = problem.evaluate(trial, np.tile(on, (len(trial), 1)))[0]
+            return float(found[0]), (found[1:] - found[0]) / (1e-6 * inward)
+
+        done = minimize(
+            value, z0, jac=True, bounds=[(0.0, 1.0)] * len(x), method="L-BFGS-B", options={"maxiter": 400}
+        )
+    moved = np.vstack((x, lower + width * np.clip(done.x, 0.0, 1.0)))
+    found = best(problem, moved, np.tile(on, (2, 1)))
+    return Found(found.x, found.on, found.value, found.allowed, int(done.nfev) + 2)
+
+
+def _pymoo() -> Any:
+    """The parts of pymoo that are used, in one name space."""
+    from types import SimpleNamespace
+
+    try:
+        from pymoo.config import Config
+        from pymoo.core.mixed import MixedVariableGA
+        from pymoo.core.problem import Problem as Base
+        from pymoo.core.variable import Binary, Real
+    except ImportError as error:
+        raise DesignError(
+            f"the genetic algorithm needs pymoo ({error}); add the extra: pip install 'curved-crease-workbench[design]'"
+        ) from error
+    Config.warnings["not_compiled"] = False
+    return SimpleNamespace(Problem=Base, Real=Real, Binary=Binary, MixedVariableGA=MixedVariableGA)

@@ -1,0 +1,169 @@
+"""What every table of a scene file is made of: the kinds of numbers, and reading a table with one clear line for what
+is wrong in it."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from bh.errors import InputError, SceneError
+from meshes.pattern import FoldKind
+
+LONGEST, SHORTEST = 1e6, 1e-6  # mm; beyond, sampling a curve to a thousandth of a millimetre loses its sense
+LARGEST = 1e9  # of any number
+TURN = 2.0 * math.pi
+
+Length = Annotated[float, Field(ge=SHORTEST, le=LONGEST)]
+Height = Annotated[float, Field(gt=0.0, le=LONGEST)]
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(ge=1e-12, le=LARGEST)]
+Stiffness = Annotated[float, Field(ge=0.0, le=LARGEST)]
+Dihedral = Annotated[float, Field(gt=0.0, lt=TURN)]
+Rest = Annotated[float, Field(ge=0.0, le=TURN)]
+FoldAngle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Few = Annotated[int, Field(ge=1, le=1000)]
+Node = Annotated[int, Field(ge=0, le=2**62)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Folds = FoldKind | Annotated[list[FoldKind], Field(min_length=1)]
+Panels = Annotated[int, Field(ge=2, le=100)]
+Power = Annotated[float, Field(ge=1.0, le=100.0)]
+Place = str | Annotated[list[Node], Field(min_length=1)]
+
+FOLDS = '"mountain", "valley" or "flat", or a list with one of them a crease'
+PLACE = 'a place ("corner:inner-start", "edge:inner", "crease:NAME", "node:N", "all", ...) or a list of nodes'
+RADII = "the radius of the crease in mm, or a list of rising radii"
+ALTERNATING = FOLDS + "; alternating where it is left out"
+ALONG, ACROSS = "the side along x in mm", "the side along y in mm"
+DENSITY = "cell height across over width along the crease, a positive number, best 5 to 12"
+LSTAR = "the length scale of the crease in mm, a positive number"
+VECTOR = "three numbers [x, y, z]"
+
+
+class Table(BaseModel):
+    """A table of the scene; values keep their TOML type, so that true is no number and "4" is none either."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+T = TypeVar("T", bound=Table)
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    if not text.strip():
+        raise SceneError("the file is empty; give a scene (see examples/)")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"this is not TOML: {error}") from error
+    except RecursionError as error:
+        raise SceneError("this is not a scene: brackets are nested too deeply") from error
+    except ValueError as error:  # such as an integer of thousands of digits
+        raise SceneError(f"this is not TOML: {str(error).split(';')[0]}") from error
+
+
+def read_table(kind: type[T], data: Any, at: str) -> T:
+    """The table `data` as `kind`.
+
+    Raises:
+        SceneError: the first thing that is wrong with it, with its dotted path (`at` is the table's).
+    """
+    table = as_table(data, at)
+    check_keys(at, table, kind.model_fields)
+    try:
+        return kind.model_validate(table)
+    except ValidationError as errors:
+        first = errors.errors(include_url=False)[0]
+        if not first["loc"]:  # a rule of the whole table
+            raise SceneError(f"{at}: {first['ctx']['error']}") from errors
+        key = str(first["loc"][0])
+        allowed = str(kind.model_fields[key].description)
+        if first["type"] == "missing":
+            raise SceneError(f"{at}.{key} is missing; give {allowed}") from errors
+        hint = "; angles are radians, not degrees" if " rad" in allowed and _like_degrees(table[key]) else ""
+        raise SceneError(f"{at}.{key} = {shown(table[key])} cannot be; give {allowed}{hint}") from errors
+
+
+def check_keys(at: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
+    allowed = list(known)
+    for key, value in table.items():
+        if key not in allowed:
+            dotted = f"{at}.{key}" if at else key
+            raise SceneError(
+                f"unknown key {dotted} = {shown(value)}{nearest(key, allowed)}; "
+                f"known keys are {', '.join(allowed)}"
+            )
+
+
+def as_table(data: Any, at: str) -> dict[str, Any]:
+    if not isinstance(data, dict):
+        example = f"[{at}]" if at.isalpha() else "{ key = value }"
+        raise SceneError(f"{at} = {shown(data)} is not a table; write {example}")
+    return data
+
+
+def as_tables(data: Any, at: str) -> list[Any]:
+    if isinstance(data, dict):
+        raise SceneError(f"{at} is one table; it is a list of tables, so write [[{at}]] with double brackets")
+    if not isinstance(data, list):
+        raise SceneError(f"{at} = {shown(data)} is not a list of tables; write [[{at}]]")
+    if not data and at == "steps":
+        raise SceneError("steps is empty; add a table [[steps]]")
+    return data
+
+
+def one_or_more(value: Any, at: str) -> list[tuple[str, Any]]:
+    """A table, or the tables of a list, each with its path."""
+    if not isinstance(value, list):
+        return [(at, value)]
+    if not value:
+        raise SceneError(f"{at} is an empty list; give a table or a list of tables")
+    return [(f"{at}[{i}]", each) for i, each in enumerate(value)]
+
+
+@contextmanager
+def within(at: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise SceneError(f"{at}: {error}") from error
+
+
+def nearest(key: object, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(str(key), list(known), n=1) or [
+        name for name in known if name.lower() == str(key).lower()
+    ]
+    return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def _like_degrees(value: Any) -> bool:
+    numbers = [v for v in (value if isinstance(value, list) else [value]) if isinstance(v, int | float)]
+    return any(7.0 < abs(v) <= 360.0 for v in numbers)
+
+
+def shown(value: Any) -> str:
+    """A value as TOML writes it, in a few characters."""
+    if isinstance(value, dict):
+        return "{...}" if value else "{}"
+    if isinstance(value, list):
+        inner = ", ".join(shown(item) for item in value[:4])
+        return f"[{inner}{', ...' if len(value) > 4 else ''}]"[:80]
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) and abs(value) >= 10**18:
+        return "an integer of many digits"
+    text = f'"{value}"' if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else text[:56] + " ..."
+
+
+def one_line(text: str) -> str:
+    """One printable line of a bearable length."""
+    words = " ".join(text.split())
+    clean = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
+    return clean if len(clean) <= 600 else clean[:596] + " ..."

@@ -1,0 +1,200 @@
+"""Sweeps: many points of one task, run anywhere, into one labelled data set. See docs/scaling.md.
+
+    import bh.sweep
+    axes = bh.sweep.grid({"radius": [80.0, 100.0, 120.0], "angle": [2.4, 2.0, 1.6]})
+    keys = {"radius": "pattern.radius", "angle": "steps[0].fold.to"}
+    data = bh.sweep.run(bh.sweep.scene("annulus.toml", keys), axes, "annulus.nc")
+
+A script that does so with processes of its own must do it under `if __name__ == "__main__":`.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import closing
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bh.provenance import versions
+from bh.sweep import runner
+from bh.sweep.dataset import ABOUT_RUN, Label, dataset, load, save
+from bh.sweep.journal import Journal
+from bh.sweep.points import Points, SweepError, grid, read_csv, table
+from bh.sweep.pools import Dask, Given, Here, Local, Pool
+from bh.sweep.progress import Bar, Silent
+from bh.sweep.scenes import SceneTask
+from bh.sweep.task import Finished, Measured, Task, identity
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+__all__ = [
+    "ABOUT_RUN", "Dask", "Finished", "Given", "Here", "Label", "Local", "Measured", "Points", "SceneTask", "SweepError",
+    "grid", "load", "partial", "read_csv", "run", "scene", "table",
+]  # fmt: skip
+
+
+def scene(
+    file: str | Path,
+    keys: Mapping[str, str | Sequence[str]],
+    places: Sequence[str] = (),
+    shape: bool = False,
+) -> SceneTask:
+    """The task of solving a scene file with some of its keys set; see `SceneTask`.
+
+    Raises:
+        SweepError: the file cannot be read, or the scene has no such key.
+    """
+    try:
+        text = Path(file).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise SweepError(f"the scene '{file}' cannot be read ({why}); check the name") from error
+    every = {name: (key,) if isinstance(key, str) else tuple(key) for name, key in keys.items()}
+    return SceneTask(text, every, Path(file).parent.resolve(), tuple(places), shape)
+
+
+def run(
+    task: Task,
+    points: Points,
+    file: str | Path,
+    *,
+    pool: Pool | Executor | int | None = None,
+    resume: bool = False,
+    progress: bool | runner.Meter = False,
+    labels: Mapping[str, Label] | None = None,
+    attributes: Mapping[str, Any] | None = None,
+    chunk: int = 1,
+    retries: int = 2,
+) -> Dataset:
+    """Run a task at every point and write the data set `file` (netCDF-4).
+
+    The values do not depend on the order of the points, on where they run or on how often the sweep was resumed: all
+    variables but those of `ABOUT_RUN` are equal to the last bit.
+
+    Args:
+        task: called with the parameters of a point by name; must be picklable. Returns values by name, or a `Measured`.
+        pool: a number of local processes (0: this process; None: one a core), any `concurrent.futures` executor, or a
+            `bh.sweep.Dask`. Given executors and pools stay open.
+        resume: go on from the journal `file`.points of a run that was interrupted or killed.
+        progress: True for a bar with rate and time left, or an object that is told.
+        labels: units and texts of parameters and values, beside those that the task knows.
+        attributes: to be written to the data set beside its provenance.
+        chunk: points a worker does in one go; more than one where points take milliseconds on far machines.
+        retries: see `bh.sweep.runner.run`.
+
+    Raises:
+        SweepError: bad input, a place that cannot be written, workers that are gone; what is finished is kept.
+    """
+    file = Path(file)
+    began = time.time()
+    meta = _meta(task, points, labels, attributes, began)
+    if resume and file.is_file() and not _journal(file).is_file():
+        before = load(file)
+        if before.attrs.get("identity") != meta["identity"]:
+            raise SweepError(f"'{file}' is of another sweep; choose another output with -o")
+        return before
+    check = getattr(task, "check", None)
+    if check is not None:
+        check([points[i] for i in sorted({0, len(points) // 2, len(points) - 1})])
+    journal = _open(file, meta, resume)
+    meter = (Bar() if progress else Silent()) if isinstance(progress, bool) else progress
+    with closing(journal):
+        done = journal.done()
+        todo = runner.jobs([i for i in range(len(points)) if i not in done], chunk)
+        if todo:
+            workers, ours = _pool(pool)
+            try:
+                runner.run(
+                    task, points.__getitem__, todo, journal, workers, meter,
+                    total=len(points), failed=journal.failed(), retries=retries,
+                )  # fmt: skip
+            finally:
+                meter.close()
+                if ours:
+                    workers.close()
+        data = _dataset(journal)
+    save(data, file)
+    _journal(file).unlink()
+    return data
+
+
+def partial(file: str | Path) -> Dataset:
+    """What there is of a data set: the finished file, or the points in its journal; open ones have the outcome "open".
+
+    Raises:
+        SweepError: there is neither.
+    """
+    file = Path(file)
+    if not _journal(file).is_file():
+        return load(file)
+    with closing(Journal.open(_journal(file))) as journal:
+        return _dataset(journal)
+
+
+def _meta(
+    task: Task,
+    points: Points,
+    labels: Mapping[str, Label] | None,
+    attributes: Mapping[str, Any] | None,
+    began: float,
+) -> dict[str, Any]:
+    from hashlib import sha256
+
+    own: dict[str, Label] = getattr(task, "labelled", dict)()
+    text = f"{identity(task)} {points.names} {points.values} {points.grid}"
+    return {
+        "identity": sha256(text.encode()).hexdigest(),
+        "names": points.names,
+        "values": points.values,
+        "grid": points.grid,
+        "labels": {name: (v.unit, v.about, v.dims) for name, v in (own | dict(labels or {})).items()},
+        "attributes": {
+            "task": identity(task),
+            "versions": versions(),
+            "began": datetime.fromtimestamp(began, UTC).isoformat(timespec="seconds"),
+            "host": f"{platform.node()}, {platform.machine()}, {os.cpu_count()} cores",
+            **({"scene": task.text} if isinstance(task, SceneTask) else {}),
+            **dict(attributes or {}),
+        },
+    }
+
+
+def _open(file: Path, meta: dict[str, Any], resume: bool) -> Journal:
+    """The journal to write to: a new one, or that of a run which goes on."""
+    place = _journal(file)
+    if not (resume and place.is_file()):
+        if resume and not file.is_file():
+            raise SweepError(f"there is no '{place}' to go on from; run without --resume")
+        return Journal.create(place, meta)
+    journal = Journal.open(place)
+    if journal.meta.get("identity") != meta["identity"]:
+        journal.close()
+        raise SweepError(f"'{place}' is of another sweep; run without --resume, or choose another output")
+    return journal
+
+
+def _dataset(journal: Journal) -> Dataset:
+    meta = journal.meta
+    points = Points(tuple(meta["names"]), tuple(tuple(v) for v in meta["values"]), meta["grid"])
+    labels = {name: Label(unit, about, tuple(dims)) for name, (unit, about, dims) in meta["labels"].items()}
+    attributes = {"identity": meta["identity"], **meta["attributes"]}
+    return dataset(points, journal, labels, attributes)
+
+
+def _journal(file: Path) -> Path:
+    return file.with_name(file.name + ".points")
+
+
+def _pool(pool: Pool | Executor | int | None) -> tuple[Pool, bool]:
+    """The pool that is asked for, and whether it was made here."""
+    if pool is None:
+        pool = os.cpu_count() or 1
+    if isinstance(pool, int):
+        return (Local(pool) if pool else Here()), True
+    return (Given(pool) if isinstance(pool, Executor) else pool), False

@@ -1,0 +1,124 @@
+"""The points that are finished, on disk at once: an SQLite file beside the data set that a sweep is to become.
+
+Tables: `meta` (key, JSON value) with the parameters and the provenance, `points` with one row for each finished point.
+One transaction a task; a killed sweep leaves a file that is whole up to its last one. It is written ahead (WAL): a kill
+of the program loses nothing, a power cut at most what the system had not written yet, and never the file.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from bh.sweep.points import SweepError
+from bh.sweep.task import Finished
+
+FORMAT = 1
+SCHEMA = """
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE points (
+    id INTEGER PRIMARY KEY, outcome TEXT NOT NULL, reason TEXT NOT NULL, measured TEXT NOT NULL,
+    wall_time_s REAL NOT NULL, attempts INTEGER NOT NULL, worker TEXT NOT NULL);
+"""
+
+
+class Journal:
+    """An open journal; every `add` is one transaction."""
+
+    def __init__(self, file: Path, connection: sqlite3.Connection) -> None:
+        self.file, self._db = file, connection
+
+    @classmethod
+    def create(cls, file: Path, meta: dict[str, Any]) -> Journal:
+        """Begin a new journal; an old one of that name is replaced.
+
+        Raises:
+            SweepError: the folder cannot be written.
+        """
+        try:
+            for old in (file, *_logs(file)):
+                old.unlink(missing_ok=True)
+            db = _connect(file)
+            with db:
+                db.executescript(SCHEMA + f"PRAGMA user_version = {FORMAT};")
+                db.executemany(
+                    "INSERT INTO meta VALUES (?, ?)", [(k, json.dumps(v)) for k, v in meta.items()]
+                )
+        except (OSError, sqlite3.Error) as error:
+            raise SweepError(f"cannot write '{file}' ({error}); choose another output with -o") from error
+        return cls(file, db)
+
+    @classmethod
+    def open(cls, file: Path) -> Journal:
+        """Open a journal.
+
+        Raises:
+            SweepError: there is none, or it is of another version.
+        """
+        if not file.is_file():
+            raise SweepError(f"there is no journal '{file}' to go on from; run without --resume")
+        try:
+            db = _connect(file)
+            (version,) = db.execute("PRAGMA user_version").fetchone()
+        except sqlite3.Error as error:
+            raise SweepError(f"'{file}' is not a journal of a sweep ({error})") from error
+        if version != FORMAT:
+            db.close()
+            raise SweepError(
+                f"'{file}' has format {version}, this version reads {FORMAT}; run the sweep anew"
+            )
+        return cls(file, db)
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        return {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
+
+    def done(self) -> set[int]:
+        """Indices of the finished points."""
+        return {row[0] for row in self._db.execute("SELECT id FROM points")}
+
+    def failed(self) -> int:
+        """How many points have another outcome than "reached"."""
+        (count,) = self._db.execute("SELECT count(*) FROM points WHERE outcome <> 'reached'").fetchone()
+        return int(count)
+
+    def add(self, found: Sequence[Finished]) -> None:
+        """Write points, all of them or none.
+
+        Raises:
+            SweepError: the disk takes no more.
+        """
+        rows = [
+            (p.number, p.outcome, p.reason, json.dumps(p.values), p.wall_time_s, p.attempts, p.worker)
+            for p in found
+        ]
+        try:
+            with self._db:
+                self._db.executemany("INSERT OR REPLACE INTO points VALUES (?, ?, ?, ?, ?, ?, ?)", rows)
+        except sqlite3.Error as error:
+            raise SweepError(f"'{self.file}' takes no more points ({error}); what it has is kept") from error
+
+    def __iter__(self) -> Iterator[Finished]:
+        """Finished points in the order of the data set."""
+        for i, outcome, reason, values, wall_time, attempts, worker in self._db.execute(
+            "SELECT id, outcome, reason, measured, wall_time_s, attempts, worker FROM points ORDER BY id"
+        ):
+            yield Finished(i, outcome, reason, json.loads(values), wall_time, attempts, worker)
+
+    def close(self) -> None:
+        self._db.close()
+
+
+def _connect(file: Path) -> sqlite3.Connection:
+    db = sqlite3.connect(file)
+    # without waiting for the disk after each point (5 to 12 ms on a busy machine)
+    db.execute("PRAGMA journal_mode = WAL")
+    db.execute("PRAGMA synchronous = NORMAL")
+    return db
+
+
+def _logs(file: Path) -> list[Path]:
+    return [file.with_name(file.name + end) for end in ("-journal", "-wal", "-shm")]

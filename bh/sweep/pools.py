@@ -1,0 +1,231 @@
+"""Where the points of a sweep run: this process, local processes, a given executor, a Dask cluster."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
+from multiprocessing import get_context, parent_process
+from typing import Any, Protocol
+
+from bh.sweep.points import SweepError
+
+ANSWER_S = 15.0  # until a scheduler counts as silent
+ASK_AGAIN_S = 5.0  # between two looks at how many workers a cluster has
+
+
+class Pool(Protocol):
+    """Workers. `slots` is how many tasks run at the same time."""
+
+    @property
+    def slots(self) -> int: ...
+
+    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]: ...
+
+    def lost(self, error: BaseException) -> str:
+        """Why a task came to nothing by no fault of its own: "worker" (it died), "pool" (all are gone), or ""."""
+        ...
+
+    def renew(self) -> None:
+        """Make new workers after some died.
+
+        Raises:
+            SweepError: it cannot.
+        """
+        ...
+
+    def trouble(self) -> str:
+        """Why nothing will ever be finished again, or an empty string."""
+        ...
+
+    def close(self) -> None: ...
+
+
+class Here:
+    """One after another in this process: no worker can die without it."""
+
+    slots = 1
+
+    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*args))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def lost(self, error: BaseException) -> str:
+        return ""
+
+    def renew(self) -> None:
+        raise SweepError("the sweep runs in this process and has no workers to renew")
+
+    def trouble(self) -> str:
+        return ""
+
+    def close(self) -> None:
+        return
+
+
+class Given:
+    """Any `concurrent.futures` executor; it is not shut down, and broken it cannot be made anew."""
+
+    def __init__(self, executor: Executor) -> None:
+        self.executor = executor
+        self.slots = int(getattr(executor, "_max_workers", 0) or os.cpu_count() or 1)
+
+    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
+        return self.executor.submit(function, *args)
+
+    def lost(self, error: BaseException) -> str:
+        return "pool" if isinstance(error, BrokenExecutor | CancelledError) else ""
+
+    def renew(self) -> None:
+        raise SweepError(
+            "the given executor is broken; what is finished is kept: go on with a new one and resume"
+        )
+
+    def trouble(self) -> str:
+        return ""
+
+    def close(self) -> None:
+        return
+
+
+class Local:
+    """Processes on this machine, one solver thread each, started anew where one dies."""
+
+    def __init__(self, workers: int) -> None:
+        if workers < 1:
+            raise SweepError(f"workers = {workers} cannot be; give 1 or more, or 0 for this process")
+        self.slots = workers
+        self._start()
+
+    def _start(self) -> None:
+        # spawned, not forked: the parent may have threads, and macOS and Windows can do nothing else
+        self._executor = ProcessPoolExecutor(self.slots, get_context("spawn"), _begin)
+        try:
+            self._executor.submit(os.getpid).result()
+        except BrokenExecutor as error:
+            raise SweepError(
+                "the worker processes cannot start; a script that sweeps must do so under "
+                "`if __name__ == '__main__':`, because they import it"
+            ) from error
+
+    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
+        try:
+            return self._executor.submit(function, *args)
+        except BrokenExecutor as error:  # found out between two tasks
+            future: Future[Any] = Future()
+            future.set_exception(error)
+            return future
+
+    def lost(self, error: BaseException) -> str:
+        return "pool" if isinstance(error, BrokenExecutor) else ""
+
+    def renew(self) -> None:
+        self._executor.shutdown(wait=True, cancel_futures=True)
+        self._start()
+
+    def trouble(self) -> str:
+        return ""
+
+    def close(self) -> None:
+        # an interrupted sweep does not wait for points of minutes: nothing of them would be kept
+        for process in list((getattr(self._executor, "_processes", None) or {}).values()):
+            process.terminate()
+        self._executor.shutdown(wait=True, cancel_futures=True)
+
+
+class Dask:
+    """A Dask distributed cluster: by the address of its scheduler, or a local one of so many processes."""
+
+    def __init__(self, address: str | None = None, workers: int = 0) -> None:
+        try:
+            from distributed import Client, LocalCluster
+        except ImportError as error:
+            raise SweepError(
+                "Dask is not installed; add the extra: pip install 'curved-crease-workbench[cluster]'"
+            ) from error
+        self._cluster: Any = None
+        if address is None:
+            self._cluster = LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
+            )
+        try:
+            self._client: Any = Client(self._cluster or address, timeout=ANSWER_S, set_as_default=False)
+        except (OSError, ValueError) as error:  # a time-out is an OSError
+            raise SweepError(
+                f"the scheduler '{address}' does not answer ({' '.join(str(error).split())}); start it with "
+                "`dask scheduler` or check its address"
+            ) from error
+        self.address = str(self._client.scheduler_info()["address"])
+        try:
+            self._client.wait_for_workers(1, timeout=ANSWER_S)
+        except TimeoutError as error:
+            self.close()
+            raise SweepError(
+                f"the scheduler '{self.address}' has no workers; start some with `dask worker {self.address}`"
+            ) from error
+        self._executor = self._client.get_executor(pure=False)
+        self._slots, self._asked = 1, 0.0
+
+    @property
+    def slots(self) -> int:
+        """Threads of the cluster; workers may come and go."""
+        if time.monotonic() > self._asked + ASK_AGAIN_S:
+            self._asked = time.monotonic()
+            with contextlib.suppress(OSError, TimeoutError):  # `trouble` tells of a scheduler that is gone
+                self._slots = max(1, sum(self._client.nthreads().values()))
+        return self._slots
+
+    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
+        future: Future[Any]
+        try:
+            future = self._executor.submit(function, *args)
+        except (OSError, RuntimeError) as error:
+            future = Future()
+            future.set_exception(CancelledError(str(error)))
+        return future
+
+    def lost(self, error: BaseException) -> str:
+        if isinstance(error, CancelledError):  # the scheduler forgot it
+            return "pool"
+        # the scheduler itself has tried it on several workers
+        return "worker" if type(error).__name__ == "KilledWorker" else ""
+
+    def renew(self) -> None:
+        raise SweepError(
+            f"the scheduler '{self.address}' is gone; what is finished is kept: resume when it is back"
+        )
+
+    def trouble(self) -> str:
+        if self._client.status in ("closed", "closing"):
+            return "gone"
+        if self._client.status == "connecting":
+            return "does not answer any more"
+        return ""
+
+    def close(self) -> None:
+        with contextlib.suppress(Exception):  # it may be gone already
+            self._client.close(timeout=2)
+        if self._cluster is not None:
+            with contextlib.suppress(Exception):
+                self._cluster.close(timeout=5)
+
+
+def _begin() -> None:
+    """A worker leaves interrupts to its parent, and ends when that has gone, also if it was killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+
+        def follow() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=follow, daemon=True).start()

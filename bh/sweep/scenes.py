@@ -1,0 +1,166 @@
+"""The task of sweeping a scene: set keys of its tables, solve it, measure the last state."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bh.errors import InputError
+from bh.path import Path as Trace
+from bh.scene import Scene, scene_from_tables
+from bh.scene_tables import read_toml
+from bh.supports import select
+from bh.sweep.dataset import Label
+from bh.sweep.points import SweepError, Value
+from bh.sweep.task import Measured
+from bh.tracing import trace
+
+TOKEN = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
+ENERGIES = ("stretching", "bending", "folding", "total")
+
+
+@dataclass(frozen=True)
+class SceneTask:
+    """Solve a scene with some of its keys set, and measure its last state.
+
+    Attributes:
+        text: of the scene file; `folder` is where files that it names are looked for.
+        keys: for every parameter the keys of the scene that take its value, such as "steps[0].fold.to".
+        places: whose node positions are measured, such as "corner:inner-end".
+        shape: also measure the positions of all nodes.
+    """
+
+    text: str
+    keys: Mapping[str, tuple[str, ...]]
+    folder: Path = Path()
+    places: tuple[str, ...] = ()
+    shape: bool = False
+    labels: Mapping[str, Label] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        tables = read_toml(self.text)
+        for name, keys in self.keys.items():
+            for key in keys:
+                _parent(tables, key, name)
+
+    @property
+    def identity(self) -> str:
+        """Of scene, keys and measures; SHA-256."""
+        data = {"text": self.text, "keys": dict(self.keys), "places": self.places, "shape": self.shape}
+        return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+    def scene(self, parameters: Mapping[str, Value]) -> Scene:
+        """The scene of a point.
+
+        Raises:
+            SceneError: it cannot be.
+        """
+        tables = copy.deepcopy(read_toml(self.text))
+        for name, value in parameters.items():
+            for key in self.keys[name]:
+                table, last = _parent(tables, key, name)
+                table[last] = value
+        return scene_from_tables(tables, self.folder)
+
+    def __call__(self, parameters: Mapping[str, Value]) -> Measured:
+        path = trace(self.scene(parameters).model)
+        if path.outcome != "reached":
+            where = f"step {len(path.steps)}, lambda {path.records[-1].lam:.6g}"
+            return Measured({}, path.outcome, f"{where}: {path.reason}")
+        return Measured(self.measure(path))
+
+    def measure(self, path: Trace) -> dict[str, Any]:
+        """Energies in N mm, dihedral angles of the creases in rad, positions in mm, and what it took."""
+        state, mesh = path[-1], path.model.mesh
+        energy = state.energy.as_dict()
+        found: dict[str, Any] = {f"energy_{kind}": energy[kind] for kind in ENERGIES}
+        for crease in mesh.creases:
+            angles = state.dihedral(crease)
+            if len(angles):
+                found |= {
+                    f"dihedral_{crease}": float(angles.mean()),
+                    f"dihedral_{crease}_min": float(angles.min()),
+                    f"dihedral_{crease}_max": float(angles.max()),
+                }
+        for place in self.places:
+            found[f"points_{word(place)}"] = state.points[select(mesh, place)]
+        if self.shape:
+            found |= {"points": state.points, "flat_points": mesh.points}
+        found |= {
+            "stable": {True: 1, False: 0, None: -1}[path.stable],
+            "critical_points": len(path.critical_points),
+            "iterations": path.iterations,
+            "unknowns": path.unknowns,
+        }
+        return found
+
+    def labelled(self) -> dict[str, Label]:
+        """Units and texts of what is measured, where they are known beforehand."""
+        known = {f"energy_{kind}": Label("N mm", f"{kind} energy") for kind in ENERGIES}
+        for place in self.places:
+            known[f"points_{word(place)}"] = Label(
+                "mm", f"positions of {place}", (f"node_{word(place)}", "xyz")
+            )
+        known["points"] = Label("mm", "positions of all nodes", ("node", "xyz"))
+        known["flat_points"] = Label("mm", "positions in the flat sheet", ("node", "xy"))
+        known["stable"] = Label("", "1 stable, 0 not stable, -1 not known")
+        for name, keys in self.keys.items():
+            known[name] = Label("", ", ".join(keys))
+        return known | dict(self.labels)
+
+    def check(self, tried: list[Mapping[str, Value]]) -> None:
+        """See that at least one of some points makes a scene that has the places.
+
+        Raises:
+            SceneError, ModelError: none does; the first one's error.
+        """
+        errors = []
+        for parameters in tried:
+            try:
+                mesh = self.scene(parameters).model.mesh
+                for place in self.places:
+                    select(mesh, place)
+                return
+            except InputError as error:
+                errors.append(error)
+        raise errors[0]
+
+
+def _parent(tables: dict[str, Any], key: str, name: str) -> tuple[Any, Any]:
+    """The table or list that holds a key, and its last part; tables that are not there yet are made."""
+    words = TOKEN.findall(key)
+    if not words or "".join(f"[{i}]" if i else f".{w}" for w, i in words).lstrip(".") != key:
+        raise SweepError(
+            f"parameter '{name}': the key '{key}' is not understood; write it as steps[0].fold.to"
+        )
+    parts: list[str | int] = [int(i) if i else w for w, i in words]
+    here: Any = tables
+    for part, after in zip(parts, [*parts[1:], None], strict=True):
+        wrong = SweepError(
+            f"parameter '{name}': the scene has no '{key}'; it must name a key of one of its tables"
+        )
+        if isinstance(part, int) != isinstance(here, list):
+            raise wrong
+        if isinstance(part, int) and part >= len(here):
+            raise wrong
+        if after is None:
+            return here, part
+        if isinstance(part, str) and part not in here and not isinstance(after, int):
+            here[part] = {}
+        if isinstance(part, str) and part not in here:
+            raise wrong
+        here = here[part]
+        if not isinstance(here, dict | list):
+            raise wrong
+    raise wrong
+
+
+def word(place: str) -> str:
+    """A place as part of a name: "corner_inner_end"."""
+    return re.sub(r"\W+", "_", place)

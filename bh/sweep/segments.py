@@ -1,0 +1,81 @@
+"""The data set of pinched segments that inverse design interpolates in (source 6.2.4): a sweep of its own kind.
+
+bh segments -o mine.nc --zone 12
+"""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import Executor
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from bh.applications.inverse.segments import Domain, beyond, grid
+from bh.applications.inverse.simulate import SETTING, SegmentTask, Setting
+from bh.applications.inverse.surrogate import FORMAT
+from bh.sweep import Label, Points, Pool, run, table
+from bh.sweep.runner import Meter
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+LABELS = {
+    "k0": Label("1/mm", "curvature of the crease before folding, positive to the left"),
+    "length": Label("mm", "length of the crease"),
+    "t": Label("mm", "end of the crease in the frame at its start (Eq. 6.9)", ("xyz",)),
+    "uvw": Label(
+        "rad", "Tait-Bryan angles of the frame at the end (Eq. 6.14 to 6.16), w not wrapped", ("angle",)
+    ),
+    "end_dihedral": Label("rad", "dihedral angle of the first and the last edge of the crease", ("end",)),
+    "energy": Label("N mm", "elastic energy"),
+    "stable": Label("", "1: the state is stable"),
+    "critical_points": Label("", "limit and bifurcation points on the way"),
+}
+
+
+def points(domain: Domain | None = None, step_k0: float = 5e-4, step_length: float = 4.0) -> Points:
+    """The source's grid (2,487 segments), and behind it those just beyond the domain that splines need at its edge."""
+    inside = grid(domain, step_k0, step_length)
+    outside = beyond(domain, step_k0, step_length)
+    k0, length = (np.concatenate(pair) for pair in zip(inside, outside, strict=True))
+    # the rounded decimals, not what steps add up to, so that data sets of equal steps have equal keys
+    return table({"k0": np.round(k0, 12).tolist(), "length": np.round(length, 9).tolist()})
+
+
+def build(
+    file: str | Path,
+    setting: Setting = SETTING,
+    *,
+    pool: Pool | Executor | int | None = None,
+    resume: bool = False,
+    progress: bool | Meter = False,
+) -> Dataset:
+    """Simulate all segments of `points` and write the data set; arguments as for `bh.sweep.run`."""
+    about: dict[str, Any] = {
+        "title": "Pinched segments of a folded crease", "format": FORMAT, "setting": json.dumps(asdict(setting))
+    }  # fmt: skip
+    return run(
+        SegmentTask(setting), points(), file, pool=pool, resume=resume, progress=progress, labels=LABELS,
+        attributes=about,
+    )  # fmt: skip
+
+
+def segments(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.nc", help="Data set.")],
+    zone: Annotated[float, typer.Option("--zone", help="Length of the pinched zone, mm.")] = SETTING.zone,
+    workers: Annotated[int | None, typer.Option("--workers", "-w", min=0, help="Local processes.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from the points that are finished.")
+    ] = False,
+) -> int:
+    """Make the data set of pinched segments that `bh design` interpolates in."""
+    from dataclasses import replace
+
+    data = build(output, replace(SETTING, zone=zone), pool=workers, resume=resume, progress=True)
+    failed = int((data["outcome"] != "reached").sum())
+    typer.echo(f"{data.sizes['point'] - failed:,} of {data.sizes['point']:,} segments; wrote {output}")
+    return 1 if failed else 0

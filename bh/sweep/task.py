@@ -1,0 +1,87 @@
+"""What a worker does: one task, called with the parameters of a point. Everything here crosses process borders."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bh.errors import InputError
+from bh.sweep.points import SweepError, Value
+
+Task = Callable[[Mapping[str, Value]], "Measured | Mapping[str, Any]"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a task found at a point.
+
+    Attributes:
+        values: by name, a number, a word or an array of numbers.
+        outcome: "reached", or why there are no values.
+        reason: one line, where the outcome is another.
+    """
+
+    values: Mapping[str, Any] = field(default_factory=dict)
+    outcome: str = "reached"
+    reason: str = ""
+
+
+class Finished(NamedTuple):
+    """A point as it is stored; `values` hold plain numbers, words and lists of numbers."""
+
+    number: int  # in the order of the data set, from 0
+    outcome: str
+    reason: str
+    values: dict[str, Any]
+    wall_time_s: float
+    attempts: int = 1
+    worker: str = ""
+
+
+def work(task: Task, points: Sequence[tuple[int, Mapping[str, Value]]]) -> list[Finished]:
+    """Run a task at some points, one after another; an exception is an outcome of its point."""
+    worker = f"{platform.node()}:{os.getpid()}"
+    found = []
+    for index, parameters in points:
+        began = time.perf_counter()
+        try:
+            measured = task(parameters)
+            if not isinstance(measured, Measured):
+                measured = Measured(measured)
+            outcome, reason = measured.outcome, measured.reason
+            values = {name: _plain(name, value) for name, value in measured.values.items()}
+        except InputError as error:
+            outcome, reason, values = "refused", str(error), {}
+        except Exception as error:  # one bad point must not stop the others
+            outcome, reason, values = "failed", f"{type(error).__name__}: {error}", {}
+        line = " ".join(reason.split())
+        found.append(Finished(index, outcome, line, values, time.perf_counter() - began, worker=worker))
+    return found
+
+
+def identity(task: Task) -> str:
+    """What a task is, in words: its own `identity` if it has one, else its qualified name."""
+    own = getattr(task, "identity", None)
+    if isinstance(own, str):
+        return own
+    name = getattr(task, "__qualname__", type(task).__qualname__)
+    return f"{getattr(task, '__module__', type(task).__module__)}.{name}"
+
+
+def _plain(name: str, value: Any) -> Any:
+    """The value as JSON can hold it; Python writes floats so that they are read back to the last bit."""
+    if isinstance(value, str | bool | int | float):
+        return value
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf":
+            raise TypeError
+    except (TypeError, ValueError) as error:
+        raise SweepError(f"measured '{name}' is a {type(value).__name__}; give numbers or words") from error
+    return array.tolist()

@@ -1,0 +1,367 @@
+"""Sweeps: the same values wherever and in whatever order points run; nothing finished is lost."""
+
+from __future__ import annotations
+
+import json
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("xarray")
+import bh.sweep
+from bh.cli import main
+from bh.sweep.file import load_sweep
+from bh.sweep.progress import duration, line
+
+HERE = Path(__file__).parent
+EXAMPLES = HERE.parents[1] / "examples"
+
+
+@pytest.fixture(autouse=True)
+def tasks(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The module of tasks; spawned workers get this process's path."""
+    monkeypatch.syspath_prepend(str(HERE))
+    import sweep_tasks
+
+    return sweep_tasks
+
+
+def same(one: Any, other: Any) -> bool:
+    """Equal to the last bit but for what tells of the run."""
+    rest = list(bh.sweep.ABOUT_RUN)
+    one, other = one.drop_vars(rest), other.drop_vars(rest)
+    return bool(
+        list(one.variables) == list(other.variables)
+        and all(one[n].dims == other[n].dims for n in one.variables)
+        and all(one[n].values.tobytes() == other[n].values.tobytes() for n in one.variables)
+    )
+
+
+GRID = bh.sweep.grid({"x": [0.1, 0.2, 0.7, 1.3], "n": [2, 0, 1]})
+
+# --- points -------------------------------------------------------------------------------------------------
+
+
+def test_grid_runs_the_last_axis_fastest() -> None:
+    points = bh.sweep.grid({"a": [1, 2], "b": ["x", "y", "z"]})
+    assert points.shape == (2, 3)
+    assert [points[i] for i in (0, 1, 3)] == [{"a": 1, "b": "x"}, {"a": 1, "b": "y"}, {"a": 2, "b": "x"}]
+
+
+def test_csv_keeps_whole_numbers_and_words(tmp_path: Path) -> None:
+    file = tmp_path / "points.csv"
+    file.write_text("radius, along ,kind\n80,32,staggered\n1e2,48,mirrored\n")
+    points = bh.sweep.read_csv(file)
+    assert points[1] == {"radius": 100.0, "along": 48, "kind": "mirrored"}
+    assert isinstance(points[1]["along"], int)
+
+
+@pytest.mark.parametrize(
+    ("axes", "told"),
+    [
+        ({}, "at least one"),
+        ({"a": []}, "at least one"),
+        ({"a": [1, 1]}, "twice"),
+        ({"a": [1, "b"]}, "mixes"),
+        ({"a": [float("nan")]}, "finite"),
+        ({"a": [[1]]}, "no number"),
+        ({c: range(1000) for c in "abc"}, "split"),
+    ],
+)
+def test_bad_axes(axes: dict[str, Any], told: str) -> None:
+    with pytest.raises(bh.sweep.SweepError, match=told):
+        bh.sweep.grid(axes)
+
+
+def test_bad_tables(tmp_path: Path) -> None:
+    with pytest.raises(bh.sweep.SweepError, match="a 2, b 1"):
+        bh.sweep.table({"a": [1, 2], "b": [1]})
+    file = tmp_path / "points.csv"
+    file.write_text("a,b\n1,2\n3\n")
+    with pytest.raises(bh.sweep.SweepError, match="row 3 has 1"):
+        bh.sweep.read_csv(file)
+    with pytest.raises(bh.sweep.SweepError, match="cannot be read"):
+        bh.sweep.read_csv(tmp_path / "none.csv")
+
+
+# --- the same values everywhere -----------------------------------------------------------------------------
+
+
+def test_same_bits_in_every_pool(tmp_path: Path, tasks: Any) -> None:
+    """This process, threads, one and two processes in tasks of one and of five points, forwards and backwards."""
+    here = bh.sweep.run(tasks.waves, GRID, tmp_path / "here.nc", pool=0)
+    assert here["sine"].sel(x=0.7, n=1).item() == np.sin(0.7) / 3.0
+    assert here["powers"].dims == ("x", "n", "powers_0")
+    assert np.isnan(here["powers"].sel(x=0.2, n=0).values[1:]).all()
+    assert here["word"].sel(x=1.3, n=2).item() == "at 1.3"
+    with ThreadPoolExecutor(3) as threads:
+        assert same(here, bh.sweep.run(tasks.waves, GRID, tmp_path / "threads.nc", pool=threads))
+    assert same(here, bh.sweep.run(tasks.waves, GRID, tmp_path / "two.nc", pool=2, chunk=5))
+    assert same(here, bh.sweep.load(tmp_path / "two.nc"))
+    back = bh.sweep.grid({"x": GRID.values[0][::-1], "n": GRID.values[1]})
+    turned = bh.sweep.run(tasks.waves, back, tmp_path / "back.nc", pool=0)
+    assert turned["sine"].sortby("x").identical(here["sine"].sortby("x"))
+
+
+def test_table_has_one_dimension(tmp_path: Path, tasks: Any) -> None:
+    points = bh.sweep.table({"x": [0.5, 0.5, 0.25], "n": [1, 2, 0]})
+    data = bh.sweep.run(
+        tasks.waves, points, tmp_path / "t.nc", pool=0, labels={"sine": bh.sweep.Label("mm", "s")}
+    )
+    assert data["sine"].dims == ("point",)
+    assert data["x"].values.tolist() == [0.5, 0.5, 0.25]
+    assert bh.sweep.load(tmp_path / "t.nc")["sine"].attrs == {"units": "mm", "long_name": "s"}
+
+
+def test_provenance(tmp_path: Path, tasks: Any) -> None:
+    data = bh.sweep.run(tasks.waves, GRID, tmp_path / "p.nc", pool=0, attributes={"why": "a test"})
+    assert data.attrs["task"] == "sweep_tasks.waves"
+    assert data.attrs["why"] == "a test"
+    assert json.loads(data.attrs["versions"])["numpy"] == np.__version__
+
+
+@contextmanager
+def cluster(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A real scheduler and two real workers, as processes of their own: (address, scheduler)."""
+    pytest.importorskip("distributed")
+    told = tmp_path / "scheduler.json"
+    log = (tmp_path / "log").open("w")
+    module = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker"]
+    rest = {"stdout": log, "stderr": log, "env": {"PYTHONPATH": str(HERE), "PATH": "/usr/bin:/bin"}}
+    quiet = ["--scheduler-file", str(told), "--no-dashboard"]
+    started = [subprocess.Popen([*module, *quiet, "--port", "0"], **rest)]  # type: ignore[call-overload]
+    try:
+        for _ in range(2):
+            started.append(
+                subprocess.Popen([*worker, *quiet, "--nthreads", "1", "--no-nanny"], **rest)  # type: ignore[call-overload]
+            )
+        yield _address(told), started[0]
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+        log.close()
+
+
+def test_dask_by_address(tmp_path: Path, tasks: Any) -> None:
+    with cluster(tmp_path) as (address, _), closing(bh.sweep.Dask(address)) as pool:
+        data = bh.sweep.run(tasks.waves, GRID, tmp_path / "dask.nc", pool=pool, chunk=2)
+    assert same(data, bh.sweep.run(tasks.waves, GRID, tmp_path / "here.nc", pool=0))
+    assert "" not in data["worker"].values.ravel().tolist()
+
+
+def test_a_scheduler_that_goes_away(tmp_path: Path, tasks: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line, and what was finished is kept for another run."""
+    monkeypatch.setattr("bh.sweep.runner.QUIET_S", 2.0)
+    points, file = bh.sweep.grid({"x": list(range(300))}), tmp_path / "gone.nc"
+
+    class Killer:
+        def update(self, done: int, *_: Any) -> None:
+            if done > 20:
+                scheduler.kill()
+
+        def close(self) -> None:
+            return
+
+    with (
+        cluster(tmp_path) as (address, scheduler),
+        closing(bh.sweep.Dask(address)) as pool,
+        pytest.raises(bh.sweep.SweepError, match="kept") as told,
+    ):
+        bh.sweep.run(tasks.slow, points, file, pool=pool, progress=Killer())
+    assert "\n" not in str(told.value)
+    assert 20 < int((bh.sweep.partial(file)["outcome"] == "reached").sum()) < 300
+    whole = bh.sweep.run(tasks.slow, points, tmp_path / "whole.nc", pool=0)
+    assert same(whole, bh.sweep.run(tasks.slow, points, file, pool=0, resume=True))
+
+
+def _address(file: Path) -> str:
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until:
+        if file.is_file() and file.read_text():
+            return str(json.loads(file.read_text())["address"])
+        time.sleep(0.1)
+    raise AssertionError("the scheduler did not start")
+
+
+def test_a_silent_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("bh.sweep.pools.ANSWER_S", 0.5)
+    with pytest.raises(bh.sweep.SweepError, match="does not answer") as told:
+        bh.sweep.Dask("tcp://127.0.0.1:9")
+    assert "\n" not in str(told.value)
+
+
+# --- points that fail, workers that die, sweeps that are killed ---------------------------------------------
+
+
+def test_a_failed_point_stops_nothing(tmp_path: Path, tasks: Any) -> None:
+    data = bh.sweep.run(tasks.moody, bh.sweep.grid({"x": [1, 2, 3]}), tmp_path / "m.nc", pool=0)
+    assert data["outcome"].values.tolist() == ["reached", "failed", "reached"]
+    assert data["reason"].values[1] == "ZeroDivisionError: no value at two"
+    assert data["inverse"].values.tolist()[::2] == [-1.0, 1.0]
+    assert np.isnan(data["inverse"].values[1])
+
+
+@pytest.mark.parametrize("chunk", [1, 4])
+def test_a_dead_worker_is_replaced(tmp_path: Path, tasks: Any, chunk: int) -> None:
+    points = bh.sweep.grid({"x": list(range(9))})
+    task = tasks.Deadly(str(tmp_path), always=False)
+    data = bh.sweep.run(task, points, tmp_path / "d.nc", pool=2, chunk=chunk)
+    assert (data["outcome"] == "reached").all()
+    assert data["double"].values.tolist() == [2.0 * i for i in range(9)]
+    assert data["attempts"].values[3] > 1
+
+
+def test_a_deadly_point_is_recorded(tmp_path: Path, tasks: Any) -> None:
+    points = bh.sweep.grid({"x": list(range(9))})
+    data = bh.sweep.run(
+        tasks.Deadly(str(tmp_path), always=True), points, tmp_path / "d.nc", pool=2, retries=1
+    )
+    assert data["outcome"].values.tolist() == ["reached"] * 3 + ["died"] + ["reached"] * 5
+    assert "died" in data["reason"].values[3]
+
+
+def test_a_killed_sweep_goes_on(tmp_path: Path, tasks: Any) -> None:
+    """Killed at random (SIGKILL) again and again; every point that was finished stays, the data set is the same."""
+    whole = bh.sweep.run(tasks.slow, bh.sweep.grid({"x": list(range(150))}), tmp_path / "whole.nc", pool=0)
+    file = tmp_path / "killed.nc"
+    script = (
+        f"import sys; sys.path.insert(0, {str(HERE)!r}); import bh.sweep, sweep_tasks, os\n"
+        f"if __name__ == '__main__':\n    bh.sweep.run(sweep_tasks.slow, bh.sweep.grid({{'x': list(range(150))}}), "
+        f"{str(file)!r}, pool=0, resume=os.path.exists({str(file)!r} + '.points'))\n"
+    )
+    rng, kept, kills = random.Random(4), 0, 0
+    while not file.is_file():
+        child = subprocess.Popen([sys.executable, "-c", script])
+        if kills < 3:
+            _wait_for_points(file, kept + rng.randrange(5, 30), child)
+            child.send_signal(signal.SIGKILL)
+            kills += 1
+        child.wait()
+        if kills < 3 or not file.is_file():
+            now = int((bh.sweep.partial(file)["outcome"] == "reached").sum())
+            assert kept < now < 150
+            kept = now
+    assert kills == 3
+    assert same(whole, bh.sweep.load(file))
+    assert not Path(f"{file}.points").exists()
+
+
+def _wait_for_points(file: Path, count: int, child: subprocess.Popen[bytes]) -> None:
+    journal = Path(f"{file}.points")
+    while child.poll() is None:
+        if journal.is_file():
+            try:
+                with closing(sqlite3.connect(f"file:{journal}?mode=ro", uri=True)) as db:
+                    if db.execute("SELECT count(*) FROM points").fetchone()[0] >= count:
+                        return
+            except sqlite3.Error:
+                pass
+        time.sleep(0.01)
+
+
+def test_no_going_on_with_another_sweep(tmp_path: Path, tasks: Any) -> None:
+    with pytest.raises(bh.sweep.SweepError, match="to go on from"):
+        bh.sweep.run(tasks.waves, GRID, tmp_path / "a.nc", pool=0, resume=True)
+    bh.sweep.run(tasks.waves, GRID, tmp_path / "a.nc", pool=0)
+    assert same(
+        bh.sweep.run(tasks.waves, GRID, tmp_path / "a.nc", resume=True), bh.sweep.load(tmp_path / "a.nc")
+    )
+    with pytest.raises(bh.sweep.SweepError, match="another sweep"):
+        bh.sweep.run(tasks.moody, GRID, tmp_path / "a.nc", pool=0, resume=True)
+
+
+# --- scenes and the command ---------------------------------------------------------------------------------
+
+SWEEP = """
+scene = "{scene}"
+[axes.angle]
+key = "steps[0].fold.to"
+start = 2.5
+stop = 1.5
+count = 2
+unit = "rad"
+[axes.width]
+key = "pattern.width"
+values = [10.0, 120.0]
+[measure]
+places = ["corner:inner-end"]
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    place = tmp_path / "folds.toml"
+    place.write_text(SWEEP.format(scene=(EXAMPLES / "appendix_b_a.toml").as_posix()))
+    return place
+
+
+def test_scene(file: Path, tmp_path: Path) -> None:
+    import bh
+
+    asked = load_sweep(file)
+    data = bh.sweep.run(asked.task, asked.points, tmp_path / "s.nc", pool=0, labels=asked.labels)
+    alone = bh.trace(asked.task.scene({"angle": 1.5, "width": 10.0}).model)
+    at = data.sel(angle=1.5, width=10.0)
+    assert at["energy_total"].item() == alone[-1].energy.total
+    np.testing.assert_allclose(at["dihedral_crease"], 1.5, atol=1e-9)
+    assert at["points_corner_inner_end"].shape == (1, 3)
+    assert data["outcome"].sel(width=120.0).values.tolist() == ["refused"] * 2
+    assert "reaches the centre" in data["reason"].sel(width=120.0).values[0]
+    assert data["angle"].attrs["units"] == "rad"
+
+
+def test_command(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "out.nc"
+    assert main(["sweep", str(file), "-o", str(place), "-w", "0"]) == 1
+    out, err = capsys.readouterr()
+    assert "2 of 4 points reached" in out
+    assert "2 points have no values (2 refused)" in err
+    assert "4 of 4 points, 2 failed" in err
+    assert main(["sweep", str(file), "-o", str(place), "-w", "0", "--dask-workers", "2"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("steps[0].fold.to", "steps[3].fold.to", "the scene has no 'steps[3].fold.to'"),
+        ("steps[0].fold.to", "steps[0]fold", "not understood"),
+        ("steps[0].fold.to", "steps[0].fold.too", "too"),
+        ("pattern.width", "pattern.kind.deep", "the scene has no"),
+        ("start = 2.5\n", "", "either values, or start, stop and count"),
+        ("[axes.angle]", "[axis.angle]", "axis"),
+        ("scene =", "model =", "model"),
+        ("corner:inner-end", "corner:nowhere", "nowhere"),
+    ],
+)
+def test_bad_sweep_files(
+    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
+) -> None:
+    file.write_text(file.read_text().replace(old, new))
+    assert main(["sweep", str(file), "-o", str(tmp_path / "bad.nc"), "-w", "0", "-q"]) == 2
+    err = capsys.readouterr().err
+    assert told in err
+    assert err.count("\n") == 1
+
+
+def test_progress_tells_rate_and_time_left() -> None:
+    assert line(120, 400, 2, 60, 30.0) == "120 of 400 points, 2 failed, 2 a second, 2 min 20 s left"
+    assert line(2, 10, 0, 2, 10.0) == "2 of 10 points, 5 s a point, 40 s left"
+    assert [duration(s) for s in (9.4, 3600 * 3 + 300, 86400 * 2 + 4 * 3600)] == [
+        "9 s",
+        "3 h 5 min",
+        "2 d 4 h",
+    ]
