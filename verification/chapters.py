@@ -74,7 +74,8 @@ CHAPTERS = (
         "Formulations, solver and hard cases",
         "Do the formulations converge, is the shell to be trusted as a judge, and what can stop the solver?",
         (
-            "speed_error*", "honesty*", "consistent", "convergence", "derivatives", "shell_benchmarks", "hard_cases", "campaign",
+            "speed_error*", "honesty*", "consistent", "convergence", "derivatives", "shell_benchmarks", "hard_cases",
+            "campaign",
             "crossing*", "crease_network*", "patterns*", "sweep*", "symmetry*", "accuracy*", "import*",
         ),
     ),
