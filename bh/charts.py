@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bh.offscreen import PlotError
 from bh.supports import AXES, Support
+from meshes.mesh import count
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,6 +42,7 @@ FOLDS = {
 }
 STABLE, UNSTABLE = "#0072b2", "#d55e00"
 CRITICAL = {"limit": "^", "bifurcation": "D"}
+FEW_NODES = 12  # whose marks do not hide what they stand on
 MOST_ANGLES = 7  # states of a path that are drawn along a crease
 
 
@@ -229,11 +231,12 @@ def pattern(model: Model) -> Figure:
     for number, support in enumerate(s for s in model.supports if isinstance(s, Support)):
         nodes = mesh.nodes(support.at) if isinstance(support.at, str) else np.asarray(support.at)
         fixed = support.fix if isinstance(support.fix, str) else "oblique"
-        place = support.at if isinstance(support.at, str) else f"{len(nodes)} nodes"
+        place = support.at if isinstance(support.at, str) else count(len(nodes), "node")
         x, y = mesh.points[nodes, 0], mesh.points[nodes, 1]
         marker = "s" if support.clamp else ("^", "v", "<", ">")[number % 4]
         label = f"{place}: {fixed}" + (" and slope" if support.clamp else "")
-        axes.plot(x, y, marker, color="#009e73", markersize=6.0, linestyle="none", label=label, zorder=3)
+        size = 6.0 if len(nodes) <= FEW_NODES else 3.0
+        axes.plot(x, y, marker, color="#009e73", markersize=size, linestyle="none", label=label, zorder=3)
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         axes.legend(

@@ -11,6 +11,6 @@ def draw(result: CaseResult, context: Context, model: Model, caption: str) -> No
     """Write the flat pattern of a model beside the results and show it before the other pictures of the case."""
     drawn = sum(picture["file"].startswith(f"{result.name}_setup") for picture in result.pictures)
     file = f"{result.name}_setup{drawn or ''}.png"
-    pattern(model).savefig(context.folder / file, dpi=140, metadata={"Software": None})
+    pattern(model).savefig(context.folder / file, dpi=140, bbox_inches="tight", metadata={"Software": None})
     alt = f"Flat pattern with creases and supports: {caption}"
     result.pictures.insert(drawn, {"file": file, "alt": alt, "caption": f"Set-up: {caption}"})
