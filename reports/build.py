@@ -15,7 +15,7 @@ from meshes.errors import FileFormatError
 from meshes.io.export import replacing
 from reports import words
 from reports.changes import MOST, changes
-from reports.claims import Claim, claims
+from reports.claims import Claim, claims, claims_csv
 from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
 from reports.records import (
     Case,
@@ -159,6 +159,7 @@ class Site:
                 most_failures=MOST_FAILURES,
                 most_moves=MOST,
                 pareto=_pareto(every),
+                claims_csv=claims_csv(claim for shown in self.pages for claim in shown.claims),
                 odd=[item for case in every for item in case.checks if item[1].passed and item[1].use > 1.0],
                 seconds_in_all=sum(case.info.wall_time_s or 0.0 for case in every),
             )

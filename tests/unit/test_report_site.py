@@ -112,6 +112,12 @@ def test_each_published_value_has_its_row_and_its_error_bar(tmp_path: Path) -> N
     write(tmp_path, {"checks": rows})
     words = Page(one_page(tmp_path)).text
     assert "0.0547 N mm 0.0537 ± 0.00025 N mm off by 1.8" in words
+    (link,) = [
+        a["href"] or "" for a in Page(one_page(tmp_path)).all("a") if a.get("download") == "claims.csv"
+    ]
+    table = base64.b64decode(link.split(",")[1]).decode().splitlines()
+    assert len(table) == 3
+    assert ",0.0547,0.0537,0.00025,N mm," in table[1]
 
 
 def test_a_claim_that_fails_stands_for_the_others() -> None:
