@@ -45,7 +45,8 @@ _SUBMODULES = {
     "contact": "bh.analysis.contact", "corrugation": "bh.applications.corrugation",
     "creases": "bh.analysis.creases", "interactive": "bh.interactive",
     "isometric": "bh.analysis.isometric",
-    "pinching": "bh.applications.pinching", "plotting": "bh.plotting", "scan": "bh.scan",
+    "node_sensitivities": "bh.analysis.node_sensitivities", "pinching": "bh.applications.pinching",
+    "plotting": "bh.plotting", "polish": "bh.analysis.polish", "scan": "bh.scan",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",
 }  # fmt: skip

@@ -11,7 +11,7 @@ import pytest
 import bh
 from bh.analysis.contact import first_contact
 from bh.mechanics.kinematics import hinge_geometry
-from bh.program import stress_free_angles
+from bh.step_program import stress_free_angles
 from meshes import structured, unstructured
 from meshes.io import read_drawn, read_fold, read_pattern
 

@@ -29,8 +29,14 @@ SLOW = {
     "fig3_8",
     "fig3_10",
     "fig5_3",
+    "gradients",
     "hard_cases",
     "scan",
+    "fig5_5",
+    "fig5_9",
+    "fig5_10",
+    "fig5_11",
+    "pinch_shell",
 }  # over some five seconds on a slow machine
 
 
@@ -341,7 +347,7 @@ def bad_case(monkeypatch: pytest.MonkeyPatch) -> None:
     module = types.ModuleType("verification.bad_for_tests")
     module.run = disagreeing  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setitem(registry.ALL_CASES, "bad", module.__name__)
+    monkeypatch.setitem(registry.BY_NAME, "bad", registry.Study("bad_for_tests", "solver"))
 
 
 @pytest.mark.usefixtures("bad_case")
