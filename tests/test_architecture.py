@@ -26,7 +26,8 @@ DESCRIPTION = (
 PATH = ("bh.path", "bh.halves", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = (
-    "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.offscreen", "bh.warm_up",
+    "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.charts", "bh.animation",
+    "bh.offscreen", "bh.warm_up",
     "bh.accuracy", "bh.check", "bh.design", "bh.example", "bh.export", "bh.schema",
 )  # fmt: skip
 
