@@ -261,6 +261,6 @@ def _segment(result: CaseResult, context: Context) -> None:
     result.notes.append(
         f"A pinched segment of 0.01 / mm and 120 mm ends {bars:.1f} mm off the plane with one row of bars and hinges, "
         f"the model of the data set, and {consistent:.1f} and {shell:.1f} mm with the consistent formulation and the "
-        "shell. For this segment the reach out of the plane is that of the model, not of a sheet; finer rows of one cell "
-        "do not change it."
+        "shell. For this segment the reach out of the plane is that of the model, not of a sheet; shorter cells in the "
+        "one row do not change it."
     )
