@@ -16,12 +16,13 @@ from bh.applications.corrugation import (
     top_down,
 )
 from verification.checks import CaseResult, Check, Context, line, plot
+from verification.corrugation_shell import against_shell
 from verification.corrugations import AZIMUTHS, EDGE, ORDER, POINT, RATIOS, folded, in_order
 
 CASE = "three_point"
 SOURCE = "source 4.5.2, Fig. 4.8 and 4.9"
 TAPED, FREE = "taped", "free"
-RIGS = {TAPED: Rig(tape=1.0), FREE: Rig(travel=5.0)}
+RIGS = {TAPED: Rig(tape=1.0), FREE: Rig(travel=5.0)}  # N/mm; mm
 PUBLISHED = {
     ("straight", "y"): 4.0,
     ("straight", "x"): 0.15,
@@ -71,6 +72,8 @@ def run(context: Context) -> CaseResult:
         _claims(result, stiffness, support, params)
     if not context.quick:
         _creases(result, context, params)
+    context.tell(f"{CASE}: shell")
+    against_shell(result, context.quick)
     result.notes += NOTES
     return result
 
