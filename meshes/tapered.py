@@ -195,6 +195,10 @@ def _line(
     if kept.sum() < 2:
         return chain
     first, last = int(np.argmax(kept)), len(kept) - int(np.argmax(kept[::-1]))
+    if part == 1.0 and nodes.array[chain[1], 1] == 0.0:
+        first = 0  # some of the straight edge is left beside the rail below: nothing to join
+    if part == 1.0 and nodes.array[chain[-2], 1] == 0.0:
+        last = len(kept)
     x = x[first:last]
     inner = nodes.at(x, (1.0 - part) * low[first:last] + part * high[first:last])
     below = nodes.array[chain, 0]

@@ -16,12 +16,13 @@ from bh.applications.corrugation import (
     top_down,
 )
 from verification.checks import CaseResult, Check, Context, line, plot
+from verification.corrugation_shell import against_shell
 from verification.corrugations import AZIMUTHS, EDGE, ORDER, POINT, RATIOS, folded, in_order
 
 CASE = "three_point"
 SOURCE = "source 4.5.2, Fig. 4.8 and 4.9"
 TAPED, FREE = "taped", "free"
-RIGS = {TAPED: Rig(tape=1.0), FREE: Rig(travel=5.0)}
+RIGS = {TAPED: Rig(tape=1.0), FREE: Rig(travel=5.0)}  # N/mm; mm
 PUBLISHED = {
     ("straight", "y"): 4.0,
     ("straight", "x"): 0.15,
@@ -33,7 +34,7 @@ SPAN = 50.0
 
 
 def run(context: Context) -> CaseResult:
-    """Fifteen curves on taped supports, ten on free ones, and what the crease stiffness does to two of them."""
+    """Fifteen curves on taped supports, six on free ones, and what the crease stiffness does to two of them."""
     result = CaseResult(
         CASE, "Three-point bending of the five corrugations",
         "Do simulated tests give the measured ratios k_x / k_y, and if not, what is the difference due to?", SOURCE,
@@ -55,7 +56,7 @@ def run(context: Context) -> CaseResult:
                 SOURCE,
             )
         )
-        for support in (TAPED,) if context.quick else (TAPED, FREE):
+        for support in (TAPED,) if context.quick or kind in POINT else (TAPED, FREE):
             curves = []
             for name in AZIMUTHS if support == TAPED else ("x", "y"):
                 context.tell(f"{CASE}: {kind}, {support}, about {name}")
@@ -71,6 +72,8 @@ def run(context: Context) -> CaseResult:
         _claims(result, stiffness, support, params)
     if not context.quick:
         _creases(result, context, params)
+    context.tell(f"{CASE}: shell")
+    against_shell(result, context.quick)
     result.notes += NOTES
     return result
 
@@ -124,11 +127,14 @@ def _claims(
     result: CaseResult, stiffness: dict[tuple[str, str, str], float], support: str, params: dict[str, Any]
 ) -> None:
     where = {**params, "supports": support, "L*": 25.0}
-    ratios = {kind: stiffness[kind, support, "x"] / stiffness[kind, support, "y"] for kind in ORDER}
-    for kind in ORDER:
+    kinds = [kind for kind in ORDER if (kind, support, "x") in stiffness]
+    ratios = {kind: stiffness[kind, support, "x"] / stiffness[kind, support, "y"] for kind in kinds}
+    for kind in kinds:
         result.checks.append(
             Check(CASE, "k_x / k_y", {**where, "kind": kind}, ratios[kind], "", RATIOS[kind], SOURCE)
         )
+    if len(kinds) < len(ORDER):
+        return
     lowest = float(all(ratios["straight"] < ratios[kind] for kind in ORDER[1:]))
     result.checks.append(Check(CASE, "straight is the least isotropic", where, lowest, "", 1.0, SOURCE))
     order = float(in_order(ratios))
@@ -177,6 +183,8 @@ NOTES = [
     "free: the sheet lies on three points as a rigid body and slides without friction. Supports and bar are smooth "
     "barriers that begin 0.05 mm before the surfaces meet. Where the sheet snaps, the curve goes on from the next "
     "stable state.",
+    "Free, the two point patterns lie on the flap beside their straight edge, which hangs 9 mm below the valleys, and "
+    "rock on it at 0.04 to 0.1 N/mm; those curves are left out.",
     "The stiffness is the slope between 20 and 70 % of the first peak, or of the largest load before three quarters of "
     "the depth.",
 ]
