@@ -18,8 +18,9 @@ LONGEST_MODULE, LONGEST_FUNCTION = 450, 80
 HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "distributed", "pymoo", "xarray", "h5py")
 
 DESCRIPTION = (
-    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.program", "bh.observables",
-    "bh.describe", "bh.advice", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state",
+    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.laws", "bh.ramps", "bh.plugins",
+    "bh.step_program", "bh.program", "bh.observables",
+    "bh.advice", "bh.describe", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state",
     "bh.formulations", "bh.refinement",
 )  # fmt: skip
 PATH = ("bh.path", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from meshes.errors import InputError
-from verification.cases import ALL_CASES, CASES, LONG_CASES, case
+from verification.cases import BY_NAME, CASES, LONG_CASES, case
 from verification.checks import RECORD, CaseResult, Context
 from verification.environment import environment
 
@@ -108,8 +108,8 @@ def _stored(file: Path) -> dict[str, Any]:
     try:
         old = json.loads(file.read_text(encoding="utf-8"))
         of_the_run = {key: old[key] for key in OF_A_RUN}
-        cases = [{**of_the_run, **dict(info)} for info in old["cases"] if info["name"] in ALL_CASES]
-        checks = [dict(check) for check in old["checks"] if check["case"] in ALL_CASES]
+        cases = [{**of_the_run, **dict(info)} for info in old["cases"] if info["name"] in BY_NAME]
+        checks = [dict(check) for check in old["checks"] if check["case"] in BY_NAME]
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return nothing
     summary = CaseResult("", "", "", "").summary()
@@ -124,16 +124,14 @@ def _stored(file: Path) -> dict[str, Any]:
 
 
 def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
-    """The new record with what the old one has of other cases, in the order of `ALL_CASES`."""
+    """The new record with what the old one has of other cases, in the order of the cases."""
     ran = {info["name"] for info in new["cases"]}
-    order = list(ALL_CASES).index
+    order = list(BY_NAME).index
     cases = [info for info in old["cases"] if info["name"] not in ran] + new["cases"]
     checks = [check for check in old["checks"] if check["case"] not in ran] + new["checks"]
     return {
         **new,
-        "checks": sorted(
-            checks, key=lambda check: order(check["case"]) if check["case"] in ALL_CASES else -1
-        ),
+        "checks": sorted(checks, key=lambda check: order(check["case"]) if check["case"] in BY_NAME else -1),
         "quick": any(info["quick"] for info in cases),
         "cases": sorted(cases, key=lambda info: order(info["name"])),
     }

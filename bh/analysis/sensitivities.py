@@ -29,11 +29,12 @@ from bh.errors import ModelError
 from bh.formulations import formulation
 from bh.model import Model
 from bh.path import Path
-from bh.program import crease_hinges, program
+from bh.program import program
 from bh.solvers.factor import Factor, IndefiniteError
 from bh.solvers.matrices import FreeBodyMatrix
 from bh.solvers.saddle import MultiplierMatrix
 from bh.state import State
+from bh.step_program import crease_hinges
 from bh.supports import directions, select
 from bh.threads import one_blas_thread
 

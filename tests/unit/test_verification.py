@@ -324,7 +324,7 @@ def bad_case(monkeypatch: pytest.MonkeyPatch) -> None:
     module = types.ModuleType("verification.bad_for_tests")
     module.run = disagreeing  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setitem(registry.ALL_CASES, "bad", module.__name__)
+    monkeypatch.setitem(registry.BY_NAME, "bad", registry.Study("bad_for_tests", "solver"))
 
 
 @pytest.mark.usefixtures("bad_case")
