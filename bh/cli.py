@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
+    "design": "Find a crease that reaches a point, follows a curve or moves its tip furthest.",
     "segments": "Make the data set of pinched segments for inverse design.",
     "sweep": "Solve a scene for many parameters into a labelled data set.",
     "verify": "Check the solvers against theory and published numbers.",
@@ -166,6 +167,14 @@ def view(
     vtu: Annotated[
         Path | None, typer.Option("--vtu", metavar="DIR", help="Write all states for ParaView; no window.")
     ] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option("--animation", metavar="FILE.gif", help="All states as .gif or .mp4; no window."),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option("--html", metavar="FILE.html", help="All states to turn in a browser; no window."),
+    ] = None,
     state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
 ) -> None:
     """Show a state of a solved path, or draw it to a file."""
@@ -184,7 +193,13 @@ def view(
     if picture is not None:
         bh.plotting.picture(solved[state], picture)
         typer.echo(f"wrote {picture}")
-    if picture is None and vtu is None:
+    if animation is not None:
+        typer.echo(f"wrote {bh.plotting.animation(solved, animation)}")
+    if html is not None:
+        import bh.interactive
+
+        typer.echo(f"wrote {bh.interactive.view(solved, title=path.name).save(html)}")
+    if picture is vtu is animation is html is None:
         try:
             bh.plotting.show(solved[state])
         except InputError as error:

@@ -13,7 +13,7 @@ from bh.laws import HELD, SHEET
 from bh.pinch_zone import Pinched
 from bh.supports import Constraints
 from meshes import SheetMesh
-from meshes.topology import Ints, dihedral_angles
+from meshes.topology import Ints
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,6 @@ class Ended:
     lam: float
     points: Array
     dihedral_angles: Array
-
-
-def stress_free_angles(mesh: SheetMesh) -> Array:
-    """(m,) dihedral angles of the mesh as it is made, rad: there springs are at rest before the first step."""
-    hinges = mesh.topology.hinges
-    return np.full(len(hinges), math.pi) if mesh.flat else dihedral_angles(mesh.points, hinges)
 
 
 def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:

@@ -64,6 +64,14 @@ STUDIES = (
     Study("speed_error", "solver", long=True),
     Study("honesty", "solver", long=True),
     Study("campaign", "solver", long=True),
+    Study("gradients", "solver"),
+    Study("top_down", "4"),
+    Study("bottom_up", "4"),
+    Study("three_point", "4"),
+    Study("forward", "6"),
+    Study("problem_a", "6"),
+    Study("problem_b", "6"),
+    Study("problem_c", "6", long=True),
 )
 BY_NAME = {study.name: study for study in STUDIES}
 ALL_CASES = tuple(BY_NAME)
