@@ -14,6 +14,12 @@ SINGLE: dict[str, type[Table]] = {
     "model": tables.ModelTable,
     "outputs": tables.OutputsTable,
 }
+NAMED = "^[^:]+:[^:]+$"  # module:name, of the user's own
+OWN = {
+    "type": "object",
+    "properties": {"kind": {"type": "string", "pattern": NAMED}},
+    "required": ["kind"],
+}
 MESHES: tuple[type[Table], ...] = (tables.MeshTable, tables.GmshTable, tables.DrawnTable)
 
 
@@ -27,10 +33,10 @@ def schema() -> dict[str, Any]:
     steps = {key: _one_or_more(_table(found, kind)) for key, kind in tables.ACTUATIONS.items()}
     steps["until"] = _table(found, tables.UntilTable)
     scene = {
-        "pattern": _any(found, patterns),
+        "pattern": {"anyOf": [*_any(found, patterns)["anyOf"], OWN]},
         **{name: _table(found, kind) for name, kind in SINGLE.items()},
         "mesh": _any(found, MESHES),
-        "supports": {"type": "array", "items": _table(found, tables.SupportTable)},
+        "supports": {"type": "array", "items": {"anyOf": [_table(found, tables.SupportTable), OWN]}},
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
         "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},
         "steps": {
@@ -39,6 +45,7 @@ def schema() -> dict[str, Any]:
             "items": {
                 "type": "object",
                 "properties": steps,
+                "patternProperties": {NAMED: {"type": ["object", "array"]}},
                 "additionalProperties": False,
                 "minProperties": 1,
             },

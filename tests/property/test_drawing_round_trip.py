@@ -143,6 +143,9 @@ def test_t_junctions_heal(seed: int, gap: float) -> None:
     pattern = pattern_of(heal(lines, gap), lines)
     assert [crease.fold for crease in pattern.creases] == ["mountain"] * 3
     assert len(pattern.rails) == 5
+    # the lines move, not the outline that they meet
+    rim = shapely.LinearRing(frame)
+    assert max(shapely.distance(rim, shapely.points(pattern.rings[0]))) < 1e-9
     mesh = meshes.unstructured(pattern, size=20.0)
     rim = set(mesh.topology.boundary.ravel().tolist())
     for crease in ("m1", "m2", "m3"):

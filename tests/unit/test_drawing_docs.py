@@ -144,6 +144,11 @@ class TestSchema:
         jsonschema.Draft202012Validator.check_schema(schema())
         assert set(schema()["properties"]) == set(SECTIONS)
 
+    def test_things_of_ones_own_are_allowed(self):
+        scene = read_toml((ROOT / "examples" / "wave.toml").read_text())
+        own = {"pattern": {"kind": "mine:fan", "blades": 5}, "steps": [{"mine:twist": {"by": 1.0}}]}
+        jsonschema.validate(scene | own | {"supports": [{"kind": "mine:grip", "at": "all"}]}, schema())
+
     @pytest.mark.parametrize(
         ("section", "value"),
         [
