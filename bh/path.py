@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from bh.describe import describe, rebuild
 from bh.formulations import Formulation, formulation
-from bh.halves import Half, Halves
 from bh.model import Model
 from bh.observables import until_of
 from bh.program import program
@@ -22,11 +21,12 @@ from bh.solvers.increments import ARC, LOAD, CriticalPoint
 from bh.state import State
 from bh.step_program import Ended, StepProgram, open_ends
 from bh.storage import CriticalRow, PathFile, StateRow, reading
-from bh.symmetry import Plane
 from meshes.mesh import count
 
 if TYPE_CHECKING:
     from bh.accuracy import Accuracy
+    from bh.halves import Half
+    from bh.symmetry import Plane
 
 Array = NDArray[np.float64]
 
@@ -87,9 +87,11 @@ class Path:
         self.accuracy: Accuracy | None = None
         self._formulation: Formulation = formulation(model.formulation)
         self._programs: tuple[StepProgram, ...] = program(model)
-        self._halves = (
-            None if symmetry is None else Halves(self._formulation, model, self._programs, symmetry)
-        )
+        self._halves = None
+        if symmetry is not None:
+            from bh.halves import Halves
+
+            self._halves = Halves(self._formulation, model, self._programs, symmetry)
         self._systems: dict[int, Any] = {}
         self._states: dict[int, State] = {}
 

@@ -6,21 +6,24 @@ import time
 from collections.abc import Callable
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 from bh.describe import fingerprint
 from bh.errors import ModelError, PathFileError
-from bh.halves import Half
 from bh.model import Model
 from bh.observables import until_of
 from bh.path import Path, Record, StepOutcome, new_file
 from bh.progress import ProgressMeter, meter
-from bh.refinement import Goal
 from bh.solvers.automatic import Automatic
 from bh.solvers.increments import LOAD, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.storage import PathFile
-from bh.symmetry import Plane
 from bh.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    from bh.halves import Half
+    from bh.refinement import Goal
+    from bh.symmetry import Plane
 
 
 def trace(
@@ -66,7 +69,7 @@ def trace(
             raise ModelError(
                 "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
             )
-        from bh.accuracy import solve
+        from bh.accuracy import Goal, solve
 
         goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
         path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)

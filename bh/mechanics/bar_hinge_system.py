@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from bh.mechanics.assembly import (
 from bh.mechanics.bar_hinge_design import BarHingeDesign
 from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
-from bh.mechanics.mirrored import half_elements, half_program, pattern_nodes
 from bh.mechanics.supported import SupportedSheet
 from bh.model import Model
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
@@ -27,8 +27,10 @@ from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import State
 from bh.step_program import StepProgram
-from bh.symmetry import Mirror
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.symmetry import Mirror
 
 Array = NDArray[np.float64]
 COMPLIANCE = 1e-9  # of a held crease, in parts of 1 / gamma
@@ -57,6 +59,8 @@ class BarsAndHingesSystem(SupportedSheet):
         moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
         self.elements = sheet_elements(model, program, held_start, moments)
         if plane is not None:
+            from bh.mechanics.mirrored import half_elements, half_program
+
             self.elements = half_elements(self.elements, plane)
             program, moments = half_program(program, plane), plane.hinge_weight * moments
         super().__init__(model, program, start, plane)
@@ -260,7 +264,7 @@ class BarsAndHingesSystem(SupportedSheet):
             groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
         if self.touching is not None:
             groups += (self.mesh.triangles,)
-        number, groups = pattern_nodes(self.displacements, groups)
+        number, groups = self.displacements.pattern_nodes(groups)
         return build_pattern(number, groups, self.reference)
 
     @cached_property

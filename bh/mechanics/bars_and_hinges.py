@@ -6,6 +6,8 @@ angle is imposed exactly is a hinge with a multiplier (its moment), in augmented
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,8 +17,10 @@ from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
 from bh.state import Energy, State
 from bh.step_program import StepProgram
-from bh.symmetry import Mirror
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.symmetry import Mirror
 
 Array = NDArray[np.float64]
 

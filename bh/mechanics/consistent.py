@@ -7,6 +7,8 @@ between the triangle and the sheet's tangent plane at its edges. docs/formulatio
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +20,9 @@ from bh.model import Model
 from bh.refinement import Refinement
 from bh.state import Energy, State
 from bh.step_program import StepProgram
-from bh.symmetry import Mirror
+
+if TYPE_CHECKING:
+    from bh.symmetry import Mirror
 
 Array = NDArray[np.float64]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.laws import HELD, SHEET, SPRING
-from bh.mechanics.consistent_half import half_consistent, half_patches
 from bh.mechanics.consistent_kernels import TURN
 from bh.mechanics.consistent_patches import (
     Patches,
@@ -25,9 +25,11 @@ from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffn
 from bh.model import Model
 from bh.solvers.matrices import reverse_cuthill_mckee
 from bh.step_program import StepProgram
-from bh.symmetry import Mirror
 from meshes import SheetMesh
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.symmetry import Mirror
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -102,6 +104,8 @@ def consistent_elements(
     part = None if plane is None else plane.triangle_weight
     joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part)
     if plane is not None:
+        from bh.mechanics.consistent_half import half_consistent, half_patches
+
         joined = half_patches(joined, spring, plane)
     rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
     quad, ghost = _quads(mesh, joined)

@@ -10,7 +10,6 @@ from numba import njit
 from bh.mechanics.consistent_elements import ConsistentElements
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.kinematics import OPTIONS
-from bh.mechanics.mirrored import pattern_nodes
 from bh.mechanics.pattern import Pattern, build_pattern
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -24,7 +23,7 @@ def rotation_pattern(
     Rotations are numbered after the displacements. To the order of the unknowns
     every rotation is a node of its own, in the middle of its edge, with a single unknown.
     """
-    number, _ = pattern_nodes(displacements, ())
+    number, _ = displacements.pattern_nodes(())
     n, moving = len(number), int(number.max()) + 1
     none = n + e.rotations
     table = np.full((none + 1, 3), -1, dtype=np.int64)
@@ -44,7 +43,7 @@ def rotation_pattern(
     groups: tuple[Ints, ...] = (e.triangles, patches, springs, hinges)
     if ground is not None:
         groups += (mesh.triangles[[ground]],)
-    pattern = build_pattern(table, pattern_nodes(displacements, groups)[1], places)
+    pattern = build_pattern(table, displacements.pattern_nodes(groups)[1], places)
     triangles, wide, wide_springs, *rest = pattern.slots
     # of a rotation's three rows there only the first exists
     rows = np.zeros((len(patches), int(e.width.max())), dtype=np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +17,6 @@ from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent_pattern import rotation_pattern
 from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
-from bh.mechanics.mirrored import half_program
 from bh.mechanics.pattern import Pattern
 from bh.mechanics.supported import SupportedSheet
 from bh.model import Model
@@ -25,8 +24,10 @@ from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation
 from bh.state import State
 from bh.step_program import StepProgram
-from bh.symmetry import Mirror
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.symmetry import Mirror
 
 Array = NDArray[np.float64]
 ROUNDING = 8.0 * np.finfo(float).eps
@@ -68,7 +69,12 @@ class ConsistentSystem(SupportedSheet):
     def __init__(
         self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
     ) -> None:
-        super().__init__(model, program if plane is None else half_program(program, plane), start, plane)
+        of_half = program
+        if plane is not None:
+            from bh.mechanics.mirrored import half_program
+
+            of_half = half_program(program, plane)
+        super().__init__(model, of_half, start, plane)
         mesh = self.mesh
         self.hinges = hinges = mesh.topology.hinges
         start_points = mesh.points if start is None else start.points

@@ -56,6 +56,10 @@ class Displacements:
         """(k,) unknowns of node positions x (n, 3)."""
         return np.asarray(self.to_local(x - self.reference).ravel()[self.free])
 
+    def pattern_nodes(self, groups: tuple[Ints, ...]) -> tuple[Ints, tuple[Ints, ...]]:
+        """Numbers of the unknowns (n, 3) and nodes of elements, as a pattern takes them."""
+        return self.number, groups
+
     def positions(self, u: Array, lam: float) -> Array:
         """(n, 3) node positions, mm, for unknowns u (k,)."""
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end

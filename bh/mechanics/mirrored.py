@@ -49,6 +49,13 @@ class MirroredDisplacements(Displacements):
         self._turned_kept = np.flatnonzero(self.constraints.frame_of[self._kept] >= 0)
         self._axes_kept = self.constraints.frames[self.constraints.frame_of[self._kept[self._turned_kept]]]
 
+    def pattern_nodes(self, groups: tuple[Ints, ...]) -> tuple[Ints, tuple[Ints, ...]]:
+        """Images stand for their originals; beyond the nodes of the mesh there may be more, all their own."""
+        n = len(self.original)
+        return self.own, tuple(
+            np.where(group < n, self.original[np.minimum(group, n - 1)], group) for group in groups
+        )
+
     def positions(self, u: Array, lam: float) -> Array:
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
         local.ravel()[self.free] = u
@@ -144,16 +151,3 @@ def half_elements(e: Elements, plane: Mirror) -> Elements:
         spring=int(keep[e.bending : e.bending + e.spring].sum()), held=int(held.sum()),
         penalty=(weight[len(e.source) - e.held :] * e.penalty)[held],
     )  # fmt: skip
-
-
-def pattern_nodes(displacements: Displacements, groups: tuple[Ints, ...]) -> tuple[Ints, tuple[Ints, ...]]:
-    """Numbers of the unknowns and nodes of elements as a pattern takes them: images stand for their originals."""
-    if not isinstance(displacements, MirroredDisplacements):
-        return displacements.number, groups
-    nodes, n = (
-        displacements.original,
-        len(displacements.original),
-    )  # beyond the nodes there may be more, all their own
-    return displacements.own, tuple(
-        np.where(group < n, nodes[np.minimum(group, n - 1)], group) for group in groups
-    )

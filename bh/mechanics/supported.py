@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,6 @@ from bh.laws import HELD
 from bh.mechanics import closing
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.kinematics import dihedral_angles
-from bh.mechanics.mirrored import MirroredDisplacements
 from bh.mechanics.motions import describe_motion
 from bh.mechanics.touching import Touching
 from bh.model import Model
@@ -19,7 +18,9 @@ from bh.solvers.system import System, grows_ahead
 from bh.state import State
 from bh.step_program import StepProgram
 from bh.supports import TURNED
-from bh.symmetry import Mirror
+
+if TYPE_CHECKING:
+    from bh.symmetry import Mirror
 
 Array = NDArray[np.float64]
 
@@ -39,11 +40,12 @@ class SupportedSheet:
         self.program = program
         self.force = program.force
         start_points = self.mesh.points if start is None else start.points
-        self.displacements = (
-            Displacements(self.mesh, program.constraints, start_points)
-            if plane is None
-            else MirroredDisplacements(self.mesh, program.constraints, start_points, plane)
-        )
+        if plane is None:
+            self.displacements = Displacements(self.mesh, program.constraints, start_points)
+        else:
+            from bh.mechanics.mirrored import MirroredDisplacements
+
+            self.displacements = MirroredDisplacements(self.mesh, program.constraints, start_points, plane)
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
         if self.constraints.rigid_body:
