@@ -14,7 +14,7 @@ from reports.build import one_page
 from reports.figures import ReportError
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
-SECONDS = 180
+SECONDS = 300
 
 
 def browser() -> str | None:

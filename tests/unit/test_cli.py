@@ -442,6 +442,12 @@ def test_view(here, drawn, capsys):
     assert drawn == [("show", 1.0), ("picture", 0.0, Path("flat.png")), ("series", "series")]
     assert main(["view", "out", "--state", "99"]) == 2
     assert "--state 99: 'out/path.bh' has the states 0 to" in capsys.readouterr().err
+    assert main(["view", "out", "--html", "sheet.html"]) == 0
+    assert f"wrote {Path('sheet.html').resolve()}" in capsys.readouterr().out.replace("\n", "")
+    assert '<div class="sheet3d"' in Path("sheet.html").read_text(encoding="utf-8")
+    assert main(["view", "out", "--animation", "folding.avi"]) == 2
+    assert "neither .gif nor .mp4" in capsys.readouterr().err
+    assert len(drawn) == 3  # no window was opened for these
 
 
 # --- the command itself ------------------------------------------------------------------------------------------
