@@ -34,9 +34,7 @@ def sweep(
     chunk: Annotated[int, typer.Option("--chunk", min=1, help="Points a worker does in one go.")] = 1,
     warm: Annotated[
         bool,
-        typer.Option(
-            "--warm", help="Begin at neighbours' states along the last axis, where checked to be the same."
-        ),
+        typer.Option("--warm", help="Begin at neighbours' states along the last axis, checked."),
     ] = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the points that are finished.")

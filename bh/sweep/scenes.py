@@ -34,7 +34,7 @@ class SceneTask:
         keys: for every parameter the keys of the scene that take its value, such as "steps[0].fold.to".
         places: whose node positions are measured, such as "corner:inner-end".
         shape: also measure the positions of all nodes.
-        warm: points that come together are a line along one axis, and may begin at each other's states (`bh.sweep.warm`).
+        warm: points that come together are a line along one axis and may begin at each other's states: `bh.sweep.warm`.
     """
 
     text: str
