@@ -42,7 +42,7 @@ def run(context: Context) -> CaseResult:
             curve=name,
         )
         began = time.perf_counter()
-        found = fit_curve(target, most, Polished(Genetic(80, 40)))
+        found = fit_curve(target, most, Polished(Genetic(60, 20)))
         errors[name] = [float(f.value) for _, f in found]
         best[name] = found
         for n, value in enumerate(errors[name], 1):

@@ -16,6 +16,7 @@ import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,6 +72,7 @@ def run(
     attributes: Mapping[str, Any] | None = None,
     chunk: int = 1,
     retries: int = 2,
+    warm: bool = False,
 ) -> Dataset:
     """Run a task at every point and write the data set `file` (netCDF-4).
 
@@ -87,11 +89,17 @@ def run(
         attributes: to be written to the data set beside its provenance.
         chunk: points a worker does in one go; more than one where points take milliseconds on far machines.
         retries: see `bh.sweep.runner.run`.
+        warm: of a scene on a grid: each line along the last axis is one task, whose points begin at their neighbours'
+            states where that is checked to give the same (`bh.sweep.warm`); bits are equal among warm runs only.
 
     Raises:
         SweepError: bad input, a place that cannot be written, workers that are gone; what is finished is kept.
     """
     file = Path(file)
+    if warm:
+        if not isinstance(task, SceneTask) or not points.grid:
+            raise SweepError("warm starts need a scene and a grid; leave warm out")
+        task, chunk = replace(task, warm=True), len(points.values[-1])
     began = time.time()
     meta = _meta(task, points, labels, attributes, began)
     if resume and file.is_file() and not _journal(file).is_file():
@@ -106,7 +114,15 @@ def run(
     meter = (Bar() if progress else Silent()) if isinstance(progress, bool) else progress
     with closing(journal):
         done = journal.done()
-        todo = runner.jobs([i for i in range(len(points)) if i not in done], chunk)
+        if warm:  # lines are whole or not there: a task is one transaction
+            lines = range(0, len(points), chunk)
+            todo = [
+                runner.Job(tuple(range(i, i + chunk)))
+                for i in lines
+                if not done.issuperset(range(i, i + chunk))
+            ]
+        else:
+            todo = runner.jobs([i for i in range(len(points)) if i not in done], chunk)
         if todo:
             workers, ours = _pool(pool)
             try:

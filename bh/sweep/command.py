@@ -32,6 +32,10 @@ def sweep(
         typer.Option("--dask-workers", min=1, help="Start a local Dask cluster of so many processes."),
     ] = None,
     chunk: Annotated[int, typer.Option("--chunk", min=1, help="Points a worker does in one go.")] = 1,
+    warm: Annotated[
+        bool,
+        typer.Option("--warm", help="Begin at neighbours' states along the last axis, checked."),
+    ] = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the points that are finished.")
     ] = False,
@@ -51,7 +55,7 @@ def sweep(
         with closing(pool) if isinstance(pool, bh.sweep.Dask) else _nothing():
             data = bh.sweep.run(
                 asked.task, asked.points, place, pool=pool, resume=resume, progress=not quiet,
-                labels=asked.labels, chunk=chunk,
+                labels=asked.labels, chunk=chunk, warm=warm,
             )  # fmt: skip
     except KeyboardInterrupt:
         again = shlex.join(["bh", "sweep", str(file), "-o", str(place), "--resume"])

@@ -6,7 +6,7 @@ import copy
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ class SceneTask:
         keys: for every parameter the keys of the scene that take its value, such as "steps[0].fold.to".
         places: whose node positions are measured, such as "corner:inner-end".
         shape: also measure the positions of all nodes.
+        warm: points that come together are a line along one axis and may begin at each other's states: `bh.sweep.warm`.
     """
 
     text: str
@@ -41,6 +42,7 @@ class SceneTask:
     folder: Path = Path()
     places: tuple[str, ...] = ()
     shape: bool = False
+    warm: bool = False
     labels: Mapping[str, Label] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -52,7 +54,13 @@ class SceneTask:
     @property
     def identity(self) -> str:
         """Of scene, keys and measures; SHA-256."""
-        data = {"text": self.text, "keys": dict(self.keys), "places": self.places, "shape": self.shape}
+        data = {
+            "text": self.text,
+            "keys": dict(self.keys),
+            "places": self.places,
+            "shape": self.shape,
+            "warm": self.warm,
+        }
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
     def scene(self, parameters: Mapping[str, Value]) -> Scene:
@@ -69,11 +77,28 @@ class SceneTask:
         return scene_from_tables(tables, self.folder)
 
     def __call__(self, parameters: Mapping[str, Value]) -> Measured:
-        path = trace(self.scene(parameters).model)
+        scene = self.scene(parameters)
+        path = trace(scene.model, accuracy=scene.accuracy)
         if path.outcome != "reached":
             where = f"step {len(path.steps)}, lambda {path.records[-1].lam:.6g}"
             return Measured({}, path.outcome, f"{where}: {path.reason}")
         return Measured(self.measure(path))
+
+    def line(self, points: Sequence[Mapping[str, Value]]) -> list[Measured] | None:
+        """All points of a line by warm starts, or None where one of them cannot be or is not reached."""
+        if not self.warm:
+            return None
+        from bh.sweep.warm import line
+
+        try:
+            scenes = [self.scene(parameters) for parameters in points]
+            if any(scene.accuracy is not None for scene in scenes):  # meshes are chosen point by point
+                return None
+            paths = line([scene.model for scene in scenes])
+        except InputError:
+            return None
+        reached = all(path.outcome == "reached" for path in paths)
+        return [Measured(self.measure(path)) for path in paths] if reached else None
 
     def measure(self, path: Trace) -> dict[str, Any]:
         """Energies in N mm, dihedral angles of the creases in rad, positions in mm, and what it took."""

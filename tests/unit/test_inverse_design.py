@@ -242,3 +242,33 @@ def test_projected_rule_is_the_sources() -> None:
     k0, length = np.array([[0.01, 0.01, 0.01]]), np.array([[200.0, 200.0, 200.0]])
     assert rule.measure(shipped(), k0, length, np.zeros((1, 3), dtype=bool)).tolist() == [1.0]
     assert rule.measure(shipped(), 0.2 * k0, length, np.zeros((1, 3), dtype=bool)).tolist() == [0.0]
+
+
+def test_shorter_creases_miss_by_more() -> None:
+    """A front: longer the nearer, allowed by the rules, and shorter than what reaches the point without asking."""
+    from bh.applications.inverse.pareto import pareto
+
+    target = (60.0, 60.0, 10.0)
+    front = pareto(target, allowances=(0.1, 10.0), most=3, starts=6)
+    missed, total = ([getattr(trade, name) for trade in front] for name in ("missed", "total"))
+    assert len(front) > 1
+    assert missed == sorted(missed)
+    assert total == sorted(total, reverse=True)
+    assert missed[0] <= 0.11
+    assert total[0] < 0.8 * Reach(verify=False)(target).design.total
+    for trade in front:
+        end = shipped().forward(*trade.design.lists())[0][-1]
+        assert np.linalg.norm(end - target) == pytest.approx(trade.missed, abs=1e-9)
+    with pytest.raises(DesignError, match="allow more"):
+        pareto((900.0, 0.0, 0.0), most=1)
+
+
+def test_python_of_the_page_runs() -> None:
+    """docs/inverse_design.md, without the picture at its end."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "inverse_design.md").read_text(encoding="utf-8")
+    block = page.split("```python\n")[1].split("```")[0]
+    lines = [row for row in block.splitlines() if ".plot()" not in row]
+    assert len(lines) <= 10
+    names: dict[str, object] = {}
+    exec("\n".join(lines), names)
+    assert names["found"].missed_simulated <= 1.0  # type: ignore[attr-defined]

@@ -9,7 +9,7 @@ import sqlite3
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -365,3 +365,44 @@ def test_progress_tells_rate_and_time_left() -> None:
         "3 h 5 min",
         "2 d 4 h",
     ]
+
+
+# --- warm starts --------------------------------------------------------------------------------------------
+
+
+def pinching(angles: Sequence[float]) -> tuple[Any, Any]:
+    """A folded sector whose end angle is swept in small steps, on two widths."""
+    keys = {"width": "pattern.width", "angle": "steps[0].fold.to"}
+    task = bh.sweep.scene(EXAMPLES / "appendix_b_a.toml", keys, places=["corner:inner-end"])
+    return task, bh.sweep.grid({"width": [9.0, 10.0], "angle": list(angles)})
+
+
+def test_warm_starts_give_the_same_states(tmp_path: Path) -> None:
+    """To a millionth of the sheet, in fewer iterations, and the same bits with other workers."""
+    task, points = pinching(np.linspace(1.8, 1.5, 7))
+    cold = bh.sweep.run(task, points, tmp_path / "cold.nc", pool=0)
+    warm = bh.sweep.run(task, points, tmp_path / "warm.nc", pool=0, warm=True)
+    assert (warm["outcome"] == "reached").all()
+    assert int(warm["iterations"].sum()) < 0.6 * int(cold["iterations"].sum())
+    place = "points_corner_inner_end"
+    assert np.abs(warm[place].values - cold[place].values).max() < 1e-4
+    np.testing.assert_allclose(warm["energy_total"], cold["energy_total"], rtol=1e-7)
+    assert same(warm, bh.sweep.run(task, points, tmp_path / "two.nc", pool=2, warm=True))
+
+
+def test_warm_starts_are_given_up_where_states_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A line whose check fails is that of cold starts to the last bit."""
+    from bh.sweep import warm
+
+    task, points = pinching([1.8, 1.7, 1.6])
+    models = [task.scene(points[i]).model for i in range(3)]
+    monkeypatch.setattr(warm, "same", lambda *_: False)
+    from bh.tracing import trace
+
+    for path, model in zip(warm.line(models), models, strict=True):
+        assert path[-1].points.tobytes() == trace(model)[-1].points.tobytes()
+
+
+def test_warm_starts_need_a_scene(tmp_path: Path, tasks: Any) -> None:
+    with pytest.raises(bh.sweep.SweepError, match="need a scene and a grid"):
+        bh.sweep.run(tasks.waves, GRID, tmp_path / "w.nc", pool=0, warm=True)

@@ -45,15 +45,32 @@ def fit_curve(
         task = replace(base, n=n)
         none: Bools = np.zeros(0, dtype=bool)
         top = optimiser.minimise(task, seed + n)
-        for start in _cut(found[-1][1].x) if found else []:
-            other = polish(task, start, none)
-            top = other if other.better(top) else top
+        starts = [top.x, *(_cut(found[-1][1].x) if found else ())]
+        for start in starts:
+            smooth = polish(_Squares(task), start, none)
+            for other in (polish(task, smooth.x, none), polish(task, start, none)):
+                top = other if other.better(top) else top
         found.append((task, top))
     return found
 
 
+class _Squares:
+    """The same fit by the mean of squares: smooth where the mean of distances has kinks, so a better way down."""
+
+    def __init__(self, problem: FitCurve) -> None:
+        self.problem, self.lower, self.upper, self.switches = problem, problem.lower, problem.upper, 0
+
+    def residuals(self, x: Array, on: Bools) -> Array:
+        """(N, 2 samples), over the length of the curve."""
+        apart = self.problem.points(x) - self.problem.goal
+        return np.asarray(apart.reshape(len(x), -1) / self.problem.size)
+
+    def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:
+        return (self.residuals(x, on) ** 2).sum(axis=1), np.zeros(len(x))
+
+
 def _cut(x: Array) -> Iterator[Array]:
-    """Variables of `FitCurve` with one of the segments cut in two, at its middle and near its ends."""
+    """Variables of `FitCurve` with one of the segments cut in two, at its middle or near an end."""
     theta, length = np.split(x, 2)
     for i in range(len(theta)):
         for part in (0.5, 0.1, 0.9):

@@ -1,0 +1,94 @@
+"""Warm starts: the state of a point from that of its neighbour along one axis, where that is checked to be the same.
+
+A line of points along the axis is one task, always solved in the same order, so that results do not depend on
+workers. Its first point is solved cold. A further one begins at the state of the one before, at the end of its last
+step, if the models differ in that step's targets alone. The second and the last point of a line are solved cold as
+well: where a state differs, or warm takes as many iterations, the whole line is solved cold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bh.describe import fingerprint
+from bh.model import Model
+from bh.path import Path, Record, StepOutcome
+from bh.solvers.continuation import LoadControl
+from bh.threads import one_blas_thread
+from bh.tracing import trace
+
+SAME = 1e-6  # of the sheet's size: states this near each other are one
+
+
+def line(models: Sequence[Model]) -> list[Path]:
+    """Paths of models in order, each begun at the one before where that is worth it and gives the same states."""
+    cold = {0: trace(models[0])}
+    paths = list(_warm(models, cold[0]))
+    checked = [i for i in (1, len(models) - 1) if i < len(paths) and len(paths) == len(models)]
+    for i in checked:
+        cold[i] = trace(models[i])
+        if not same(paths[i], cold[i]) or paths[i].iterations >= cold[i].iterations:
+            checked = []
+            break
+    if not checked and len(models) > 1:
+        return [cold[i] if i in cold else trace(model) for i, model in enumerate(models)]
+    return paths
+
+
+def same(one: Path, other: Path) -> bool:
+    """Do two paths end in one state?"""
+    if one.outcome != "reached" or other.outcome != "reached":
+        return False
+    apart = np.abs(one[-1].points - other[-1].points).max()
+    return bool(apart <= SAME * one.model.mesh.size)
+
+
+def _warm(models: Sequence[Model], first: Path) -> Iterator[Path]:
+    """Paths as far as warm starts go; the first one is given."""
+    yield first
+    before = first
+    for model in models[1:]:
+        found = step_over(before, model)
+        if found is None:
+            return
+        yield found
+        before = found
+
+
+def step_over(before: Path, model: Model) -> Path | None:
+    """The path of a model from the last state of a neighbour's, or None where that cannot be or does not converge.
+
+    The earlier steps are the neighbour's own; of the last step there is its end alone.
+    """
+    last = len(model.steps) - 1
+    if before.outcome != "reached" or not _alike(before.model, model):
+        return None
+    path = Path(model)
+    path.records = [record for record in before.records if record.step < last]
+    path.steps = list(before.steps[:last])
+    system = path._system(last)
+    old, record = before.solved()
+    if len(record.q) != system.size:
+        return None
+    newton = LoadControl().newton
+    with one_blas_thread():
+        forces = old.evaluate(record.q, 1.0).forces
+        found = newton.solve(system, record.q, 1.0, forces)
+    if not found.converged or not found.stable or system.objection(record.q, 1.0, found.q, 1.0):
+        return None
+    record = Record(
+        last, 1.0, found.q, found.iterations, found.evaluation.imbalance, 0.0, record.next_increment,
+        negative=found.negative, note="from a neighbouring point",
+    )  # fmt: skip
+    path.records.append(record)
+    path.steps.append(StepOutcome("reached"))
+    return path
+
+
+def _alike(one: Model, other: Model) -> bool:
+    """Do two models differ in their last step alone?"""
+    shorter = (replace(model, steps=model.steps[:-1]) for model in (one, other))
+    return len(one.steps) == len(other.steps) and len({fingerprint(model) for model in shorter}) == 1
