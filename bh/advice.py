@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bh.actuation import Displace, Force
+from bh.actuation import Displace, Force, Pinch
 
 if TYPE_CHECKING:
     from bh.model import Model
@@ -24,7 +24,8 @@ BEST = (5.0, 12.0)  # aspect ratios of cells
 class Remark:
     """One line of `text` for people, and its `code` for programs.
 
-    Codes are "aspect-ratio", "diagonals", "rows", "rulings", "loads" and "drawing" (what was read into a drawing).
+    Codes are "aspect-ratio", "diagonals", "rows", "rulings", "loads", "pinch" and "drawing" (what was read into a
+    drawing).
     """
 
     code: str
@@ -38,6 +39,7 @@ def remarks(model: Model) -> tuple[Remark, ...]:
     """What to know about the mesh of a model with its formulation; empty where there is nothing to say."""
     if model.formulation == "bars-and-hinges":
         found = [_aspect_ratio(model), _diagonals(model), _rows(model), _rulings(model), _twisted(model)]
+        found.append(_pinched(model))
     elif model.formulation == "consistent":
         found = [_stretched(model)]
     else:
@@ -110,6 +112,16 @@ def _twisted(model: Model) -> Remark | None:
         "loads",
         f"bars and hinges are too stiff in torsion{how} and in bending within the plane (2.95 times with one row); "
         'where a load twists or pulls the sheet use formulation = "consistent"',
+    )
+
+
+def _pinched(model: Model) -> Remark | None:
+    if not any(isinstance(item, Pinch) for step in model.steps for item in step):
+        return None
+    return Remark(
+        "pinch",
+        "a pinch twists the panels beside it, in which bars and hinges are far too stiff (80 times the energy of the "
+        'shell, docs/pinching.md): use formulation = "consistent" if its numbers matter',
     )
 
 

@@ -24,10 +24,13 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
 PAGES = {
-    "Use": ("installation", "scenes", "plots", "report"),
-    "Studies": ("stiffness", "scan", "performance"),
-    "How it works": ("formulation", "fem", "solver", "decisions"),
-}
+    "Use": ("installation", "drawing", "scenes", "plots", "report"),
+    "Studies": (
+        "stiffness", "corrugations", "pinching", "inverse_design", "isometric", "sensitivities", "scaling", "scan",
+        "performance",
+    ),
+    "How it works": ("architecture", "extending", "formulation", "fem", "solver", "decisions"),
+}  # fmt: skip
 # packages whose __all__ is public, and modules that are public as a whole
 PUBLIC = ("bh", "meshes")
 MODULES = (

@@ -6,11 +6,14 @@ import json
 import re
 import shlex
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
 import pytest
 
+import bh
+import meshes
 from bh.advice import remarks
 from bh.check import report
 from bh.cli import main
@@ -238,3 +241,12 @@ class TestRemarks:
         path = bh.trace(scene.model, file=here / "path.bh")
         assert bh.Path.load(here / "path.bh").remarks == path.remarks
         assert any("boundary" in r for r in path.remarks)
+
+
+def test_a_pinch_by_bars_and_hinges_is_told() -> None:
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.8), aspect_ratio=8)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127)).fold("crease", rest=1.6, Lstar=25.0)
+    assert "pinch" not in [remark.code for remark in remarks(model)]
+    pinched = model.pinch("crease")
+    assert "pinch" in [remark.code for remark in remarks(pinched)]
+    assert remarks(replace(pinched, formulation="consistent")) == ()
