@@ -15,6 +15,7 @@ SINGLE: dict[str, type[Table]] = {
     "outputs": tables.OutputsTable,
 }
 NAMED = "^[^:]+:[^:]+$"  # module:name, of the user's own
+VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
 OWN = {
     "type": "object",
     "properties": {"kind": {"type": "string", "pattern": NAMED}},
@@ -38,6 +39,7 @@ def schema() -> dict[str, Any]:
         "mesh": _any(found, MESHES),
         "supports": {"type": "array", "items": {"anyOf": [_table(found, tables.SupportTable), OWN]}},
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
+        "symmetry": {"anyOf": [{"enum": ["x", "y"]}, VECTOR]},
         "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},
         "steps": {
             "type": "array",

@@ -15,7 +15,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 HOUSE = ("meshes", "bh", "fem", "verification", "reports")
 LONGEST_MODULE, LONGEST_FUNCTION = 450, 80
-HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "distributed", "pymoo", "xarray", "h5py")
+HEAVY = (
+    "gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "distributed", "pymoo", "xarray", "h5py",
+    "svgelements", "ezdxf", "trimesh",
+)  # fmt: skip
 
 DESCRIPTION = (
     "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.laws", "bh.ramps", "bh.plugins",
