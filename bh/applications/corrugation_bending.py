@@ -182,9 +182,9 @@ def second_stage(
     """Slope (N/mm) and R^2 of a line through the second stage of a curve, its ends (mm) and the first peak (N).
 
     The stage goes from 20 to 70 % of the first peak of the load, behind which the load drops by 15 %, or of the largest
-    load before the displacement `reach` (mm) if there is none (peaks below half of that do not count): the bar has found
-    its mountains and no crease has flattened yet. The line is fitted to 101 points evenly spaced along the curve, as a
-    test stand samples it.
+    load before the displacement `reach` (mm) if there is none (peaks below half of that do not count): the bar has
+    found its mountains and no crease has flattened yet. The line is fitted to 101 points evenly spaced along the curve,
+    as a test stand samples it.
     """
     if x[-1] > reach:
         x, y = np.append(x[x < reach], reach), np.append(y[x < reach], np.interp(reach, x, y))
