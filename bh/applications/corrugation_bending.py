@@ -106,8 +106,6 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     along = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     across = np.array([-along[1], along[0], 0.0])
     points = settle(folded, along, across, rig.span, rig.offset)
-    slope, height = lid(folded, points, along, across, 0.5 * rig.bar)
-    slope, height = (0.0, _highest(folded, points, across, 0.5 * rig.bar)) if rig.level else (slope, height)
     half = 0.5 * rig.span + 0.5 * SUPPORT
     depth = 5.0 + rig.gap
 
@@ -123,33 +121,29 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     items: list[Bar | Tether] = [
         bar("left", -half, -depth, SUPPORT),
         bar("right", half, -depth, SUPPORT),
-        bar("bar", 0.0, height + depth, rig.bar, rig.travel, math.atan(slope)),
         Tether("all", (CRADLE, CRADLE, CRADLE)),
     ]
     start = moved_to(folded.path, points)
-    model = start.model
     if rig.tape > 0.0:
         valleys = crease_nodes(folded.mesh, "valley")
         taped = valleys[np.abs(points[valleys] @ across) >= 0.5 * rig.span].tolist()
         if not taped:
             raise ModelError("no valley crease lies over the supports, where tape could hold it")
         items.append(Tether(taped, (rig.tape, rig.tape, 0.0)))
-        # the bar out of the way while the sheet is taped
-        still = [
-            replace(
-                item,
-                by=(0.0, 0.0, 0.0),
-                at=(item.at[0], item.at[1], item.at[2] + rig.travel * (item.name == "bar")),
-            )
-            if isinstance(item, Bar)
-            else item
-            for item in items
-        ]
-        model = model.step(*still, Displace(taped, "z", 0.0))  # flat sheets lie in z = 0, as the supports do
+        # flat sheets lie in z = 0, as the supports do
+        down = start.model.step(*items, Displace(taped, "z", 0.0))
+        start = trace(down, after=start, strategy=LoadControl(work_mismatch=math.inf))
+        if start.outcome != "reached":
+            raise ModelError(f"the corrugation cannot be taped down ({start.outcome}: {start.reason})")
+        points = start[-1].points
+    slope, height = lid(folded, points, along, across, 0.5 * rig.bar)
+    if rig.level:
+        slope, height = 0.0, float(_under(folded, points, across, 0.5 * rig.bar)[:, 2].max())
+    items.append(bar("bar", 0.0, height + depth, rig.bar, rig.travel, math.atan(slope)))
     # as on a test stand: where the sheet snaps it goes to the next stable state, and the bar goes on
     first, largest = min(0.1, 0.2 * rig.largest) / rig.travel, rig.largest / rig.travel
     snapping = LoadControl(first=first, largest=largest, work_mismatch=math.inf, smallest=1e-4)
-    path = trace(model.step(*items), after=start, strategy=snapping)
+    path = trace(start.model.step(*items), after=start, strategy=snapping)
     return _evaluate(path, azimuth, rig)
 
 
@@ -188,13 +182,15 @@ def second_stage(
     """Slope (N/mm) and R^2 of a line through the second stage of a curve, its ends (mm) and the first peak (N).
 
     The stage goes from 20 to 70 % of the first peak of the load, behind which the load drops by 15 %, or of the largest
-    load before the displacement `reach` (mm) if there is none: the bar has found its mountains and no crease has
-    flattened yet. The line is fitted to 101 points evenly spaced along the curve, as a test stand samples it.
+    load before the displacement `reach` (mm) if there is none (peaks below half of that do not count): the bar has
+    found its mountains and no crease has flattened yet. The line is fitted to 101 points evenly spaced along the curve,
+    as a test stand samples it.
     """
     if x[-1] > reach:
         x, y = np.append(x[x < reach], reach), np.append(y[x < reach], np.interp(reach, x, y))
     highest = np.maximum.accumulate(y)
-    fallen = np.flatnonzero(y < (1.0 - DROP) * highest)
+    # a smaller peak is the sheet that settles on its supports
+    fallen = np.flatnonzero((y < (1.0 - DROP) * highest) & (highest >= 0.5 * y.max()))
     top = int(np.argmax(y[: fallen[0] + 1] if len(fallen) else y))
     peak = float(y[top])
     if top < 2 or peak <= 0.0:
@@ -279,10 +275,6 @@ def lid(folded: Folded, points: Array, along: Array, across: Array, half: float)
     rows = -np.column_stack((w, np.ones(len(w))))
     found = linprog([0.0, 1.0], rows, -under[:, 2], bounds=[(-1.0, 1.0), (None, None)])
     return float(found.x[0]), float(found.x[1])
-
-
-def _highest(folded: Folded, points: Array, across: Array, half: float) -> float:
-    return float(_under(folded, points, across, half)[:, 2].max())
 
 
 def _under(folded: Folded, points: Array, across: Array, half: float) -> Array:

@@ -67,7 +67,7 @@ def test_stiffness_against_patterns_of_loads() -> None:
         probe.against(np.zeros((2, 3, 3)))
 
 
-TASK = Task(along=16, directions=6)
+TASK = Task(along=12, directions=4)
 
 
 def test_designs_have_the_wanted_area() -> None:
