@@ -16,7 +16,7 @@ import typer
 
 from bh.applications.inverse.segments import Domain, beyond, grid
 from bh.applications.inverse.simulate import SETTING, SegmentTask, Setting
-from bh.applications.inverse.surrogate import FORMAT
+from bh.applications.inverse.surrogate import FORMAT, Surrogate
 from bh.sweep import Label, Points, Pool, run, table
 from bh.sweep.runner import Meter
 
@@ -62,6 +62,41 @@ def build(
         SegmentTask(setting), points(), file, pool=pool, resume=resume, progress=progress, labels=LABELS,
         attributes=about,
     )  # fmt: skip
+
+
+def intensity_points(
+    surrogate: Surrogate, steps: int = 9, parts: tuple[float, ...] = (0.25, 0.5, 0.75)
+) -> Points:
+    """Segments pinched by parts of the way: a grid of curvatures (k0 >= 0: mirror images are known), lengths, parts."""
+    lengths = np.linspace(*surrogate.domain.length, steps)
+    setting = surrogate.setting
+    rows = [
+        (
+            float(np.round(s * surrogate.sector_bound(length), 12)),
+            float(length),
+            float(setting.fold - a * way),
+        )
+        for way in (setting.fold - setting.pinch,)
+        for a in parts
+        for length in lengths
+        for s in np.linspace(0.0, 1.0, steps)
+    ]
+    k0, length, pinch = (list(column) for column in zip(*rows, strict=True))
+    return table({"k0": k0, "length": length, "pinch": pinch})
+
+
+def build_intensities(
+    file: str | Path, surrogate: Surrogate, *, pool: Pool | Executor | int | None = None, resume: bool = False
+) -> Dataset:
+    """Simulate `intensity_points` for a data set, as `bh.applications.inverse.graded` needs them."""
+    setting = surrogate.setting
+    about = {
+        "title": "Pinched segments of some intensities",
+        "format": FORMAT,
+        "setting": json.dumps(asdict(setting)),
+    }
+    points = intensity_points(surrogate)
+    return run(SegmentTask(setting), points, file, pool=pool, resume=resume, labels=LABELS, attributes=about)
 
 
 def segments(

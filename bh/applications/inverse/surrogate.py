@@ -51,7 +51,7 @@ class Surrogate:
         k0, length, values = (np.asarray(x, dtype=float) for x in (k0, length, values))
         lengths = np.unique(length)
         s = np.linspace(-1.0, 1.0, COLUMNS)
-        bound = self._bound(lengths)
+        bound = self.sector_bound(lengths)
         table = np.empty((COLUMNS, len(lengths), 6))
         for j, row in enumerate(lengths):
             here = np.flatnonzero(length == row)
@@ -94,7 +94,7 @@ class Surrogate:
         except (KeyError, TypeError, ValueError) as error:
             raise DesignError(f"the data set is incomplete ({error}); make it anew: bh segments") from error
 
-    def _bound(self, length: ArrayLike) -> Array:
+    def sector_bound(self, length: ArrayLike) -> Array:
         """Curvature before folding at which the sector is as large as it may be, 1/mm."""
         return np.asarray(
             self.domain.sector * math.sin(0.5 * self.setting.fold) / np.asarray(length, dtype=float)
@@ -118,7 +118,7 @@ class Surrogate:
                     "and a folded sector of at most half a turn"
                 )
         at = np.clip(length, *self.domain.length)
-        s = np.clip(k0 / self._bound(at), -1.0, 1.0)
+        s = np.clip(k0 / self.sector_bound(at), -1.0, 1.0)
         found = self._spline(np.stack((s, at), axis=-1))
         return found[..., :3], found[..., 3:]
 
