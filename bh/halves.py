@@ -10,9 +10,10 @@ from bh.errors import ModelError
 from bh.formulations import formulation as registered
 from bh.formulations import names
 from bh.model import Model
-from bh.program import Ended, StepProgram, program
+from bh.program import program
 from bh.solvers.modes import count_negative
 from bh.state import State
+from bh.step_program import Ended, StepProgram
 from bh.symmetry import Mirror, Plane, check, halved, mirror
 
 R = TypeVar("R")

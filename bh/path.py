@@ -15,10 +15,11 @@ from bh.describe import describe, rebuild
 from bh.formulations import Formulation, formulation
 from bh.model import Model
 from bh.observables import until_of
-from bh.program import Ended, StepProgram, open_ends, program
+from bh.program import program
 from bh.provenance import provenance_of
 from bh.solvers.increments import ARC, LOAD, CriticalPoint
 from bh.state import State
+from bh.step_program import Ended, StepProgram, open_ends
 from bh.storage import CriticalRow, PathFile, StateRow, reading
 from meshes.mesh import count
 
@@ -145,7 +146,7 @@ class Path:
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
-        return found
+        return found + [f"{remark.code}: {remark}" for remark in self.model.remarks]
 
     @property
     def iterations(self) -> int:

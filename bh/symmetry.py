@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.model import Model
-from bh.program import StepProgram
+from bh.step_program import StepProgram
 from bh.supports import Constraints, RigidBody, Support
 from meshes import Arc, SheetMesh
 from meshes.topology import Ints

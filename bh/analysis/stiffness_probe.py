@@ -193,6 +193,17 @@ class Probe:
             )
         return self._condensed(self._components(parts))
 
+    def against(self, loads: ArrayLike) -> Array:
+        """(m, m) stiffness condensed to m generalised displacements: those that nodal loads (m, n, 3) do work on.
+
+        A load of unit size asks for the mean displacement that it is conjugate to; a point between nodes is a load that
+        they share. N/mm.
+        """
+        rows = np.asarray(loads, dtype=float)
+        if rows.ndim != 3 or rows.shape[1:] != self.points.shape or not np.isfinite(rows).all():
+            raise ModelError(f"loads must be finite arrays (m, {len(self.points)}, 3), not {rows.shape}")
+        return self._against(np.column_stack([self.system.loads(row) for row in rows]))
+
     # ------------------------------------------------------------------------------- modes
 
     def modes(self, count: int = 6, density: float | None = None) -> tuple[Mode, ...]:
@@ -250,10 +261,13 @@ class Probe:
         clash = {node for node, _ in components} & set(self._held.tolist())
         if clash:
             raise ModelError(f"node {min(clash)} is held while it is probed; leave it out of one of them")
-        B = np.column_stack((self._columns(components), self._held_columns))
-        m = len(components)
-        if m == 0:
+        if not components:
             return np.zeros((0, 0))
+        return self._against(self._columns(components))
+
+    def _against(self, columns: Array) -> Array:
+        """(m, m) stiffness against unit loads (size, m); held nodes stay."""
+        B, m = np.column_stack((columns, self._held_columns)), columns.shape[1]
         with one_blas_thread():
             C = B.T @ self._solve(B)
         C = 0.5 * (C + C.T)

@@ -10,14 +10,22 @@ Bending "about x" has the bar along x (azimuth 0), "about y" along y (pi/2). mm,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.applications.corrugation_bending import DIRECTIONS, BendingTest, Rig, all_directions, three_point
+from bh.applications.corrugation_bending import (
+    DIRECTIONS,
+    BendingTest,
+    Rig,
+    all_directions,
+    moved_to,
+    three_point,
+)
 from bh.applications.corrugation_sections import bottom_up, section_moments, top_down
+from bh.applications.corrugation_tangent import Directional, tangent_bending
 from bh.errors import ModelError
 from bh.model import Model, Sheet
 from bh.observables import depth, depth_of
@@ -27,8 +35,8 @@ from bh.tracing import trace
 from meshes import CreasePattern, SheetMesh, corrugation, structured
 
 __all__ = [
-    "DIRECTIONS", "POLYESTER", "BendingTest", "Folded", "Rig", "all_directions", "bottom_up", "fold", "laid",
-    "section_moments", "three_point", "top_down",
+    "DIRECTIONS", "POLYESTER", "BendingTest", "Directional", "Folded", "Rig", "all_directions", "bottom_up", "fold",
+    "laid", "section_moments", "tangent_bending", "three_point", "top_down",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -119,15 +127,4 @@ def laid(path: Path) -> Folded:
         if state.mesh.folds[name] == "valley"
     )
     middle = 0.5 * (turned.min(axis=0) + turned.max(axis=0))
-    return Folded(moved(path, turned - [middle[0], middle[1], low]), deep)
-
-
-def moved(path: Path, points: Array) -> Path:
-    """The path with its last state moved rigidly to `points` (n, 3)."""
-    system, record = path.solved()
-    q = record.q.copy()
-    q[: system.moving] = system.loads(points - path.model.mesh.points)[: system.moving]
-    other = Path(path.model, path.provenance)
-    other.records = [*path.records[:-1], replace(record, q=q)]
-    other.steps = list(path.steps)
-    return other
+    return Folded(moved_to(path, turned - [middle[0], middle[1], low]), deep)

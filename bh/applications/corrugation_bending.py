@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from bh.actuation import Bar, Tether
+from bh.actuation import Bar, Displace, Tether
 from bh.errors import ModelError
+from bh.observables import crease_nodes, depth_of
 from bh.path import Path
 from bh.solvers.continuation import LoadControl
 from bh.tracing import trace
@@ -25,6 +26,7 @@ SUPPORT = 200.0  # mm, width of a support: the sheet never hangs over its far ed
 TRIGGER = 0.1  # N, from which displacement counts (4.5.1)
 WINDOW = (0.2, 0.7)  # of the first peak of the load: the second stage
 DROP = 0.15  # of the load, behind a peak
+REACH = 0.75  # of the depth: further down mountains flatten
 CRADLE = 1e-3  # N/mm on the whole sheet along every axis: keeps it in place where nothing touches it
 
 
@@ -34,10 +36,12 @@ class Rig:
 
     Attributes:
         span: between the inner edges of the supports, mm; bar: its width, mm; travel: of the bar, mm.
-        tape: stiffness along x and y of what holds the sheet over the supports, N/mm in all; 0 is free of friction.
+        tape: 0 is a sheet that lies free, without friction. Else valley creases over the supports are first pulled down
+            onto them and stay there, held along x and y by this stiffness, N/mm in all (double-sided tape, 4.5.1).
         gap, stiffness: of the contact (`bh.actuation.Bar`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
         largest: displacement between two states, mm.
+        offset: of the sheet's middle from the bar, along the span, mm.
     """
 
     span: float = 50.0
@@ -48,6 +52,7 @@ class Rig:
     stiffness: float = 50.0
     level: bool = False
     largest: float = 0.5
+    offset: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("span", "bar", "travel", "gap", "stiffness", "largest"):
@@ -100,7 +105,7 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     rig = rig or Rig()
     along = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     across = np.array([-along[1], along[0], 0.0])
-    points = settle(folded, along, across, rig.span)
+    points = settle(folded, along, across, rig.span, rig.offset)
     slope, height = lid(folded, points, along, across, 0.5 * rig.bar)
     slope, height = (0.0, _highest(folded, points, across, 0.5 * rig.bar)) if rig.level else (slope, height)
     half = 0.5 * rig.span + 0.5 * SUPPORT
@@ -121,17 +126,42 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
         bar("bar", 0.0, height + depth, rig.bar, rig.travel, math.atan(slope)),
         Tether("all", (CRADLE, CRADLE, CRADLE)),
     ]
+    start = moved_to(folded.path, points)
+    model = start.model
     if rig.tape > 0.0:
-        over = np.flatnonzero((np.abs(points @ across) >= 0.5 * rig.span) & (points[:, 2] < 0.5))
-        items.append(Tether(over.tolist(), (rig.tape, rig.tape, 0.0)))
-    from bh.applications.corrugation import moved
-
-    start = moved(folded.path, points)
+        valleys = crease_nodes(folded.mesh, "valley")
+        taped = valleys[np.abs(points[valleys] @ across) >= 0.5 * rig.span].tolist()
+        if not taped:
+            raise ModelError("no valley crease lies over the supports, where tape could hold it")
+        items.append(Tether(taped, (rig.tape, rig.tape, 0.0)))
+        # the bar out of the way while the sheet is taped
+        still = [
+            replace(
+                item,
+                by=(0.0, 0.0, 0.0),
+                at=(item.at[0], item.at[1], item.at[2] + rig.travel * (item.name == "bar")),
+            )
+            if isinstance(item, Bar)
+            else item
+            for item in items
+        ]
+        model = model.step(*still, Displace(taped, "z", 0.0))  # flat sheets lie in z = 0, as the supports do
     # as on a test stand: where the sheet snaps it goes to the next stable state, and the bar goes on
     first, largest = min(0.1, 0.2 * rig.largest) / rig.travel, rig.largest / rig.travel
     snapping = LoadControl(first=first, largest=largest, work_mismatch=math.inf, smallest=1e-4)
-    path = trace(start.model.step(*items), after=start, strategy=snapping)
+    path = trace(model.step(*items), after=start, strategy=snapping)
     return _evaluate(path, azimuth, rig)
+
+
+def moved_to(path: Path, points: Array) -> Path:
+    """The path of a free sheet with its last state moved rigidly to `points` (n, 3)."""
+    system, record = path.solved()
+    q = record.q.copy()
+    q[: system.moving] = system.loads(points - path.model.mesh.points)[: system.moving]
+    other = Path(path.model, path.provenance)
+    other.records = [*path.records[:-1], replace(record, q=q)]
+    other.steps = list(path.steps)
+    return other
 
 
 def _evaluate(path: Path, azimuth: float, rig: Rig) -> BendingTest:
@@ -148,25 +178,31 @@ def _evaluate(path: Path, azimuth: float, rig: Rig) -> BendingTest:
     x, y = moved_by[touched:] - zero, load[touched:]
     if len(x) == 0 or x[0] > 0.0:
         x, y = np.concatenate(([0.0], x)), np.concatenate(([min(TRIGGER, load.max())], y))
-    slope, r2, window, peak = second_stage(x, y)
+    slope, r2, window, peak = second_stage(x, y, REACH * depth_of(path[0 if step == 0 else states[0] - 1])[0])
     return BendingTest(azimuth, x, y, slope, r2, window, peak, path.outcome, path.reason, path)
 
 
-def second_stage(x: Array, y: Array) -> tuple[float, float, tuple[float, float], float]:
+def second_stage(
+    x: Array, y: Array, reach: float = math.inf
+) -> tuple[float, float, tuple[float, float], float]:
     """Slope (N/mm) and R^2 of a line through the second stage of a curve, its ends (mm) and the first peak (N).
 
-    The stage goes from 20 to 70 % of the first peak of the load, behind which the load drops by 15 % (else of the
-    load at the end): the bar has found its mountains and no crease has flattened yet. The line is fitted
-    to 101 points evenly spaced along the curve, as a test stand samples it.
+    The stage goes from 20 to 70 % of the first peak of the load, behind which the load drops by 15 %, or of the largest
+    load before the displacement `reach` (mm) if there is none: the bar has found its mountains and no crease has
+    flattened yet. The line is fitted to 101 points evenly spaced along the curve, as a test stand samples it.
     """
+    if x[-1] > reach:
+        x, y = np.append(x[x < reach], reach), np.append(y[x < reach], np.interp(reach, x, y))
     highest = np.maximum.accumulate(y)
     fallen = np.flatnonzero(y < (1.0 - DROP) * highest)
-    top = int(np.argmax(y[: fallen[0] + 1])) if len(fallen) else len(y) - 1
+    top = int(np.argmax(y[: fallen[0] + 1] if len(fallen) else y))
     peak = float(y[top])
     if top < 2 or peak <= 0.0:
         return math.nan, math.nan, (math.nan, math.nan), peak
     rising = np.maximum.accumulate(y[: top + 1])
     ends = [float(np.interp(part * peak, rising, x[: top + 1])) for part in WINDOW]
+    if not ends[1] > ends[0]:
+        return math.nan, math.nan, (ends[0], ends[1]), peak
     at = np.linspace(ends[0], ends[1], 101)
     load = np.interp(at, x[: top + 1], y[: top + 1])
     slope, offset = np.polyfit(at, load, 1)
@@ -175,7 +211,7 @@ def second_stage(x: Array, y: Array) -> tuple[float, float, tuple[float, float],
     return float(slope), 1.0 - left / max(spread, 1e-300), (ends[0], ends[1]), peak
 
 
-def settle(folded: Folded, along: Array, across: Array, span: float) -> Array:
+def settle(folded: Folded, along: Array, across: Array, span: float, offset: float = 0.0) -> Array:
     """(n, 3) nodes of the rigid sheet as it lies on two supports (z = 0) under a load over the origin.
 
     Of all positions in which nothing over the supports is below them that of the lowest origin: a linear program for
@@ -185,7 +221,7 @@ def settle(folded: Folded, along: Array, across: Array, span: float) -> Array:
     edges = folded.mesh.topology.edges
     for _ in range(12):
         a, b = _about(points, along, across)
-        points = points - a * along - b * across
+        points = points - a * along - (b - offset) * across
         over = _over(points, edges, across, 0.5 * span)
         if len(over) == 0 or not ((over @ across).min() < 0.0 < (over @ across).max()):
             raise ModelError(f"the corrugation does not reach both supports {span:g} mm apart")

@@ -22,11 +22,11 @@ from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.supported import SupportedSheet
 from bh.model import Model
-from bh.program import StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import State
+from bh.step_program import StepProgram
 from meshes.topology import Ints
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
 from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
-from bh.program import StepProgram
 from bh.state import Energy, State
+from bh.step_program import StepProgram
 from meshes.topology import Ints
 
 if TYPE_CHECKING:

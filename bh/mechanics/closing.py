@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bh.mechanics.assembly import add_lower, add_product, rotate
 from bh.mechanics.hinge_lock import ZONE, in_zone, lock, until_closed
 from bh.mechanics.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
-from bh.program import hinge_name
+from bh.step_program import hinge_name
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]

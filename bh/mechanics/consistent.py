@@ -17,9 +17,9 @@ from bh.mechanics.consistent_kernels import TURN
 from bh.mechanics.consistent_system import ConsistentSystem
 from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
-from bh.program import StepProgram
 from bh.refinement import Refinement
 from bh.state import Energy, State
+from bh.step_program import StepProgram
 
 if TYPE_CHECKING:
     from bh.symmetry import Mirror

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bh.actuation import Ramp
 from bh.errors import ModelError
+from bh.laws import HELD, SHEET, SPRING
 from bh.mechanics.consistent_kernels import TURN
 from bh.mechanics.consistent_patches import (
     Patches,
@@ -22,8 +23,8 @@ from bh.mechanics.hinge_lock import ZONE, until_closed
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.model import Model
-from bh.program import HELD, SHEET, SPRING, StepProgram
 from bh.solvers.matrices import reverse_cuthill_mckee
+from bh.step_program import StepProgram
 from meshes import SheetMesh
 from meshes.topology import Ints
 

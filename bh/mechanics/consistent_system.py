@@ -20,10 +20,10 @@ from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.pattern import Pattern
 from bh.mechanics.supported import SupportedSheet
 from bh.model import Model
-from bh.program import StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation
 from bh.state import State
+from bh.step_program import StepProgram
 from meshes.topology import Ints
 
 if TYPE_CHECKING:

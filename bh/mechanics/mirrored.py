@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bh.actuation import Ramp
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.elements import Elements
-from bh.program import StepProgram
+from bh.step_program import StepProgram
 from bh.supports import Constraints
 from bh.symmetry import Mirror
 from meshes import SheetMesh

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.laws import HELD
 from bh.mechanics import closing
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.motions import describe_motion
 from bh.mechanics.touching import Touching
 from bh.model import Model
-from bh.program import HELD, StepProgram
 from bh.solvers.system import System, grows_ahead
 from bh.state import State
+from bh.step_program import StepProgram
 from bh.supports import TURNED
 
 if TYPE_CHECKING:
