@@ -47,6 +47,7 @@ _SUBMODULES = {
     "isometric": "bh.analysis.isometric",
     "node_sensitivities": "bh.analysis.node_sensitivities", "pinching": "bh.applications.pinching",
     "plotting": "bh.plotting", "polish": "bh.analysis.polish", "scan": "bh.scan",
+    "rulings": "bh.analysis.rulings",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",
 }  # fmt: skip

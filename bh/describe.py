@@ -60,6 +60,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
             "kind": mesh.kind,
             "aspect_ratio": None if np.isnan(mesh.aspect_ratio) else mesh.aspect_ratio,
             "curves": {name: _tagged(curve, CURVES) for name, curve in mesh.curves.items()},
+            **({"remarks": list(mesh.remarks)} if mesh.remarks else {}),
         },
         "supports": [_support(s) for s in model.supports],
         "creases": {name: _plain(law) for name, law in model.creases.items()},
@@ -87,6 +88,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             folds=flat["folds"], fold_angles=angles, spans=arrays.get("spans"), kind=flat["kind"],
             curves={name: _untagged(curve, CURVES) for name, curve in flat["curves"].items()},
             aspect_ratio=float("nan") if flat["aspect_ratio"] is None else flat["aspect_ratio"],
+            remarks=tuple(flat.get("remarks", ())),
         )  # fmt: skip
         return Model(
             mesh=mesh,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from bh.supports import Holding, RigidBody, Support
 from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.advice import Remark
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,6 +204,13 @@ class Model:
             if letters:
                 model = model.support([node], letters)
         return model
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What the mesh does to the answer with this formulation (`bh.advice`); empty where there is nothing to say."""
+        from bh.advice import remarks
+
+        return remarks(self)
 
     def support(
         self,

@@ -13,9 +13,9 @@ from bh.laws import HELD, SPRING
 from bh.model import CreaseLaw, Model
 from bh.observables import Until
 from bh.pinch_zone import Pinched
-from bh.step_program import Ended, StepProgram, edge_hinges, hinge_name, stress_free_angles
+from bh.step_program import Ended, StepProgram, edge_hinges, hinge_name
 from bh.supports import Prescribed, resolve
-from meshes.topology import Ints
+from meshes.topology import Ints, dihedral_angles
 
 Direction = tuple[float, float, float]
 
@@ -36,7 +36,7 @@ class Ramps:
         hinges, nodes = len(model.mesh.topology.hinges), len(model.mesh.points)
         self.law = np.zeros(hinges, dtype=np.int64)
         self.stiffness = np.zeros(hinges)
-        self.rest = stress_free_angles(model.mesh)
+        self.rest = dihedral_angles(model.mesh.points, model.mesh.topology.hinges)
         self.made = self.rest.copy()  # rest angles of the laws; they come in during the first step
         self.rest_ends = np.full((hinges, 2), math.pi)
         self.held = np.full(hinges, np.nan)

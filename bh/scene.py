@@ -43,6 +43,7 @@ from bh.scene_schema import (
 from bh.scene_tables import (
     as_table,
     as_tables,
+    as_tuple,
     check_keys,
     nearest,
     one_line,
@@ -51,11 +52,14 @@ from bh.scene_tables import (
     read_toml,
     shown,
     within,
+    without,
 )
 from bh.supports import Holding, RigidBody, Support, directions, select
+from bh.symmetry import Plane, check, mirror
 from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy")
+SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy",
+            "symmetry")  # fmt: skip
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
 COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
@@ -80,6 +84,7 @@ class Scene:
         model: checked; its steps can be programmed (`bh.program`), nothing is solved.
         outputs: what a run is to write.
         accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
+        symmetry: the plane of a scene to be solved by halves, or None: `bh.trace(..., symmetry=scene.symmetry)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -89,6 +94,7 @@ class Scene:
     name: str = "scene"
     source: Path | None = None
     accuracy: Goal | None = None
+    symmetry: Plane | None = None
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -188,7 +194,17 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
             pattern_of(model)
             if accuracy.at is not None:
                 model.mesh.nodes(accuracy.at)
-    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy)
+    return Scene(model, Outputs(**{name: as_tuple(value) for name, value in outputs}), accuracy=accuracy,
+                 symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None)  # fmt: skip
+
+
+def _symmetry(model: Model, data: Any) -> Plane:
+    """A letter, or a normal."""
+    if not isinstance(data, str | list):
+        raise SceneError(f'symmetry = {shown(data)} cannot be; give "x", "y" or a normal [x, y, 0]')
+    with within("symmetry"):
+        check(model, program(model), mirror(model.mesh, data))
+    return data if isinstance(data, str) else tuple(data)
 
 
 def _accuracy(data: Any) -> Goal:
@@ -237,7 +253,7 @@ def _drawn(table: dict[str, Any]) -> CreasePattern:
         raise SceneError(f"pattern.kind is missing; use one of {listed}, or give a file")
     if isinstance(kind, str) and ":" in kind:
         with within("pattern"):
-            own: CreasePattern = made(kind, _without(table, "kind"), CreasePattern)
+            own: CreasePattern = made(kind, without(table, "kind"), CreasePattern)
             return own
     if not isinstance(kind, str) or kind not in LIBRARY:
         raise SceneError(
@@ -331,7 +347,7 @@ def _check_triangles(triangles: float) -> None:
 def _support(item: Any, at: str) -> Holding:
     if isinstance(item, dict) and ":" in str(item.get("kind")):
         with within(at):
-            held: Holding = made(item["kind"], _without(item, "kind"), Holding)
+            held: Holding = made(item["kind"], without(item, "kind"), Holding)
             return held
     table = read_table(SupportTable, item, at)
     if table.at == "rigid-body":
@@ -384,15 +400,11 @@ def _actuation(key: str, item: Any, at: str) -> Actuation:
         with within(at):
             own: Actuation = made(key, as_table(item, at), Actuation)
             return own
-    given = {name: _tuple(value) for name, value in read_table(ACTUATIONS[key], item, at)}
+    given = {name: as_tuple(value) for name, value in read_table(ACTUATIONS[key], item, at)}
     if isinstance(given.get("direction"), tuple):
         given["direction"] = _direction(given["direction"], f"{at}.direction")
     with within(at):
         return MAKERS[key](**given)
-
-
-def _without(table: dict[str, Any], key: str) -> dict[str, Any]:
-    return {name: value for name, value in table.items() if name != key}
 
 
 def _direction(vector: Sequence[float], at: str) -> tuple[float, ...]:
@@ -434,7 +446,3 @@ def _check(model: Model) -> None:
         if step.constraints.rigid_body and step.force.end.any():  # forces on a free sheet have to balance
             with within(f"steps[{i}]"):
                 formulation(model.formulation).system(model, step, None)
-
-
-def _tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value

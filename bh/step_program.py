@@ -86,19 +86,6 @@ class Ended:
     dihedral_angles: Array
 
 
-def stress_free_angles(mesh: SheetMesh) -> Array:
-    """(m,) dihedral angles of the mesh as it is made, rad: there springs are at rest before the first step."""
-    hinges = mesh.topology.hinges
-    if mesh.flat:
-        return np.full(len(hinges), math.pi)
-    wing, tail, head, other = (mesh.points[hinges[:, k]] for k in range(4))
-    edge = head - tail
-    one, two = np.cross(edge, wing - tail), np.cross(other - tail, edge)
-    length = np.linalg.norm(edge, axis=1)
-    turn = np.arctan2(length * np.einsum("mi,mi->m", one, other - tail), np.einsum("mi,mi->m", one, two))
-    return np.asarray(np.mod(math.pi + turn, 2.0 * math.pi))
-
-
 def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:
     """Rows of `mesh.topology.hinges` along a crease, in order."""
     found = edge_hinges(mesh, crease)
