@@ -53,7 +53,8 @@ def run(context: Context) -> CaseResult:
         "raised cosine: with that a segment at the bound of the sector (half a turn) just does not meet itself when it "
         "is pinched, which is how the source chose that bound; with 60 mm it does, with 20 mm it stays far from it. "
         "The length was chosen after seeing results of seven lengths on five segments, because it fits three "
-        "statements of the source; so agreement with these three is partly by construction, not an independent confirmation. "
+        "statements of the source; so agreement with these three is partly by construction, not an independent "
+        "confirmation. "
         "See docs/inverse_design.md on what of this belongs to bars and hinges."
     )
     return result
