@@ -15,7 +15,7 @@ export PIP_NO_INPUT := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup libraries report test lint format bench bench-table fast clean distclean
+.PHONY: help setup libraries report test lint format bench bench-table docs fast clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -45,6 +45,11 @@ bench: setup ## run the benchmarks
 
 bench-table: setup ## measure the table of speeds, docs/performance.md
 	@$(PY) -m benchmarks.table
+
+docs: setup ## build the documentation site into build/docs/html
+	@echo "== Documentation"
+	@$(PY) docs/build_site.py build/docs
+	@echo "documentation: $(CURDIR)/build/docs/html/index.html"
 
 fast: setup ## add the extra `fast` (pypardiso with MKL, 0.9 GB; x86-64 only)
 	@$(PY) -m pip install -q --no-build-isolation -c requirements.lock -e '.[fast]'

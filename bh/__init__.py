@@ -43,8 +43,11 @@ _HOME = {
 
 _SUBMODULES = {
     "contact": "bh.analysis.contact", "corrugation": "bh.applications.corrugation",
-    "creases": "bh.analysis.creases", "isometric": "bh.analysis.isometric",
-    "pinching": "bh.applications.pinching", "plotting": "bh.plotting", "scan": "bh.scan",
+    "creases": "bh.analysis.creases", "interactive": "bh.interactive",
+    "isometric": "bh.analysis.isometric",
+    "node_sensitivities": "bh.analysis.node_sensitivities", "pinching": "bh.applications.pinching",
+    "plotting": "bh.plotting", "polish": "bh.analysis.polish", "scan": "bh.scan",
+    "rulings": "bh.analysis.rulings",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",
 }  # fmt: skip

@@ -30,6 +30,7 @@ from bh.program import program
 from bh.progress import ProgressMeter
 from bh.refinement import Goal, Refinement, mesh_at, pattern_of, with_mesh
 from bh.solvers.trace import Strategy
+from bh.symmetry import Plane
 from bh.tracing import trace
 
 Array = NDArray[np.float64]
@@ -111,6 +112,7 @@ def solve(
     *,
     progress: bool | ProgressMeter = False,
     strategy: Strategy | None = None,
+    symmetry: Plane | None = None,
 ) -> Path:
     """Trace a model to a wanted accuracy; its own mesh and formulation only say what the sheet is.
 
@@ -124,14 +126,14 @@ def solve(
     began = time.perf_counter()
     pattern = pattern_of(model)
     _check(model, goal)
-    race = _Race(goal, candidates())
+    race = _Race(goal, candidates(halves=symmetry is not None))
     trials: list[Trial] = []
     error, order, lost = math.inf, math.nan, 0
     while True:
         name, level = race.next()
         mesh = mesh_at(pattern, race.options[name].kind, level)
         clock = time.perf_counter()
-        path = trace(with_mesh(model, mesh, name), progress=progress, strategy=strategy)
+        path = trace(with_mesh(model, mesh, name), progress=progress, strategy=strategy, symmetry=symmetry)
         reached = path.outcome == "reached"
         value = reading(path, goal) if reached else np.array([math.nan])
         spent = time.perf_counter() - clock
@@ -200,14 +202,16 @@ def estimate(values: list[Array]) -> tuple[float, float]:
     return SAFETY * left / size, order
 
 
-def candidates() -> dict[str, Refinement]:
-    """The formulations that say on which meshes they converge.
+def candidates(halves: bool = False) -> dict[str, Refinement]:
+    """The formulations that say on which meshes they converge; those only that can be solved by `halves`, if asked.
 
     Raises:
         ModelError: there is none.
     """
     found = {name: getattr(formulation(name), "refinement", None) for name in names()}
     known = {name: item for name, item in found.items() if isinstance(item, Refinement)}
+    if halves:
+        known = {name: item for name, item in known.items() if hasattr(formulation(name), "half")}
     if not known:
         raise ModelError(
             "no formulation is installed that says how its meshes are refined; install the project with pip"

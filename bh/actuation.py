@@ -1,6 +1,6 @@
 """Actuations: what drives a sheet while the control parameter lambda runs from 0 to 1 in a step.
 
-All of them are data. `bh.program` turns the steps of a model into ramps (value at lambda and its rate).
+All of them are data, and know what they ask of the hinges and nodes of a sheet (`apply`); `bh.ramps` makes ramps of it.
 """
 
 from __future__ import annotations
@@ -8,13 +8,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.pinch_zone import PROFILES, Profile
+from bh.pinch_zone import PROFILES, Profile, pinch
+from bh.supports import AXES, select
+
+if TYPE_CHECKING:
+    from bh.ramps import Ramps
 
 Array = NDArray[np.float64]
 Angles = float | Sequence[float]
@@ -35,8 +39,23 @@ class Ramp:
         return self.end - self.start
 
 
+class Actuation:
+    """What acts in a step. An actuation of your own derives from it and is a frozen dataclass of plain values
+    (docs/extending.md).
+    """
+
+    late: ClassVar[bool] = False  # applied after the others of its step, from where they lead
+
+    def prepare(self, ramps: Ramps) -> None:
+        """Before the first step: springs that must be there from the start."""
+
+    def apply(self, ramps: Ramps) -> None:
+        """What is asked for at the end of the step."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class Fold:
+class Fold(Actuation):
     """Fold a crease.
 
     Attributes:
@@ -91,9 +110,46 @@ class Fold:
                     + ("; angles are radians, not degrees" if np.abs(angles).max(initial=0.0) > 7.0 else "")
                 )
 
+    @property
+    def _spring(self) -> bool:
+        return self.Lstar is not None or self.stiffness is not None
+
+    def prepare(self, ramps: Ramps) -> None:
+        if self._spring:
+            ramps.spring(ramps.creases(self.crease)[0], self.Lstar, self.stiffness)
+
+    def apply(self, ramps: Ramps) -> None:
+        hinges, sense, drawn = ramps.creases(self.crease)
+        angle = self._target(sense, drawn)
+        if self.rest is not None or self._spring:
+            ramps.rest_at(hinges, angle, release=self._spring)
+            return
+        if not ((angle > 0.0) & (angle < 2.0 * math.pi)).all():
+            raise ModelError(
+                f"fold of crease '{self.crease}' closes it completely; stay inside (0, 2 pi) rad"
+            )
+        ramps.hold(hinges, angle)
+
+    def _target(self, sense: Array, drawn: Array) -> Array:
+        """(k,) dihedral angles at the end of the step, rad."""
+        if isinstance(self.by, str):
+            if np.isnan(drawn).any():
+                raise ModelError(
+                    f"fold of crease '{self.crease}': the pattern gives no fold angles; use by = radians"
+                )
+            return np.asarray(math.pi - drawn)
+        value = next(value for value in (self.by, self.to, self.rest) if value is not None)
+        angles = np.asarray(value, dtype=float)
+        if angles.ndim and angles.shape != sense.shape:
+            raise ModelError(
+                f"fold of crease '{self.crease}' has {angles.size} angles for {len(sense)} edges"
+            )
+        angles = np.broadcast_to(angles, sense.shape).copy()
+        return math.pi - sense * angles if self.by is not None else angles
+
 
 @dataclass(frozen=True)
-class Pinch:
+class Pinch(Actuation):
     """Close a crease that is folded already over a part of its length (source 5.3.2).
 
     Along the pinched zone the dihedral angle goes from what it is to the pinched one by a profile (`bh.pinch_zone`).
@@ -150,9 +206,14 @@ class Pinch:
         by = math.pi - math.pi / 14.0 if self.by is None else self.by
         return np.asarray(math.pi - sense * by)
 
+    late: ClassVar[bool] = True
+
+    def apply(self, ramps: Ramps) -> None:
+        pinch(ramps, self)
+
 
 @dataclass(frozen=True)
-class Moment:
+class Moment(Actuation):
     """A dead couple a length on a crease, N mm / mm; positive folds the crease the way that it is drawn."""
 
     crease: str
@@ -161,9 +222,13 @@ class Moment:
     def __post_init__(self) -> None:
         _finite(f"moment on crease '{self.crease}'", (self.to,))
 
+    def apply(self, ramps: Ramps) -> None:
+        hinges, sense, _ = ramps.creases(self.crease)
+        ramps.couple(hinges, sense * self.to)
+
 
 @dataclass(frozen=True)
-class Force:
+class Force(Actuation):
     """A dead force. `each` (N) acts on every node of the place; `total` (N) is shared equally among them."""
 
     at: str | Sequence[int]
@@ -179,9 +244,15 @@ class Force:
         assert vector is not None
         _vector(f"force at '{self.at}'", vector)
 
+    def apply(self, ramps: Ramps) -> None:
+        nodes = select(ramps.mesh, self.at)
+        vector = self.each if self.each is not None else self.total
+        share = 1.0 if self.each is not None else 1.0 / len(nodes)
+        ramps.pull(nodes, share * np.asarray(vector, dtype=float))
+
 
 @dataclass(frozen=True)
-class Displace:
+class Displace(Actuation):
     """Prescribed displacement from the stress-free position: `by` (mm) along `direction` (three numbers, or x, y, z).
 
     Nodes stay free across the direction, and keep their displacement in later steps.
@@ -203,9 +274,14 @@ class Displace:
             if not any(self.direction):
                 raise ModelError(f"displacement at '{self.at}': the direction is the zero vector")
 
+    def apply(self, ramps: Ramps) -> None:
+        raw = AXES[self.direction] if isinstance(self.direction, str) else self.direction
+        unit = np.asarray(raw, dtype=float) / np.linalg.norm(raw)
+        ramps.displace(select(ramps.mesh, self.at), unit.tolist(), self.by)
+
 
 @dataclass(frozen=True)
-class Bar:
+class Bar(Actuation):
     """A rigid bar that the sheet can touch, without friction, in the step that names it (`bh.mechanics.touching`).
 
     Its section is a rectangle with rounded edges, its axis as long as it needs to be. Bars take the place of the
@@ -245,6 +321,9 @@ class Bar:
                 f"bar '{self.name}': its radius {self.radius:g} mm is more than half of its section"
             )
 
+    def apply(self, ramps: Ramps) -> None:
+        ramps.touch(self)
+
     @property
     def half(self) -> tuple[float, float]:
         """Half the width and height between the centres of the rounded edges, mm."""
@@ -263,7 +342,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Tether:
+class Tether(Actuation):
     """Soft springs that hold nodes where the step begins; they share the `total` stiffness along x, y and z, N/mm."""
 
     at: str | Sequence[int]
@@ -274,8 +353,8 @@ class Tether:
         if min(self.total) < 0.0:
             raise ModelError(f"tether at '{self.at}': {self.total} cannot be; stiffness is not negative")
 
-
-Actuation = Fold | Pinch | Moment | Force | Displace | Bar | Tether
+    def apply(self, ramps: Ramps) -> None:
+        ramps.touch(self)
 
 
 def _finite(what: str, values: Sequence[float]) -> None:

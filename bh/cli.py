@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
+    "design": "Find a crease that reaches a point, follows a curve or moves its tip furthest.",
     "segments": "Make the data set of pinched segments for inverse design.",
     "sweep": "Solve a scene for many parameters into a labelled data set.",
     "verify": "Check the solvers against theory and published numbers.",
@@ -166,6 +167,14 @@ def view(
     vtu: Annotated[
         Path | None, typer.Option("--vtu", metavar="DIR", help="Write all states for ParaView; no window.")
     ] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option("--animation", metavar="FILE.gif", help="All states as .gif or .mp4; no window."),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option("--html", metavar="FILE.html", help="All states to turn in a browser; no window."),
+    ] = None,
     state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
 ) -> None:
     """Show a state of a solved path, or draw it to a file."""
@@ -184,7 +193,13 @@ def view(
     if picture is not None:
         bh.plotting.picture(solved[state], picture)
         typer.echo(f"wrote {picture}")
-    if picture is None and vtu is None:
+    if animation is not None:
+        typer.echo(f"wrote {bh.plotting.animation(solved, animation)}")
+    if html is not None:
+        import bh.interactive
+
+        typer.echo(f"wrote {bh.interactive.view(solved, title=path.name).save(html)}")
+    if picture is vtu is animation is html is None:
         try:
             bh.plotting.show(solved[state])
         except InputError as error:
@@ -224,6 +239,71 @@ def export(
         else:
             done = write_state(file, [solved[k] for k in range(last + 1)], source.stem)
     typer.echo(f"wrote {done}")
+
+
+@app.command()
+def init(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scene to write.")] = Path("scene.toml"),
+    drawing: Annotated[
+        Path | None, typer.Option("--drawing", metavar="FILE", help="An SVG or DXF crease pattern to fold.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
+) -> None:
+    """Write a commented example scene."""
+    from bh.errors import InputError
+    from bh.example import example
+    from meshes.io.export import replacing
+
+    if file.exists() and not force:
+        raise InputError(f"'{file}' is there already; name another file, or add --force")
+    if drawing is not None:  # a scene looks for its files from its own folder
+        drawing = Path(os.path.relpath(drawing, file.parent))
+    text = example(drawing, file.parent)
+    with replacing(file) as draft:
+        draft.write_text(text, encoding="utf-8")
+    typer.echo(f"wrote {file}; next: bh check {shlex.quote(str(file))}")
+
+
+@app.command()
+def check(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).")],
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="PNG, SVG or PDF to draw; default SCENE-check.png."),
+    ] = None,
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
+) -> None:
+    """Check a scene, say what it is, and draw its flat pattern."""
+    from bh.check import draw, report
+    from bh.scene import load_scene
+
+    loaded = load_scene(scene)
+    for line in report(loaded):
+        typer.echo(line)
+    if not no_picture:
+        typer.echo(f"wrote {draw(loaded, picture or Path(f'{loaded.name}-check.png'))}")
+
+
+@app.command()
+def schema(
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write to a file; default the screen."),
+    ] = None,
+) -> None:
+    """Print the JSON schema of scenes, for editors."""
+    import json
+
+    from bh.schema import schema as scene_schema
+    from meshes.io.export import replacing
+
+    text = json.dumps(scene_schema(), indent=2) + "\n"
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    with replacing(output) as draft:
+        draft.write_text(text, encoding="utf-8")
+    typer.echo(f"wrote {output}; name it in the first line of a scene: #:schema {output}")
 
 
 @app.command()

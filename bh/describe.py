@@ -15,7 +15,8 @@ from bh.actuation import Actuation, Bar, Displace, Fold, Force, Moment, Pinch, T
 from bh.errors import PathFileError
 from bh.model import CreaseLaw, ElementStiffness, Model, Sheet
 from bh.observables import Until
-from bh.supports import RigidBody, Support
+from bh.plugins import named
+from bh.supports import Holding, RigidBody, Support
 from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
@@ -59,8 +60,9 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
             "kind": mesh.kind,
             "aspect_ratio": None if np.isnan(mesh.aspect_ratio) else mesh.aspect_ratio,
             "curves": {name: _tagged(curve, CURVES) for name, curve in mesh.curves.items()},
+            **({"remarks": list(mesh.remarks)} if mesh.remarks else {}),
         },
-        "supports": ["rigid-body" if isinstance(s, RigidBody) else _plain(s) for s in model.supports],
+        "supports": [_support(s) for s in model.supports],
         "creases": {name: _plain(law) for name, law in model.creases.items()},
         "steps": [[_tagged(item, STEP_ITEMS) for item in step] for step in model.steps],
     }
@@ -86,11 +88,12 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             folds=flat["folds"], fold_angles=angles, spans=arrays.get("spans"), kind=flat["kind"],
             curves={name: _untagged(curve, CURVES) for name, curve in flat["curves"].items()},
             aspect_ratio=float("nan") if flat["aspect_ratio"] is None else flat["aspect_ratio"],
+            remarks=tuple(flat.get("remarks", ())),
         )  # fmt: skip
         return Model(
             mesh=mesh,
             sheet=Sheet(**data["sheet"]),
-            supports=tuple(RigidBody() if s == "rigid-body" else Support(**s) for s in data["supports"]),
+            supports=tuple(_held(s) for s in data["supports"]),
             steps=tuple(tuple(_untagged(item, STEP_ITEMS) for item in step) for step in data["steps"]),
             creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
             formulation=data["formulation"],
@@ -119,8 +122,9 @@ def _plain(item: Any) -> dict[str, Any]:
 
 
 def _tagged(item: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
-    kind = next(name for name, cls in kinds.items() if type(item) is cls)
-    return {"kind": kind, **_plain(item)}
+    """Fields and kind; a class of the user's own is "module:Class"."""
+    own = f"{type(item).__module__}:{type(item).__qualname__}"
+    return {"kind": next((name for name, cls in kinds.items() if type(item) is cls), own), **_plain(item)}
 
 
 def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
@@ -130,7 +134,23 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
     for key in ("start", "end", "centre", "curvatures", "lengths"):
         if isinstance(rest.get(key), list):
             rest[key] = tuple(rest[key])
-    return kinds[data["kind"]](**rest)
+    if ":" not in data["kind"]:
+        return kinds[data["kind"]](**rest)
+    lists = {key: tuple(value) if isinstance(value, list) else value for key, value in rest.items()}
+    return named(data["kind"])(**lists)
+
+
+def _support(item: Holding) -> Any:
+    if isinstance(item, RigidBody):
+        return "rigid-body"
+    return _plain(item) if type(item) is Support else _tagged(item, {})
+
+
+def _held(data: Any) -> Holding:
+    if data == "rigid-body":
+        return RigidBody()
+    held: Holding = _untagged(data, {}) if "kind" in data else Support(**data)
+    return held
 
 
 def _jsonable(value: Any) -> Any:

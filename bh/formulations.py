@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.model import Model
-from bh.program import StepProgram
+from bh.plugins import named
 from bh.state import State
+from bh.step_program import StepProgram
 
 GROUP = "bh.formulations"
 
@@ -47,7 +48,7 @@ def names() -> list[str]:
 
 @cache
 def formulation(name: str) -> Formulation:
-    """The formulation of that name.
+    """The formulation of that name, or of the user's own "module:Class".
 
     Raises:
         ModelError: it is not registered; the message lists those that are.
@@ -56,6 +57,9 @@ def formulation(name: str) -> Formulation:
         if point.name == name:
             made: Formulation = point.load()()
             return made
+    if ":" in name:
+        own: Formulation = named(name)()
+        return own
     known = ", ".join(names()) or "none; install the project with pip first"
     raise ModelError(f"formulation '{name}' is not known; use one of: {known}")
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,10 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from bh.actuation import Actuation, Displace, Fold, Force, Moment, Pinch
 from bh.errors import ModelError
 from bh.observables import Until
-from bh.supports import RigidBody, Support
+from bh.supports import Holding, RigidBody, Support
 from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.advice import Remark
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +122,7 @@ class Model:
 
     mesh: SheetMesh
     sheet: Sheet
-    supports: tuple[Support | RigidBody, ...] = ()
+    supports: tuple[Holding, ...] = ()
     steps: tuple[tuple[Actuation | Until, ...], ...] = ()
     creases: Mapping[str, CreaseLaw] = field(default_factory=dict)
     formulation: str = "bars-and-hinges"
@@ -202,14 +205,26 @@ class Model:
                 model = model.support([node], letters)
         return model
 
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What the mesh does to the answer with this formulation (`bh.advice`); empty where there is nothing to say."""
+        from bh.advice import remarks
+
+        return remarks(self)
+
     def support(
-        self, at: str | Sequence[int], fix: str | Sequence[Sequence[float]] = "xyz", clamp: bool = False
+        self,
+        at: str | Sequence[int] | Holding,
+        fix: str | Sequence[Sequence[float]] = "xyz",
+        clamp: bool = False,
     ) -> Model:
         """Hold nodes, and the slope too with `clamp`; at "rigid-body" take out what rigid motions are left.
 
-        See `bh.supports`.
+        `at` can be a support of your own. See `bh.supports`.
         """
-        item = RigidBody() if at == "rigid-body" else Support(at, fix, clamp)
+        item = (
+            at if isinstance(at, Holding) else RigidBody() if at == "rigid-body" else Support(at, fix, clamp)
+        )
         return replace(self, supports=(*self.supports, item))
 
     def crease(self, name: str, **law: Any) -> Model:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.plugins import named
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -58,12 +59,7 @@ class Until:
         """The observable of a state."""
         if self.observable in OBSERVABLES:
             return OBSERVABLES[self.observable](state, self.of)
-        module, _, name = self.observable.partition(":")
-        try:
-            function = getattr(import_module(module), name)
-        except (ImportError, AttributeError, ValueError) as missing:
-            raise ModelError(f"observable '{self.observable}' cannot be imported ({missing})") from missing
-        return float(function(state))
+        return float(named(self.observable)(state))
 
 
 def until_of(actuations: Sequence[object]) -> Until | None:

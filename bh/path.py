@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
 
@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 
 from bh.describe import describe, rebuild
 from bh.formulations import Formulation, formulation
+from bh.halves import Half, Halves
 from bh.model import Model
 from bh.observables import until_of
-from bh.program import Ended, StepProgram, open_ends, program
+from bh.program import program
 from bh.provenance import provenance_of
 from bh.solvers.increments import ARC, LOAD, CriticalPoint
 from bh.state import State
+from bh.step_program import Ended, StepProgram, open_ends
 from bh.storage import CriticalRow, PathFile, StateRow, reading
+from bh.symmetry import Plane
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -74,7 +77,9 @@ class Path:
         accuracy: the estimate of its error, where an accuracy was asked for (`bh.accuracy.Accuracy`), else None.
     """
 
-    def __init__(self, model: Model, provenance: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self, model: Model, provenance: dict[str, Any] | None = None, symmetry: Plane | None = None
+    ) -> None:
         self.model = model
         self.provenance = provenance or provenance_of(model)
         self.records: list[Record] = []
@@ -82,6 +87,9 @@ class Path:
         self.accuracy: Accuracy | None = None
         self._formulation: Formulation = formulation(model.formulation)
         self._programs: tuple[StepProgram, ...] = program(model)
+        self._halves = (
+            None if symmetry is None else Halves(self._formulation, model, self._programs, symmetry)
+        )
         self._systems: dict[int, Any] = {}
         self._states: dict[int, State] = {}
 
@@ -103,7 +111,15 @@ class Path:
     @property
     def stable(self) -> bool | None:
         """Is the last state stable? None where that was not looked at."""
+        self._look_at_whole()
         return self.records[-1].stable if self.records else None
+
+    def _look_at_whole(self) -> None:
+        """Of a sheet solved by halves, count the negative modes of the last state, symmetric or not, when asked."""
+        if self._halves is not None and self.records and self.records[-1].negative is None:
+            last = self.records[-1]
+            self.records[-1] = replace(last, negative=self._halves.negative(self._system(last.step), last))
+            self._states.pop(len(self.records) - 1, None)
 
     @property
     def critical_points(self) -> list[tuple[int, CriticalPoint]]:
@@ -124,10 +140,11 @@ class Path:
         found += dict.fromkeys(ends)
         if self.accuracy is not None and not self.accuracy.met:
             found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
+        self._look_at_whole()
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
-        return found
+        return found + [f"{remark.code}: {remark}" for remark in self.model.remarks]
 
     @property
     def iterations(self) -> int:
@@ -235,14 +252,23 @@ class Path:
     def _system(self, step: int) -> Any:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
-            start = None
-            if step > 0:
-                last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
-                start = None if last is None else self[last]
-                if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
-                    self._programs = program(self.model, self._ended(step))
-            self._systems[step] = self._formulation.system(self.model, self._programs[step], start)
+            if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
+                self._programs = program(self.model, self._ended(step))
+            self._systems[step] = self._formulation.system(
+                self.model, self._programs[step], self._start(step)
+            )
         return self._systems[step]
+
+    def _half(self, step: int) -> Half | None:
+        """The half that solves a step, or None where the whole sheet is solved."""
+        if self._halves is None:
+            return None
+        return self._halves.of(step, self._system(step), self._start(step), self._ended(step))
+
+    def _start(self, step: int) -> State | None:
+        """The state that a step begins at; None is the stress-free sheet."""
+        last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
+        return None if last is None else self[last]
 
     def _ended(self, before: int) -> dict[int, Ended]:
         """Steps before `before` that ended early, by an `Until`."""

@@ -9,15 +9,22 @@ Profiles of a pinch of length b about its middle (s = 0), as parts of the way fr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.laws import HELD, SHEET
 from meshes import SheetMesh
+from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.actuation import Pinch
+    from bh.ramps import Ramps
 
 Array = NDArray[np.float64]
 Profile = Literal["cosine", "grip"]
@@ -152,3 +159,63 @@ def zone(line: Chain, name: str, at: float, length: float | None) -> float:
             f"{whole:.4g} mm); {mend}"
         )
     return length
+
+
+def pinch(ramps: Ramps, item: Pinch) -> None:
+    """Ask for a pinch, from the angles that the other actuations of its step lead to."""
+    names = [item.crease]
+    if item.crease == "all":
+        folds, mesh = ramps.mesh.folds, ramps.mesh
+        names = [name for name in mesh.creases if folds.get(name) != "flat" and is_chain(mesh, name)]
+        if not names:
+            raise ModelError("pinch of crease 'all': the sheet has no mountain or valley crease")
+    for name in names:
+        _pinch_one(ramps, name, item)
+
+
+def _pinch_one(ramps: Ramps, name: str, item: Pinch) -> None:
+    hinges, sense, _ = ramps.creases(name)
+    line = chain(ramps.mesh, name)
+    part, ends = parts(line, item.at, zone(line, name, item.at, item.length), item.profile)
+    turned = ramps.mesh.crease_edges(name)
+    ends = np.where((turned[:, 0] > turned[:, 1])[:, None], ends[:, ::-1], ends)
+    inside = np.flatnonzero(part > 0.0)
+    rows, part, ends = hinges[inside], part[inside], ends[inside]
+    now, target = ramps.before[rows], item.target(sense)[inside]
+    _check(ramps, name, item, rows, now, target)
+    nominal = now + part * (target - now)
+    for row, angle in zip(rows.tolist(), nominal.tolist(), strict=True):
+        known, other = ramps.claimed.setdefault(row, (angle, item.at))
+        if abs(known - angle) > 1e-9:
+            raise ModelError(
+                f"two pinches of crease '{name}' overlap and contradict each other (at {other:g} and "
+                f"{item.at:g}); keep their zones apart, or pinch one after the other"
+            )
+    if item.how == "rest":
+        ramps.rest[rows] = nominal
+        ramps.rest_ends[rows] += ends * (target[:, None] - ramps.rest_ends[rows])
+        return
+    ramps.law[rows], ramps.held[rows] = HELD, nominal
+    ramps.pinch.toward[rows], ramps.pinch.part[rows], ramps.pinch.ends[rows] = target, part, ends
+    ramps.pinch.base[rows] = np.where(ramps.folded[rows], now, np.nan)
+    ramps.pinched[rows] = True
+
+
+def _check(ramps: Ramps, name: str, item: Pinch, rows: Ints, now: Array, target: Array) -> None:
+    law = ramps.law[rows]
+    if (law == SHEET).any():
+        raise ModelError(
+            f"pinch of crease '{name}': it is ordinary sheet there; fold it before, or in the same step"
+        )
+    if item.how == "rest" and (law == HELD).any():
+        raise ModelError(
+            f"pinch of crease '{name}' by rest angles: its angle is imposed there and no spring acts; "
+            "use how = 'imposed'"
+        )
+    other = (now - math.pi) * (target - math.pi) < 0.0
+    if other.any():
+        angle = float(target[int(np.argmax(other))])
+        raise ModelError(
+            f"pinch of crease '{name}' to {angle:.4g} rad would fold it to its other side; "
+            f"give {2.0 * math.pi - angle:.4g}, or by"
+        )

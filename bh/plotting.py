@@ -1,7 +1,15 @@
 """Pictures of folded sheets, curves of energy, and series for ParaView.
 
 Pictures are rendered by pyvista without a window (`bh.offscreen`) and framed by matplotlib, both imported when
-first needed.
+first needed. In one line each:
+
+    bh.plotting.picture(path[-1], "sheet.png")        # the folded sheet, coloured by energy density
+    bh.plotting.animation(path, "folding.gif")        # or .mp4
+    bh.plotting.pattern(path.model)                   # the flat pattern with creases and supports
+    bh.plotting.fold_angles(path, "crease")           # along a crease
+    bh.plotting.response(path, "node:3", "z")         # force against displacement, with stability
+    bh.plotting.curves(path)                          # energies
+    bh.interactive.view(path)                         # to turn in a browser or a notebook
 """
 
 from __future__ import annotations
@@ -10,12 +18,15 @@ import os
 import shutil
 import tempfile
 import uuid
+from collections.abc import Sequence
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.animation import animation
+from bh.charts import INK, curves, fold_angles, pattern, response
 from bh.offscreen import PlotError, has_display, render
 from bh.panels import cut_open
 from meshes.io.export import replacing, write_mesh
@@ -26,17 +37,14 @@ if TYPE_CHECKING:
     from bh.path import Path
     from bh.state import State
 
+__all__ = [
+    "PlotError", "animation", "curves", "export_series", "fold_angles", "pattern", "picture", "response", "show",
+]  # fmt: skip
+
 Array = NDArray[np.float64]
 
 KINDS = ("stretching", "bending", "folding")
-INK, PAPER, BLANK_SHEET, COLOURS = "#1b1b1f", "white", "#b9c4cf", "viridis"
-# Okabe and Ito's colours, told apart with any colour vision; dashes tell the lines apart in grey
-CURVES = {
-    "total": (INK, "-"),
-    "bending": ("#0072b2", "-"),
-    "stretching": ("#d55e00", (0, (5, 1.5))),
-    "folding": ("#009e73", (0, (1.2, 1.2))),
-}
+PAPER, BLANK_SHEET, COLOURS = "white", "#b9c4cf", "viridis"
 MOST_EDGES = 20_000  # triangles of a mesh whose edges can still be told apart in a picture
 
 
@@ -79,9 +87,7 @@ def picture(
     target = FilePath(file)
     if target.suffix.lower() != ".png":
         raise PlotError(f"picture '{target}' is not a .png file; name it so")
-    width, height = size
-    if not (160 <= width <= 8000 and 120 <= height <= 8000):
-        raise PlotError(f"picture size {width} x {height} cannot be; give 160 x 120 to 8000 x 8000 pixels")
+    width, height = _possible(size)
     colouring = _colouring(state, colour, top)
     title = _energies(state) if caption is True else (caption or "")
     unit = _unit(width, height)
@@ -92,6 +98,30 @@ def picture(
     with replacing(target) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
     return target.resolve()
+
+
+def moving_pictures(
+    states: Sequence[State], colour: str | None, size: tuple[int, int]
+) -> list[NDArray[np.uint8]]:
+    """Pictures (height, width, 3) of states as `animation` shows them: one camera, one scale of colours."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    width, height = _possible(size)
+    whole = [_colouring(state, colour, None) for state in states]
+    top = max((found.top for found in whole if found is not None), default=0.0)
+    unit = _unit(width, height)
+    head, foot = int(64 * unit), int(118 * unit) if top else 0
+    inner = height - head - foot
+    camera = _camera(states[-1], width / inner, None, np.concatenate([state.points for state in states]))
+    found = []
+    for state in states:
+        colouring = _colouring(state, colour, top or None)
+        image = _render(state, colouring, (width, inner), camera)
+        figure = _frame(image, (width, height), foot, _energies(state), f"{colour} energy density", colouring)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        found.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+    return found
 
 
 def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
@@ -126,38 +156,6 @@ def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
     plotter.add_text(_energies(state), font_size=9, color=INK, font_file=findfont("DejaVu Sans"))
     camera.aim(plotter)
     return plotter.show(**options)
-
-
-def curves(path: Path) -> Figure:
-    """Energy by kind, N mm, against step + lambda, as a matplotlib figure; kinds that stay zero are left out.
-
-    Raises:
-        PlotError: the path has no states.
-    """
-    from matplotlib.figure import Figure
-
-    if len(path) == 0:
-        raise PlotError("the path has no states to plot; trace the model first")
-    at = path.lambdas
-    energies = [state.energy.as_dict() for state in path]
-    series = {kind: np.array([energy[kind] for energy in energies]) for kind in CURVES}
-    shown = {kind: values for kind, values in series.items() if np.any(values != 0.0)}
-    if len(shown) <= 2:  # the only kind there is says all that the total would
-        shown.pop("total", None)
-    figure = Figure(figsize=(7.2, 4.4), dpi=100, layout="constrained")
-    axes = figure.subplots()
-    for boundary in range(1, int(np.ceil(at[-1] - 1e-12))):
-        axes.axvline(boundary, color="0.85", linewidth=1.0, zorder=0)
-    for kind, values in shown.items():
-        colour, dashes = CURVES[kind]
-        axes.plot(at, values, color=colour, linestyle=dashes, marker="o", markersize=3.0, label=kind)
-    axes.set(xlabel="step + λ", ylabel="energy, N mm", xlim=(at[0], max(at[-1], at[0] + 1e-3)))
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.margins(y=0.06)
-    if shown:
-        axes.set_ylim(bottom=min(0.0, *(float(values.min()) for values in shown.values())))
-        axes.legend(frameon=False, loc="upper left")
-    return figure
 
 
 def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path") -> FilePath:
@@ -203,6 +201,13 @@ def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path"
     finally:
         shutil.rmtree(new, ignore_errors=True)
     return (home / f"{name}.pvd").resolve()
+
+
+def _possible(size: tuple[int, int]) -> tuple[int, int]:
+    width, height = size
+    if not (160 <= width <= 8000 and 120 <= height <= 8000):
+        raise PlotError(f"picture size {width} x {height} cannot be; give 160 x 120 to 8000 x 8000 pixels")
+    return width, height
 
 
 # --- what is drawn -----------------------------------------------------------------------------------------
@@ -329,11 +334,13 @@ class Camera(NamedTuple):
         plotter.camera.clipping_range = (0.5 * self.depth, 3.5 * self.depth)
 
 
-def _camera(state: State, aspect: float, view: tuple[float, float] | None) -> Camera:
-    """The sheet fills the picture (`aspect` wide a height) but for a margin."""
+def _camera(
+    state: State, aspect: float, view: tuple[float, float] | None, points: Array | None = None
+) -> Camera:
+    """The sheet fills the picture (`aspect` wide a height) but for a margin, or all of `points` (n, 3) do."""
     across, up, back = _axes(*(view or _view(state, aspect)))
     to_picture = np.column_stack((across, up, back))
-    seen = state.points @ to_picture
+    seen = (state.points if points is None else points) @ to_picture
     low, high = seen.min(axis=0), seen.max(axis=0)
     width, height, _ = (high - low).tolist()
     centre, depth = to_picture @ (0.5 * (low + high)), float(np.linalg.norm(high - low))

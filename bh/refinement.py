@@ -13,7 +13,7 @@ from typing import Any
 from bh.actuation import Fold, Force
 from bh.errors import ModelError
 from bh.model import Model
-from bh.supports import RigidBody, select
+from bh.supports import Support, select
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.structured import Kind
 
@@ -121,7 +121,7 @@ def pattern_of(model: Model) -> CreasePattern:
     if model.stiffness is not None:
         raise ModelError("given element stiffness belongs to one mesh; leave out accuracy or the stiffness")
     for number, support in enumerate(model.supports):
-        if not isinstance(support, RigidBody):
+        if isinstance(support, Support):
             _check_place(support.at, f"supports[{number}]")
     for number, step in enumerate(model.steps):
         for item in step:

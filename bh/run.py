@@ -63,7 +63,10 @@ def solve(
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
         (folder / names[1]).unlink(missing_ok=True)
     try:
-        path = trace(scene.model, progress=progress, file=file, resume=resume, accuracy=scene.accuracy)
+        path = trace(
+            scene.model, progress=progress, file=file, resume=resume, accuracy=scene.accuracy,
+            symmetry=scene.symmetry,
+        )  # fmt: skip
     except (InputError, KeyboardInterrupt):
         if not resume and not holds_states(file):
             _take_back(file, made)

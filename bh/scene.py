@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from bh.actuation import Actuation, Bar, Fold, Moment, Pinch, Tether
+from bh.actuation import Actuation, Displace, Force
 from bh.describe import ACTUATIONS as MAKERS
 from bh.errors import InputError, SceneError
 from bh.formulations import formulation, names
 from bh.model import CreaseLaw, Model, Sheet
 from bh.observables import Until
+from bh.plugins import made
 from bh.program import program
 from bh.refinement import Goal, pattern_of
 from bh.scene_patterns import (
@@ -42,6 +43,7 @@ from bh.scene_schema import (
 from bh.scene_tables import (
     as_table,
     as_tables,
+    as_tuple,
     check_keys,
     nearest,
     one_line,
@@ -50,11 +52,14 @@ from bh.scene_tables import (
     read_toml,
     shown,
     within,
+    without,
 )
-from bh.supports import RigidBody, Support, directions, select
+from bh.supports import Holding, RigidBody, Support, directions, select
+from bh.symmetry import Plane, check, mirror
 from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy")
+SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy",
+            "symmetry")  # fmt: skip
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
 COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
@@ -79,6 +84,7 @@ class Scene:
         model: checked; its steps can be programmed (`bh.program`), nothing is solved.
         outputs: what a run is to write.
         accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
+        symmetry: the plane of a scene to be solved by halves, or None: `bh.trace(..., symmetry=scene.symmetry)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -88,6 +94,7 @@ class Scene:
     name: str = "scene"
     source: Path | None = None
     accuracy: Goal | None = None
+    symmetry: Plane | None = None
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -187,7 +194,17 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
             pattern_of(model)
             if accuracy.at is not None:
                 model.mesh.nodes(accuracy.at)
-    return Scene(model, Outputs(**{name: _tuple(value) for name, value in outputs}), accuracy=accuracy)
+    return Scene(model, Outputs(**{name: as_tuple(value) for name, value in outputs}), accuracy=accuracy,
+                 symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None)  # fmt: skip
+
+
+def _symmetry(model: Model, data: Any) -> Plane:
+    """A letter, or a normal."""
+    if not isinstance(data, str | list):
+        raise SceneError(f'symmetry = {shown(data)} cannot be; give "x", "y" or a normal [x, y, 0]')
+    with within("symmetry"):
+        check(model, program(model), mirror(model.mesh, data))
+    return data if isinstance(data, str) else tuple(data)
 
 
 def _accuracy(data: Any) -> Goal:
@@ -205,7 +222,7 @@ def _accuracy(data: Any) -> Goal:
 
 def _formulation(name: str) -> str:
     known = names()
-    if name not in known:
+    if name not in known and ":" not in name:
         listed = ", ".join(known) or "none; install the project with pip first"
         raise SceneError(
             f"model.formulation = {shown(name)} is not known{nearest(name, known)}; use one of {listed}"
@@ -217,15 +234,7 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
     table = as_table(pattern, "pattern")
     if "file" in table:
         return _mesh_from_file(table, mesh, folder)
-    kind = table.get("kind")
-    listed = ", ".join(LIBRARY)
-    if kind is None:
-        raise SceneError(f"pattern.kind is missing; use one of {listed}, or give a file")
-    if not isinstance(kind, str) or kind not in LIBRARY:
-        raise SceneError(
-            f"pattern.kind = {shown(kind)} is not known{nearest(kind, LIBRARY)}; use one of {listed}"
-        )
-    drawn = read_table(LIBRARY[kind], table, "pattern")
+    drawn = _drawn(table)
     if mesh is None:
         raise SceneError(
             "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
@@ -233,9 +242,26 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
     how = _mesh_table(as_table(mesh, "mesh"))
     if isinstance(how, DrawnTable):
         raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
+    return _meshed(drawn, how)
+
+
+def _drawn(table: dict[str, Any]) -> CreasePattern:
+    """A pattern of the library, or of the user's own: "module:function" with its arguments as keys."""
+    kind = table.get("kind")
+    listed = ", ".join(LIBRARY)
+    if kind is None:
+        raise SceneError(f"pattern.kind is missing; use one of {listed}, or give a file")
+    if isinstance(kind, str) and ":" in kind:
+        with within("pattern"):
+            own: CreasePattern = made(kind, without(table, "kind"), CreasePattern)
+            return own
+    if not isinstance(kind, str) or kind not in LIBRARY:
+        raise SceneError(
+            f"pattern.kind = {shown(kind)} is not known{nearest(kind, LIBRARY)}; use one of {listed}"
+        )
+    drawn = read_table(LIBRARY[kind], table, "pattern")
     with within("pattern"):
-        pattern = drawn.draw()
-    return _meshed(pattern, how)
+        return drawn.draw()
 
 
 def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
@@ -318,7 +344,11 @@ def _check_triangles(triangles: float) -> None:
         raise SceneError(f"mesh: this is some {triangles:.2g} triangles; ask for fewer than {LARGEST_MESH:,}")
 
 
-def _support(item: Any, at: str) -> Support | RigidBody:
+def _support(item: Any, at: str) -> Holding:
+    if isinstance(item, dict) and ":" in str(item.get("kind")):
+        with within(at):
+            held: Holding = made(item["kind"], without(item, "kind"), Holding)
+            return held
     table = read_table(SupportTable, item, at)
     if table.at == "rigid-body":
         return RigidBody()
@@ -342,7 +372,7 @@ def _crease(item: Any, at: str) -> CreaseLaw:
 
 def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
     step = as_table(item, at)
-    check_keys(at, step, (*ACTUATIONS, "until"))
+    check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTUATIONS, "until"))
     if not set(step) - {"until"}:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
     found: list[Actuation | Until] = []
@@ -366,7 +396,11 @@ def _until(item: Any, at: str) -> Until:
 
 
 def _actuation(key: str, item: Any, at: str) -> Actuation:
-    given = {name: _tuple(value) for name, value in read_table(ACTUATIONS[key], item, at)}
+    if ":" in key:
+        with within(at):
+            own: Actuation = made(key, as_table(item, at), Actuation)
+            return own
+    given = {name: as_tuple(value) for name, value in read_table(ACTUATIONS[key], item, at)}
     if isinstance(given.get("direction"), tuple):
         given["direction"] = _direction(given["direction"], f"{at}.direction")
     with within(at):
@@ -393,14 +427,12 @@ def _check(model: Model) -> None:
                 select(mesh, support.at)
     for i, actuations in enumerate(model.steps):
         for item in actuations:
-            if isinstance(item, Until | Bar | Tether):
-                continue
             key = type(item).__name__.lower()
-            if isinstance(item, Fold | Moment | Pinch):
-                if item.crease != "all":
-                    with within(f"steps[{i}].{key}.crease"):
-                        mesh.crease_edges(item.crease)
-            else:
+            crease = getattr(item, "crease", "all")
+            if crease != "all":
+                with within(f"steps[{i}].{key}.crease"):
+                    mesh.crease_edges(crease)
+            if isinstance(item, Force | Displace):
                 with within(f"steps[{i}].{key}.at"):
                     select(mesh, item.at)
     try:
@@ -414,7 +446,3 @@ def _check(model: Model) -> None:
         if step.constraints.rigid_body and step.force.end.any():  # forces on a free sheet have to balance
             with within(f"steps[{i}]"):
                 formulation(model.formulation).system(model, step, None)
-
-
-def _tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value

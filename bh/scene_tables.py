@@ -167,3 +167,13 @@ def one_line(text: str) -> str:
     words = " ".join(text.split())
     clean = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
     return clean if len(clean) <= 600 else clean[:596] + " ..."
+
+
+def without(table: dict[str, Any], key: str) -> dict[str, Any]:
+    """The table without one of its keys."""
+    return {name: value for name, value in table.items() if name != key}
+
+
+def as_tuple(value: Any) -> Any:
+    """Lists of a scene as the tuples of frozen data."""
+    return tuple(value) if isinstance(value, list) else value

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.program import crease_hinges
+from bh.step_program import crease_hinges
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]

@@ -22,8 +22,22 @@ UNBALANCED = (
 TURNED = "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
 
 
+class Holding:
+    """What holds a sheet. A support of your own derives from it and is a frozen dataclass of plain values
+    (docs/extending.md).
+    """
+
+    def held(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+        """Nodes and a unit direction in which they cannot move, (k,) and (3,), as often as needed."""
+        raise NotImplementedError
+
+    def clamps(self, mesh: SheetMesh) -> Ints:
+        """Rows of `mesh.topology.edges` across which the sheet keeps its slope."""
+        return np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True)
-class Support:
+class Support(Holding):
     """Nodes that cannot move in some directions.
 
     Attributes:
@@ -37,10 +51,20 @@ class Support:
     fix: str | Sequence[Sequence[float]] = "xyz"
     clamp: bool = False
 
+    def held(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+        nodes = select(mesh, self.at)
+        return [(nodes, direction) for direction in directions(self.fix)]
+
+    def clamps(self, mesh: SheetMesh) -> Ints:
+        return clamped_edges(mesh, self.at) if self.clamp else super().clamps(mesh)
+
 
 @dataclass(frozen=True)
-class RigidBody:
+class RigidBody(Holding):
     """Takes out exactly the rigid motions that the other supports leave free, without any force (see `bh.trace`)."""
+
+    def held(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+        return []
 
 
 @dataclass(frozen=True)
@@ -113,7 +137,7 @@ def select(mesh: SheetMesh, at: str | Sequence[int]) -> Ints:
 
 def resolve(
     mesh: SheetMesh,
-    supports: Iterable[Support | RigidBody],
+    supports: Iterable[Holding],
     prescribed: Iterable[Prescribed] = (),
     touching: bool = False,
 ) -> Constraints:
@@ -128,13 +152,9 @@ def resolve(
     n = len(mesh.points)
     fixed = np.zeros((n, 3), dtype=bool)
     oblique: dict[int, list[tuple[Array, float, float]]] = {}
-    rigid_body = not supports and not prescribed
+    rigid_body = (not supports and not prescribed) or any(isinstance(s, RigidBody) for s in supports)
     for support in supports:
-        if isinstance(support, RigidBody):
-            rigid_body = True
-            continue
-        nodes = select(mesh, support.at)
-        for direction in directions(support.fix):
+        for nodes, direction in support.held(mesh):
             if np.abs(direction).max() == 1.0:
                 fixed[nodes, int(np.abs(direction).argmax())] = True
             else:
@@ -164,8 +184,8 @@ def resolve(
             frame_of[node] = len(frames)
             frames.append(_complete(axes))
     stacked = np.array(frames).reshape(-1, 3, 3)
-    held = [clamped_edges(mesh, item.at) for item in supports if isinstance(item, Support) and item.clamp]
-    clamped = mesh.topology.edges[np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))]
+    clamps = [support.clamps(mesh) for support in supports]
+    clamped = mesh.topology.edges[np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *clamps]))]
     constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body and not touching, clamped)
     if not touching:
         _check_rigid_motions(mesh, constraints)

@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
-from typing import Any
 
 from bh.describe import fingerprint
 from bh.errors import ModelError, PathFileError
+from bh.halves import Half
 from bh.model import Model
 from bh.observables import until_of
 from bh.path import Path, Record, StepOutcome, new_file
@@ -19,12 +19,14 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.increments import LOAD, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.storage import PathFile
+from bh.symmetry import Plane
 from bh.threads import one_blas_thread
 
 
 def trace(
     model: Model,
     *,
+    symmetry: Plane | None = None,
     progress: bool | ProgressMeter = False,
     strategy: Strategy | None = None,
     file: str | FilePath | None = None,
@@ -35,6 +37,8 @@ def trace(
     """Follow the equilibrium of `model` through all its steps.
 
     Args:
+        symmetry: "x", "y" or a normal [x, y, 0]: solve one half of a mirror-symmetric model (`bh.symmetry`). States are
+            of the whole sheet; what leaves the symmetry is only looked for in the last state (`path.stable`).
         progress: True for a bar in the terminal, or an object that is told about every increment.
         strategy: how increments are chosen; the default suits all scenes.
         file: write every accepted state to this file before the next increment begins.
@@ -58,9 +62,19 @@ def trace(
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
     if accuracy is not None:
-        return _trace_to(model, accuracy, progress, strategy, file, resume, after)
+        if resume or after is not None:
+            raise ModelError(
+                "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
+            )
+        from bh.accuracy import solve
+
+        goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
+        path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)
+        if file is not None:
+            path.save(file)
+        return path
     strategy = strategy or Automatic()
-    path = Path(model) if after is None else _continued(after, model)
+    path = Path(model, symmetry=symmetry) if after is None else _continued(after, model, symmetry)
     target: PathFile | None = None
     if file is not None:
         if after is not None:
@@ -68,7 +82,7 @@ def trace(
                 "a path that goes on from another one cannot have a file; save it when it is solved"
             )
         if resume:
-            path, target = _resume(model, FilePath(file))
+            path, target = _resume(model, FilePath(file), symmetry)
         else:
             path._system(0)  # a model that cannot be solved must not replace the file of one that was
             target = new_file(path, FilePath(file))
@@ -89,35 +103,15 @@ def trace(
     return path
 
 
-def _trace_to(
-    model: Model,
-    accuracy: float | Goal,
-    progress: bool | ProgressMeter,
-    strategy: Strategy | None,
-    file: str | FilePath | None,
-    resume: bool,
-    after: Path | None,
-) -> Path:
-    from bh.accuracy import solve
-
-    if resume or after is not None:
-        raise ModelError(
-            "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
-        )
-    goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-    path = solve(model, goal, progress=progress, strategy=strategy)
-    if file is not None:
-        path.save(file)
-    return path
-
-
 def _run_step(
     path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
 ) -> StepOutcome:
-    system = path._system(step)
+    half = path._half(step)
+    system = path._system(step) if half is None else half.system
     began = time.perf_counter()
 
     def accept(record: Record) -> None:
+        record = record if half is None else half.whole(record)
         path.records.append(record)
         if target is not None:
             target.add(path._row(len(path.records) - 1, record))
@@ -136,13 +130,14 @@ def _run_step(
             )
             began = time.perf_counter()
     else:
-        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in _recent(done)]
+        recent = [record if half is None else half.part(record) for record in _recent(done)]
+        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in recent]
         increment = done[-1].next_increment
         if (
             len(history) < 3 and step > 0 and not any(r.jumped for r in done)
         ):  # later steps do not store their start
             history.insert(0, origin)
-    goal, tolerance = _goal(path, step, system)
+    goal, tolerance = _goal(path, step, half)
     for item in walk(Walk(system, strategy, tuple(history), increment, origin, goal, tolerance)):
         now = time.perf_counter()
         if item.outcome != "reached":
@@ -160,14 +155,16 @@ def _run_step(
     return StepOutcome("reached")
 
 
-def _goal(path: Path, step: int, system: Any) -> tuple[Callable[[Point], float] | None, float]:
+def _goal(path: Path, step: int, half: Half | None) -> tuple[Callable[[Point], float] | None, float]:
     """What is zero where the step ends early, and to which tolerance; None if nothing ends it early."""
     until = until_of(path.model.steps[step])
     if until is None:
         return None, 0.0
 
     def missed(at: Point) -> float:
-        return until.measure(path._formulation.observe(path.model, system, at.q, at.lam, step)) - until.value
+        q = at.q if half is None else half.unknowns(at.q, at.lam)
+        state = path._formulation.observe(path.model, path._system(step), q, at.lam, step)
+        return until.measure(state) - until.value
 
     return missed, until.tolerance
 
@@ -181,7 +178,7 @@ def _recent(done: list[Record]) -> list[Record]:
     return done[max(arc - 3, jumps[-1] if jumps else 0, 0) :]
 
 
-def _continued(after: Path, model: Model) -> Path:
+def _continued(after: Path, model: Model, symmetry: Plane | None) -> Path:
     """A path of `model` that begins with all that `after` has."""
     if after.outcome != "reached":
         raise ModelError(f"the path to go on from ended early ({after.outcome}); solve it first")
@@ -189,26 +186,26 @@ def _continued(after: Path, model: Model) -> Path:
         raise ModelError(
             "the path to go on from is of another model; add steps to its own: path.model.step(...)"
         )
-    path = Path(model)
+    path = Path(model, symmetry=symmetry)
     path.records, path.steps = list(after.records), list(after.steps)
     path._states = dict(after._states)
     return path
 
 
-def _resume(model: Model, file: FilePath) -> tuple[Path, PathFile]:
+def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path, PathFile]:
     path = Path.load(file)
     if path.provenance.get("input") != fingerprint(model):
         raise PathFileError(
             f"'{file}' holds another model; run without --resume, or choose another output folder"
         )
-    path = _with_model(path, model)
+    path = _with_model(path, model, symmetry)
     target = PathFile.open(file)
     target.forget_failed_steps()
     path.steps = [step for step in path.steps if step.outcome == "reached"]
     return path, target
 
 
-def _with_model(path: Path, model: Model) -> Path:
-    other = Path(model, path.provenance)
+def _with_model(path: Path, model: Model, symmetry: Plane | None) -> Path:
+    other = Path(model, path.provenance, symmetry)
     other.records, other.steps = path.records, path.steps
     return other

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from bh.actuation import Ramp
 from bh.errors import ModelError
+from bh.laws import HELD, SHEET, SPRING
 from bh.model import Model
-from bh.program import HELD, SHEET, SPRING, StepProgram
+from bh.step_program import StepProgram
 from fem.shell import edge_tangents
 from fem.spaces import tables
 from meshes.curved import ElementMesh

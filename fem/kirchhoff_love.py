@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.model import Model, Sheet
-from bh.program import StepProgram, program
+from bh.program import program
 from bh.refinement import Refinement
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
 from bh.solvers.trace import Strategy, Walk, walk
 from bh.state import State
+from bh.step_program import StepProgram
 from bh.threads import one_blas_thread
 from fem.loads import EdgeMoments
 from fem.observables import ShellState, observe

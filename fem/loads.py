@@ -55,47 +55,52 @@ def _plain(item: Actuation | Until) -> Actuation | Until:
     return item
 
 
-def forces(mesh: ElementMesh, model: Model, step: int, lengths: Array) -> Ramp:
+def forces(mesh: ElementMesh, model: Model, step: int, acting: Ramp, lengths: Array) -> Ramp:
     """Dead forces (n, 3) on all nodes, N, at the start and the end of step `step`.
 
-    A `total` on a named set of edges is a uniform line load a length of edge; everything else acts on the corners
-    named. A force stays until another one acts on the same place, as in `bh.program`.
+    They are those of `acting` (corners, 3), what the steps ask for, but that a `total` on a named set of edges is a
+    uniform line load a length of edge instead of equal shares.
     """
-    for actuations in model.steps[:step]:  # the builder of these does not know where such a step ended
+    for actuations in model.steps[
+        :step
+    ]:  # nobody knows here which part of a line load acted where such a step ended
         moved = any(isinstance(item, Force | Displace) for item in actuations)
         if moved and any(isinstance(item, Until) for item in actuations):
             raise ModelError("the shell cannot go on after a force or displacement that `until` ended early")
-    acting: dict[object, Array] = {}
-    before: dict[object, Array] = {}
+    lines: dict[str, Array] = {}
+    before: dict[str, Array] = {}
     for actuations in model.steps[: step + 1]:
-        before = dict(acting)
+        before = dict(lines)
         for item in actuations:
-            if isinstance(item, Force):
-                key = item.at if isinstance(item.at, str) else tuple(item.at)
-                acting[key] = _force(mesh, item, lengths)
-    none = np.zeros_like(mesh.nodes)
-    return Ramp(sum(before.values(), none), sum(acting.values(), none.copy()))
+            if isinstance(item, Force) and isinstance(item.at, str) and item.at in mesh.sheet.edge_sets:
+                lines[item.at] = _line(mesh, item, lengths)
+
+    def whole(corners: Array, instead: dict[str, Array]) -> Array:
+        out = np.zeros_like(mesh.nodes)
+        out[: len(corners)] = corners
+        return sum(instead.values(), out)
+
+    return Ramp(whole(acting.start, before), whole(acting.end, lines))
 
 
-def _force(mesh: ElementMesh, item: Force, lengths: Array) -> Array:
+def _line(mesh: ElementMesh, item: Force, lengths: Array) -> Array:
+    """(n, 3) what is different where a total force is a line load, N."""
     out = np.zeros_like(mesh.nodes)
-    if item.total is not None and isinstance(item.at, str) and item.at in mesh.sheet.edge_sets:
-        total = np.asarray(item.total, dtype=float)
-        edges = mesh.sheet.topology.find_edges(mesh.sheet.edge_sets[item.at])
-        share = lengths[edges] / lengths[edges].sum()
-        ends = mesh.sheet.topology.edges[edges]
-        middle = len(mesh.sheet.points) + edges
-        rule: tuple[tuple[Ints, float], ...] = ((ends[:, 0], 0.5), (ends[:, 1], 0.5))
-        if mesh.degree == 2:
-            rule = ((ends[:, 0], 1.0 / 6.0), (ends[:, 1], 1.0 / 6.0), (middle, 2.0 / 3.0))  # Simpson's
-        for rows, part in rule:
-            np.add.at(out, rows, part * share[:, None] * total)
+    if item.total is None:
         return out
-    nodes: Ints = select(mesh.sheet, item.at)
-    if item.each is not None:
-        out[nodes] = np.asarray(item.each, dtype=float)
-    else:
-        out[nodes] = np.asarray(item.total, dtype=float) / len(nodes)
+    assert isinstance(item.at, str)
+    total = np.asarray(item.total, dtype=float)
+    edges = mesh.sheet.topology.find_edges(mesh.sheet.edge_sets[item.at])
+    share = lengths[edges] / lengths[edges].sum()
+    ends = mesh.sheet.topology.edges[edges]
+    middle = len(mesh.sheet.points) + edges
+    rule: tuple[tuple[Ints, float], ...] = ((ends[:, 0], 0.5), (ends[:, 1], 0.5))
+    if mesh.degree == 2:
+        rule = ((ends[:, 0], 1.0 / 6.0), (ends[:, 1], 1.0 / 6.0), (middle, 2.0 / 3.0))  # Simpson's
+    for rows, part in rule:
+        np.add.at(out, rows, part * share[:, None] * total)
+    nodes = select(mesh.sheet, item.at)
+    out[nodes] -= total / len(nodes)
     return out
 
 

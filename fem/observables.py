@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.model import Model, Sheet
-from bh.program import crease_hinges
 from bh.state import Energy, State
+from bh.step_program import crease_hinges
 from fem.kernels import Frames
 from fem.shell import ShellElements
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.model import Model
-from bh.program import StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation, grows_ahead
+from bh.step_program import StepProgram
 from bh.supports import TURNED, UNBALANCED
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
@@ -97,7 +97,7 @@ class ShellSystem:
 
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
-        force = loads.forces(self.mesh, model, step, self.elements.lengths)
+        force = loads.forces(self.mesh, model, step, self.program.force, self.elements.lengths)
         couple = loads.edge_moments(self.elements, moments)
         none = np.zeros(self.elements.tables.rotations * len(self.creases))
         ends = [

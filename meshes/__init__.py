@@ -15,6 +15,7 @@ from meshes.library import (
 from meshes.mesh import SheetMesh
 from meshes.parallel import parallel_creases
 from meshes.pattern import Crease, CreasePattern
+from meshes.ruled import ruled
 from meshes.structured import structured
 from meshes.unstructured import unstructured
 
@@ -38,6 +39,7 @@ __all__ = [
     "opposite_parabolas",
     "parabolic_canopy",
     "parallel_creases",
+    "ruled",
     "sine_tessellation",
     "strip",
     "structured",

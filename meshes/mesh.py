@@ -49,6 +49,7 @@ class SheetMesh:
             None where the mesh has no such directions.
         kind: how it was meshed ("staggered", "alternating", "one-way", "mirrored", "gmsh", "imported", ...).
         aspect_ratio: mean panel height across the crease over width along it (alpha = H / W), or nan.
+        remarks: what was taken for granted when the pattern was read, one line each.
         origin: the pattern that it was made of, where there is one; see `pattern`.
 
     Raises:
@@ -65,6 +66,7 @@ class SheetMesh:
     spans: Array | None = None
     kind: str = "imported"
     aspect_ratio: float = float("nan")
+    remarks: tuple[str, ...] = ()
     origin: Origin | None = None
 
     def __post_init__(self) -> None:
@@ -169,7 +171,9 @@ class SheetMesh:
         return tuple(name.removeprefix("crease:") for name in self.edge_sets if name.startswith("crease:"))
 
     def nodes(self, at: str) -> Ints:
-        """Nodes of a named place: "corner:inner-start", "edge:inner", "crease:NAME", "node:N" or "all".
+        """Nodes of a place: "corner:inner-start", "edge:inner", "crease:NAME", "node:N", "near:X,Y" or "all".
+
+        "near:X,Y" is the node nearest to that place of the stress-free sheet, mm, seen from +z.
 
         Raises:
             MeshError: there is no such place; the message lists those there are.
@@ -186,8 +190,21 @@ class SheetMesh:
             if text.isdecimal() and len(text) < 19 and int(text) < len(self.points):
                 return np.array([int(text)])
             raise MeshError(f"'{at}' is not a node of the mesh; use node:0 to node:{len(self.points) - 1}")
-        places = [*self.corners, *self.edge_sets, "node:N", "all"]
+        if at.startswith("near:"):
+            return np.array([self._nearest(at)])
+        places = [*self.corners, *self.edge_sets, "node:N", "near:X,Y", "all"]
         raise MeshError(f"the sheet has no place '{at}'; use one of {', '.join(places)}")
+
+    def _nearest(self, at: str) -> int:
+        try:
+            x, y = (float(word) for word in at.removeprefix("near:").split(","))
+        except ValueError:
+            raise MeshError(f"'{at}' is no place; write two lengths in mm: near:10.5,20") from None
+        away = np.hypot(self.points[:, 0] - x, self.points[:, 1] - y)
+        nearest = int(away.argmin()) if np.isfinite(away).all() else 0
+        if not away[nearest] <= 0.1 * self.size:
+            raise MeshError(f"'{at}' is {away[nearest]:.4g} mm from the sheet; name a place on it")
+        return nearest
 
     def crease_edges(self, crease: str) -> Ints:
         """(k, 2) node pairs along a crease, in order.

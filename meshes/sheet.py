@@ -157,9 +157,13 @@ def _check_inside(graph: Graph, lines: Sequence[DrawnLine], polygon: Any, inside
     shapely.prepare(polygon)
     within = shapely.contains_xy(polygon, middle)
     for e in inside[~within].tolist():
+        out = max(float(polygon.distance(shapely.Point(point))) for point in graph.points[graph.edges[e]])
+        mend = (
+            f", or cut off what stands out by gap = {1.05 * out:.2g}" if out < 0.05 * polygon.length else ""
+        )
         raise PatternError(
             f"{_name(graph, lines, e)} ({graph.kinds[e]}) leaves the sheet at {_middle(graph, e)}; "
-            "end it at the outline, or raise gap"
+            f"end it at the outline{mend}"
         )
     for e in inside.tolist():
         if graph.kinds[e] == "cut":

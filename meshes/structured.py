@@ -93,6 +93,7 @@ def structured(
         spans=spans,
         kind=kind,
         aspect_ratio=alpha,
+        remarks=pattern.remarks,
         origin=Origin.of(pattern, points, triangles),
     )
 

@@ -120,6 +120,16 @@ def build(triangles: Ints, nodes: int) -> Topology:
     return Topology(edges, edge_triangles, hinges, inner, triangle_edges)
 
 
+def dihedral_angles(points: NDArray[np.float64], hinges: Ints) -> NDArray[np.float64]:
+    """(m,) dihedral angles of `hinges` (m, 4) with nodes at `points` (n, 3), rad in [0, 2 pi); flat is pi exactly."""
+    wing, tail, head, other = (points[hinges[:, k]] for k in range(4))
+    edge = head - tail
+    one, two = np.cross(edge, wing - tail), np.cross(other - tail, edge)
+    sine = np.linalg.norm(edge, axis=1) * np.einsum("mi,mi->m", one, other - tail)
+    turn = np.arctan2(sine, np.einsum("mi,mi->m", one, two))
+    return np.asarray(np.mod(np.pi + turn, 2.0 * np.pi))
+
+
 def boundary_loops(topology: Topology) -> list[Ints]:
     """The boundary as closed loops of nodes, longest first.
 

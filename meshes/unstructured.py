@@ -111,6 +111,7 @@ def unstructured(
         fold_angles=drawn_angles(pattern, chains),
         curves=curves,
         kind="gmsh",
+        remarks=pattern.remarks,
         origin=Origin.of(pattern, points, triangles),
     )
 

@@ -15,7 +15,7 @@ from meshes.errors import FileFormatError
 from meshes.io.export import replacing
 from reports import words
 from reports.changes import MOST, changes
-from reports.claims import Claim, claims
+from reports.claims import Claim, claims, claims_csv
 from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
 from reports.records import (
     Case,
@@ -35,6 +35,7 @@ SOURCE = (
     "Stiffness and Enable Shape Morphing of Thin-Sheet Structures” by Woodruff."
 )
 MOST_FAILURES = 25  # that are listed at the top
+MOST_PARETO = 4  # plots of error against time on the front page
 TEMPLATES = Path(__file__).parent / "templates"
 ASSETS = {"plotly.min.js": interactive.library, "viewer.js": interactive.script}
 
@@ -158,6 +159,7 @@ class Site:
                 most_failures=MOST_FAILURES,
                 most_moves=MOST,
                 pareto=_pareto(every),
+                claims_csv=claims_csv(claim for shown in self.pages for claim in shown.claims),
                 odd=[item for case in every for item in case.checks if item[1].passed and item[1].use > 1.0],
                 seconds_in_all=sum(case.info.wall_time_s or 0.0 for case in every),
             )
@@ -238,12 +240,21 @@ def _seeds(cases: Sequence[Case]) -> str:
 
 
 def _pareto(cases: Iterable[Case]) -> tuple[Case, list[dict[str, Any]]] | None:
-    """The plots of error against time of the case `speed_error`, if it has been run."""
+    """Plots of error against time of the case `speed_error`, if it has been run: those of the energy, if it has any."""
     for case in cases:
-        if case.name == "speed_error" and case.plots:
-            named = [item for item in case.plots if "pareto" in item["plot"].id.lower()]
-            return case, (named or case.plots)[:2]
+        if case.name != "speed_error":
+            continue
+        against_time = [item for item in case.plots if item["plot"].id.endswith("-time")]
+        energies = [item for item in against_time if "energy" in item["plot"].id]
+        shown = (energies or against_time or case.plots)[:MOST_PARETO]
+        return (case, [_renamed(item, "front-") for item in shown]) if shown else None
     return None
+
+
+def _renamed(item: dict[str, Any], prefix: str) -> dict[str, Any]:
+    """A plot that is shown twice, with ids of its own."""
+    drawn = svg(item["plot"], f"{prefix}{item['plot'].id}-")
+    return {**item, "svg": drawn}
 
 
 def _cases(results: Results, folder: Path) -> list[Case]:

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
+from reports.figures import csv_link
 from reports.records import Case, Check
 
 PREFIX = "source "
@@ -63,6 +65,23 @@ def claims(cases: Iterable[Case]) -> list[Claim]:
                 number, check = max(alike, key=_severity)
                 found.append(Claim(case, number, check, len(alike)))
     return found
+
+
+def claims_csv(found: Iterable[Claim]) -> str:
+    """Link to the table as CSV."""
+    rows: list[list[Any]] = [
+        ["case", "place", "claim", "quantity", "published", "ours", "error bar", "unit", "error", "tolerance",
+         "verdict", "of records", "unknowns", "wall_time_s", "command"]
+    ]  # fmt: skip
+    for claim in found:
+        check = claim.check
+        quick = " --quick" if claim.case.info.quick else ""
+        rows.append(
+            [claim.case.name, claim.place, claim.words, check.quantity, check.reference, check.value, check.bar,
+             check.unit, check.error, check.tolerance, claim.verdict, claim.count, check.unknowns,
+             check.wall_time_s, f"bh verify {claim.case.name}{quick}"]
+        )  # fmt: skip
+    return csv_link(rows)
 
 
 def _severity(row: tuple[int, Check]) -> tuple[int, float]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+MOST_JOBS = 4  # cases at a time unless told otherwise; each takes half a gigabyte
 
 
 def report(
@@ -19,13 +22,16 @@ def report(
     reuse: Annotated[
         bool, typer.Option("--reuse", help="show the results that are there, run nothing")
     ] = False,
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", min=0, help="cases that are run at a time 0: one a core, up to 4")
+    ] = 0,
     pdf: Annotated[
         bool, typer.Option("--pdf", help="print all of it to a PDF file beside the page; needs a browser")
     ] = False,
 ) -> None:
-    """Run the verification cases and write the report: a front page, and a folder of chapters beside it.
+    """Run the verification cases and write the report page.
 
-    They need nothing else, no network and no server.
+    It is the front page of a site: the chapters lie in a folder beside it. They need no network and no server.
     """
     from reports.build import build
     from reports.records import read, shortfall
@@ -34,7 +40,8 @@ def report(
     if not reuse:
         from verification.run import run
 
-        run(None, results, quick, lambda text: typer.echo(text, err=True))
+        at_once = jobs or min(os.cpu_count() or 1, MOST_JOBS)
+        run(None, results, quick, lambda text: typer.echo(text, err=True), at_once)
     written = build(results, page)
     printed = None
     if pdf:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 WIDTH, HEIGHT = 420, 300  # of a plot, CSS pixels where it is not scaled
+MOST_MARKERS = 40  # points of a curve that are all marked
 WIDEST = 1600  # of a picture, pixels
 # stand-ins for the CSS variables while matplotlib draws; no two may be equal
 INK, SOFT, RULE = "#010203", "#010204", "#010205"
@@ -184,8 +185,12 @@ def _draw(axes: Axes, plot: Plot) -> None:
         if series.style == "points":
             axes.plot(x, y, linestyle="none", markersize=5.0 + 2.0 * extra, **look)
         else:
-            size = 4.2 + 2.0 * extra if len(x) <= 40 else 0.0
-            axes.plot(x, y, linestyle=pattern, linewidth=1.5 + 1.5 * extra, markersize=size, **look)
+            size = 4.2 + 2.0 * extra
+            # a long curve has a few markers, on other places than its neighbours have theirs
+            every = None if len(x) <= MOST_MARKERS else (number * len(x) // 64, max(len(x) // 8, 1))
+            axes.plot(
+                x, y, linestyle=pattern, linewidth=1.5 + 1.5 * extra, markersize=size, markevery=every, **look
+            )
     axes.set_xlabel(typeset(plot.x.label))
     axes.set_ylabel(typeset(plot.y.label))
     axes.spines[["top", "right"]].set_visible(False)
@@ -267,6 +272,15 @@ _GREEK = {
     "phi": "φ",
     "psi": "ψ",
     "pi": "π",
+    "beta": "β",
+    "gamma": "\N{GREEK SMALL LETTER GAMMA}",
+    "delta": "δ",
+    "eta": "η",
+    "mu": "μ",
+    "rho": "\N{GREEK SMALL LETTER RHO}",
+    "sigma": "\N{GREEK SMALL LETTER SIGMA}",
+    "tau": "τ",
+    "omega": "ω",
 }
 _POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)[eE]([+-]?\d+)(?![\w]|\.\d)")
 _THOUSANDS = re.compile(r"(?<![\d.,])\d{1,3}(?:,\d{3})+(?![\d,]\d)")

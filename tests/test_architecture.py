@@ -18,15 +18,17 @@ LONGEST_MODULE, LONGEST_FUNCTION = 450, 80
 HEAVY = ("gmsh", "pyvista", "matplotlib", "plotly", "skfem", "dask", "distributed", "pymoo", "xarray", "h5py")
 
 DESCRIPTION = (
-    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.program", "bh.observables",
+    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.laws", "bh.ramps", "bh.plugins",
+    "bh.step_program", "bh.program", "bh.observables",
     "bh.describe", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state", "bh.formulations",
-    "bh.refinement",
+    "bh.refinement", "bh.symmetry", "bh.advice",
 )  # fmt: skip
-PATH = ("bh.path", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")
+PATH = ("bh.path", "bh.halves", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = (
-    "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.offscreen", "bh.warm_up",
-    "bh.accuracy", "bh.advice", "bh.check", "bh.example", "bh.export", "bh.schema",
+    "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.charts", "bh.animation",
+    "bh.offscreen", "bh.warm_up",
+    "bh.accuracy", "bh.check", "bh.design", "bh.example", "bh.export", "bh.schema",
 )  # fmt: skip
 
 # What each part may import of the house; the first prefix that fits a module decides. Its own part is written out,

@@ -11,6 +11,7 @@ import numpy as np
 
 import meshes
 from bh import Model, Sheet, State, trace
+from verification import setups
 from verification.checks import CaseResult, Check, Context, cost_of, line, plot, reached_energy
 from verification.theory import cone
 
@@ -76,6 +77,11 @@ def run(context: Context) -> CaseResult:
                     )  # fmt: skip
             if along == 64:
                 _picture(result, context, path[-1], actuation)
+    for actuation, how in (
+        ("a", "both curved edges are kept in the plane"),
+        ("d", "only its corners are held"),
+    ):
+        setups.draw(result, context, model(actuation, 32), f"({actuation}), {how}")
     x = [float(n) for n in densities]
     series = [line(f"({a})", x, values) for a, values in totals.items()]
     series.append(line("cone, nu = 0", x, [exact] * len(x), "reference"))

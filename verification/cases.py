@@ -1,55 +1,82 @@
-"""All named cases; adding one is adding a file and a line here."""
+"""All named cases. Adding one is adding a file of that name with a function `run`, and a line here: the commands, the
+tests and the page of its chapter in the report find it (docs/extending.md).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
 
 from meshes.errors import InputError
 from verification.checks import Case
 
-ALL_CASES = {
-    "strips": "verification.strips",
-    "shear_calibration": "verification.shear_calibration",
-    "cone": "verification.cone",
-    "appendix_b": "verification.appendix_b",
-    "consistent": "verification.consistent",
-    "convergence": "verification.convergence",
-    "fig3_6": "verification.fig3_6",
-    "fig3_8": "verification.fig3_8",
-    "fig3_10": "verification.fig3_10",
-    "derivatives": "verification.derivatives",
-    "fig3_9": "verification.fig3_9",
-    "fig3_11": "verification.fig3_11",
-    "sheets_3": "verification.sheets_3",
-    "fig5_5": "verification.fig5_5",
-    "fig5_9": "verification.fig5_9",
-    "fig5_10": "verification.fig5_10",
-    "fig5_11": "verification.fig5_11",
-    "fig5_3": "verification.fig5_3",
-    "appendix_a": "verification.appendix_a",
-    "pinch_shell": "verification.pinch_shell",
-    "scan": "verification.scan",
-    "hard_cases": "verification.hard_cases",
-    "appendix_b_shell": "verification.appendix_b_shell",
-    "appendix_b_cross": "verification.appendix_b_cross",
-    "appendix_b_fields": "verification.appendix_b_fields",
-    "appendix_b_sheets": "verification.appendix_b_sheets",
-    "shell_benchmarks": "verification.shell_benchmarks",
-    "tables4": "verification.tables4",
-    "top_down": "verification.top_down",
-    "bottom_up": "verification.bottom_up",
-    "three_point": "verification.three_point",
-    "speed_error": "verification.speed_error",
-    "honesty": "verification.honesty",
-    "campaign": "verification.campaign",
-}
-# run only when named: minutes, not seconds; `records` keeps a run of each
-LONG = {"campaign", "speed_error", "honesty", "fig3_8", "fig3_10"}
-LONG_CASES = {name: module for name, module in ALL_CASES.items() if name in LONG}
-CASES = {name: module for name, module in ALL_CASES.items() if name not in LONG}
-# run with the case by `bh verify`
-PARTS = {"appendix_b": ("appendix_b_shell", "appendix_b_cross", "appendix_b_fields", "appendix_b_sheets")}
+
+@dataclass(frozen=True)
+class Study:
+    """A case: the module `verification.<name>`, and where it belongs.
+
+    Attributes:
+        chapter: key of `verification.chapters.CHAPTERS`.
+        long: minutes, not seconds: run only when named, and `records` keeps a run of it.
+        part_of: the case with which `bh verify` runs it too.
+    """
+
+    name: str
+    chapter: str
+    long: bool = False
+    part_of: str | None = None
+
+    @property
+    def module(self) -> str:
+        return f"verification.{self.name}"
+
+
+STUDIES = (
+    Study("strips", "3"),
+    Study("shear_calibration", "3"),
+    Study("cone", "3"),
+    Study("appendix_b", "B"),
+    Study("consistent", "solver"),
+    Study("convergence", "solver"),
+    Study("fig3_6", "3"),
+    Study("fig3_8", "3", long=True),
+    Study("fig3_10", "3", long=True),
+    Study("derivatives", "solver"),
+    Study("fig3_9", "3"),
+    Study("fig3_11", "3"),
+    Study("sheets_3", "3"),
+    Study("fig5_5", "5"),
+    Study("fig5_9", "5"),
+    Study("fig5_10", "5"),
+    Study("fig5_11", "5"),
+    Study("fig5_3", "5"),
+    Study("appendix_a", "A"),
+    Study("pinch_shell", "5"),
+    Study("scan", "3"),
+    Study("hard_cases", "solver"),
+    Study("appendix_b_shell", "B", part_of="appendix_b"),
+    Study("appendix_b_cross", "B", part_of="appendix_b"),
+    Study("appendix_b_fields", "B", part_of="appendix_b"),
+    Study("appendix_b_sheets", "B", part_of="appendix_b"),
+    Study("shell_benchmarks", "solver"),
+    Study("tables4", "4"),
+    Study("speed_error", "solver", long=True),
+    Study("honesty", "solver", long=True),
+    Study("campaign", "solver", long=True),
+    Study("gradients", "solver"),
+    Study("top_down", "4"),
+    Study("bottom_up", "4"),
+    Study("three_point", "4"),
+    Study("forward", "6"),
+    Study("problem_a", "6"),
+    Study("problem_b", "6"),
+    Study("problem_c", "6", long=True),
+)
+BY_NAME = {study.name: study for study in STUDIES}
+ALL_CASES = tuple(BY_NAME)
+LONG_CASES = tuple(study.name for study in STUDIES if study.long)
+CASES = tuple(study.name for study in STUDIES if not study.long)
 
 
 def case(name: str) -> Case:
@@ -58,12 +85,13 @@ def case(name: str) -> Case:
     Raises:
         InputError: there is no such case; the message lists those there are.
     """
-    if name not in ALL_CASES:
+    if name not in BY_NAME:
         raise InputError(f"there is no verification case '{name}'; use one of {', '.join(ALL_CASES)}")
-    found: Case = import_module(ALL_CASES[name]).run
+    found: Case = import_module(BY_NAME[name].module).run
     return found
 
 
 def with_parts(names: Sequence[str]) -> list[str]:
     """The names, each followed by the other parts of its study, each case once."""
-    return list(dict.fromkeys(part for name in names for part in (name, *PARTS.get(name, ()))))
+    parts = [part for name in names for part in (name, *(s.name for s in STUDIES if s.part_of == name))]
+    return list(dict.fromkeys(parts))

@@ -17,6 +17,7 @@ def verify(
         "results"
     ),
     quick: Annotated[bool, typer.Option("--quick", help="fewer points in every case")] = False,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="cases that are run at a time")] = 1,
     listing: Annotated[bool, typer.Option("--list", help="list the cases and stop")] = False,
 ) -> None:
     """Check the solvers against theory and published numbers.
@@ -34,7 +35,9 @@ def verify(
         for name in LONG_CASES:
             typer.echo(f"{name}: takes minutes, runs only when named")
         return
-    data = run(with_parts(cases) if cases else None, results, quick, lambda text: typer.echo(text, err=True))
+    data = run(
+        with_parts(cases) if cases else None, results, quick, lambda text: typer.echo(text, err=True), jobs
+    )
     if json is not None:
         write_json(json, {"checks": data["checks"], "versions": data["versions"]})
     failed = [check for check in data["checks"] if check["passed"] is False]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 import meshes
 from bh import Model, Path, Sheet, trace
 from meshes.structured import Kind
+from verification import setups
 from verification.checks import CaseResult, Check, Context, cost_of, line, plot
 from verification.theory import cone
 
@@ -86,6 +87,10 @@ def run(context: Context) -> CaseResult:
                 "Energy of the sheet folded to 90 degrees over the energy of the cones.",
             )
         )
+    setups.draw(
+        result, context, cone_model(math.pi / 2, 8.0, "staggered"),
+        "a sector of 90 degrees at alpha = 8; its crease is kept in its plane",
+    )  # fmt: skip
     _notes(result)
     return result
 

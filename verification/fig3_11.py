@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bh import Automatic, Displace, LoadControl, Model, Path, State, trace
 from bh.analysis.stiffness_probe import Probe
+from verification import setups
 from verification.checks import CaseResult, Check, Context, line, plot
 from verification.hard_cases.pinching import PLEATS, Fan
 
@@ -102,6 +103,8 @@ def run(context: Context) -> CaseResult:
         _judge(result, found, {"formulation": formulation, "increments": increments, "along": along})
     context.tell("fig3_11: the folded fan, refined")
     _against_refined(result, curves, 32 if context.quick else 64, 4 if context.quick else 6)
+    fan = Fan(along, ANGLE, THICKNESS, FORMULATIONS[0], RADIUS)
+    setups.draw(result, context, fan.folded, "the pleated fan, flat")
     _plots(result, curves)
     _notes(result, curves)
     return result

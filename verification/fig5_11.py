@@ -8,6 +8,7 @@ from typing import Any
 from verification.checks import CaseResult, Context, line, plot
 from verification.pinching import (
     AS_SOURCE,
+    CONVERGED,
     LENGTH,
     NEARLY,
     WAYS,
@@ -80,7 +81,7 @@ def _claims(result: CaseResult, way: Way, level: int, found: Found) -> None:
             0.05 if way is SAME_CELLS else None, **params)  # fmt: skip
         add(result, None, "bend over spacing", bend.slope, "deg/mm", None, SOURCE, **params)
         rising = [at[w].bend for w in SPACINGS]
-        judged = 0.0 if way.meshes[level] == way.judged else None
+        judged = 0.0 if way is not CONVERGED and level == 0 else None
         add(result, None, "bend grows with spacing", float(rising == sorted(rising)), "", 1.0, SOURCE, judged,
             **params)  # fmt: skip
         twist = [abs(at[w].twist) for w in SPACINGS]

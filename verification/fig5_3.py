@@ -29,7 +29,7 @@ MESHES = {  # cells along the crease and rows a side, coarse and fine
 QUICK = {"bars-and-hinges": ((50, 1), (100, 1)), "consistent": ((20, 2), (40, 4))}
 MODERATE = math.pi / 3  # isometry holds from here to flat
 TOLERANCE = 0.02
-FEW = (1.1, 2.0, 3.0, 4.0, 10.0, 20.0, 40.0)  # pi over the dihedral angle
+FEW = (1.1, 2.0, 3.0, 4.0, 10.0, 20.0, 40.0, 80.0, 200.0)
 MANY = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0, 20.0, 24.0, 28.0, 32.0, 36.0, 40.0, 45.0, 50.0,
         60.0, 80.0, 100.0, 140.0, 200.0)  # fmt: skip
 SHOWN = (3.0, 10.0, 50.0, 200.0)
@@ -182,6 +182,9 @@ def _judge(result: CaseResult, item: Curve, params: dict[str, object]) -> None:
             SOURCE + ": departs",
             None,
         )
+    add("kappa over kappa_0 at pi/200", float(item.ratio[-1]), "", None, SOURCE + ": goes to 0", None)
+    add("opening of the panels at pi/200, over the angle at the crease", float(item.opening[-1] / item.turned[-1]), "",
+        None, "1 if panels stay straight across the crease", None)  # fmt: skip
     if len(item.phi) < len(MANY):
         return
     angle, height = item.peak()
@@ -198,9 +201,6 @@ def _judge(result: CaseResult, item: Curve, params: dict[str, object]) -> None:
             None,
         )
     add("largest kappa over kappa_0", height, "", None, SOURCE, None)
-    add("kappa over kappa_0 at pi/200", float(item.ratio[-1]), "", None, SOURCE + ": goes to 0", None)
-    add("opening of the panels at pi/200, over the angle at the crease", float(item.opening[-1] / item.turned[-1]), "",
-        None, "1 if panels stay straight across the crease", None)  # fmt: skip
     over = bool((item.stretching > item.bending).any() and item.bending[-1] < item.bending.max())
     add(
         "stretching overtakes bending, which falls",

@@ -120,6 +120,7 @@ def pinched(
     sheet: Sheet = SHEET,
     left: float = PINCHED,
     folds: Sequence[str] | None = None,
+    Lstar: float = LSTAR,
 ) -> Pinched:
     """Fold all creases to 90 degrees by the rest angle of their springs, then pinch their middles.
 
@@ -129,7 +130,7 @@ def pinched(
     along, rows = mesh
     pattern = meshes.parallel_creases(curvature, LENGTH, spacing, creases, folds)  # type: ignore[arg-type]
     model = Model(meshes.structured(pattern, along=along, rows=rows), sheet, formulation=way.formulation)
-    model = model.fold("all", by=FOLDED, Lstar=LSTAR)
+    model = model.fold("all", by=FOLDED, Lstar=Lstar)
     path = trace(model.pinch("all", by=math.pi - left, length=way.zone, profile=way.profile))
     return Pinched(path, way.zone)
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 import math
+import multiprocessing
 import os
 import platform
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from meshes.errors import InputError
-from verification.cases import ALL_CASES, CASES, LONG_CASES, case
+from verification.cases import BY_NAME, CASES, LONG_CASES, case
 from verification.checks import RECORD, CaseResult, Context
 from verification.environment import environment
 
@@ -28,8 +30,9 @@ def run(
     folder: Path,
     quick: bool = False,
     report: Callable[[str], None] = lambda text: None,
+    jobs: int = 1,
 ) -> dict[str, Any]:
-    """Run the named cases (all if None) and write `folder`/checks.json and the pictures.
+    """Run the named cases (all if None) and write `folder`/checks.json and the pictures, `jobs` cases at a time.
 
     The file keeps what it holds of other cases, each with the versions, the date, the machine and the `quick` of its
     own run; those at the top are of this run (`quick` if any case is).
@@ -39,7 +42,9 @@ def run(
     Raises:
         InputError: an unknown case, or a folder that cannot be written.
     """
-    functions = {name: case(name) for name in (cases or CASES)}
+    names = list(dict.fromkeys(cases or CASES))
+    for name in names:
+        case(name)  # an unknown one is told before any is run
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -47,21 +52,53 @@ def run(
         raise InputError(
             f"cannot write the folder '{folder}' ({error.strerror}); choose another one"
         ) from error
-    context = Context(folder, quick, report)
     found = []
-    for name, function in functions.items():
-        began = time.perf_counter()
-        result = function(context)
-        result.wall_time_s = time.perf_counter() - began
+    for result in _results(names, folder, quick, report, min(jobs, len(names))):
         passed = sum(check.passed is True for check in result.checks)
         judged = sum(check.passed is not None for check in result.checks)
-        report(f"{name}: {result.verdict}, {passed} of {judged} checks passed, {result.wall_time_s:.1f} s")
+        report(
+            f"{result.name}: {result.verdict}, {passed} of {judged} checks passed, {result.wall_time_s:.1f} s"
+        )
         found.append(result)
-    data = _record(found, quick)
+    found.sort(key=lambda result: names.index(result.name))
+    data = _record(found, quick, jobs)
     merged = _merged(_known(folder / "checks.json"), data)
     _keep(folder / "checks.json", folder / "previous.json")
     write_json(folder / "checks.json", merged)
     return data
+
+
+def _results(
+    names: Sequence[str], folder: Path, quick: bool, report: Callable[[str], None], jobs: int
+) -> Iterator[CaseResult]:
+    """What each case found, as it ends; by several processes if there are jobs for them."""
+    if jobs <= 1:
+        for name in names:
+            yield _timed(name, Context(folder, quick, report))
+        return
+    report(f"{len(names)} cases, {jobs} at a time; each is told of when it has ended")
+    # fresh processes: forked ones would share what libraries of threads hold
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+        futures = [pool.submit(_silent, name, folder, quick) for name in names]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except BaseException:  # one failed, or the user broke off: what has not begun is not begun
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _silent(name: str, folder: Path, quick: bool) -> CaseResult:
+    """A case in a process of its own; what it tells on the way would mix with what others tell."""
+    return _timed(name, Context(folder, quick, lambda text: None))
+
+
+def _timed(name: str, context: Context) -> CaseResult:
+    began = time.perf_counter()
+    result = case(name)(context)
+    result.wall_time_s = time.perf_counter() - began
+    return result
 
 
 def _keep(file: Path, copy: Path) -> None:
@@ -84,7 +121,7 @@ def _known(file: Path) -> dict[str, Any]:
     return known
 
 
-def _record(found: Sequence[CaseResult], quick: bool) -> dict[str, Any]:
+def _record(found: Sequence[CaseResult], quick: bool, jobs: int) -> dict[str, Any]:
     run_by = {
         "versions": environment(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -92,6 +129,7 @@ def _record(found: Sequence[CaseResult], quick: bool) -> dict[str, Any]:
             "system": platform.system(),
             "processor": platform.machine(),
             "cores": os.cpu_count(),
+            "cases at a time": jobs,
         },
         "quick": quick,
     }
@@ -108,8 +146,8 @@ def _stored(file: Path) -> dict[str, Any]:
     try:
         old = json.loads(file.read_text(encoding="utf-8"))
         of_the_run = {key: old[key] for key in OF_A_RUN}
-        cases = [{**of_the_run, **dict(info)} for info in old["cases"] if info["name"] in ALL_CASES]
-        checks = [dict(check) for check in old["checks"] if check["case"] in ALL_CASES]
+        cases = [{**of_the_run, **dict(info)} for info in old["cases"] if info["name"] in BY_NAME]
+        checks = [dict(check) for check in old["checks"] if check["case"] in BY_NAME]
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return nothing
     summary = CaseResult("", "", "", "").summary()
@@ -124,16 +162,14 @@ def _stored(file: Path) -> dict[str, Any]:
 
 
 def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
-    """The new record with what the old one has of other cases, in the order of `ALL_CASES`."""
+    """The new record with what the old one has of other cases, in the order of the cases."""
     ran = {info["name"] for info in new["cases"]}
-    order = list(ALL_CASES).index
+    order = list(BY_NAME).index
     cases = [info for info in old["cases"] if info["name"] not in ran] + new["cases"]
     checks = [check for check in old["checks"] if check["case"] not in ran] + new["checks"]
     return {
         **new,
-        "checks": sorted(
-            checks, key=lambda check: order(check["case"]) if check["case"] in ALL_CASES else -1
-        ),
+        "checks": sorted(checks, key=lambda check: order(check["case"]) if check["case"] in BY_NAME else -1),
         "quick": any(info["quick"] for info in cases),
         "cases": sorted(cases, key=lambda info: order(info["name"])),
     }

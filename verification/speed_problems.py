@@ -39,6 +39,7 @@ class Problem:
         actuate: the model of a mesh and a formulation's name.
         stiffness: read from the solved path, in `unit`; `what` says which.
         turning: all that happens is that the crease turns, which the shell can do in one increment.
+        asked: what the energy of the consistent formulation on its finest mesh may be off.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Problem:
     what: str
     unit: str
     turning: bool = True
+    asked: float = 0.01
 
     @property
     def length(self) -> float:
@@ -179,5 +181,5 @@ PROBLEMS = (
     Problem("bending", "Strip of 3.4.1 under a line load", _STRIP, 20, _bent, _sag,
             "line load over deflection of the middle", "N / mm^2", turning=False),
     Problem("lifted", "Cantilevered annulus, tip lifted by 10 mm", _sector(math.pi / 4), 8, _lifted, _lift_force,
-            "force over rise", "N/mm", turning=False),
+            "force over rise", "N/mm", turning=False, asked=0.04),
 )  # fmt: skip

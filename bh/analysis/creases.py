@@ -18,8 +18,8 @@ from bh.analysis import relations
 from bh.analysis.differences import Differentiation, FiniteDifferences, SmoothingSpline, one_sided
 from bh.analysis.generators import Generators, panel_generators
 from bh.errors import ModelError
-from bh.program import crease_hinges
 from bh.state import State
+from bh.step_program import crease_hinges
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]

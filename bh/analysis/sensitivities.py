@@ -12,7 +12,8 @@ K, a and both partial derivatives are exact (`bh.mechanics.bar_hinge_design`, `c
 function that makes the model: central differences of sixth order of the element data. No solution and no residual is
 differenced, only smooth closed formulas such as a length or E t^3 L^2 / (6 A). Their error is measured as the distance
 to differences of fourth order and reported (`Sensitivity.error`). Of a stiffness the derivative of K along the sheet's
-response is differenced as well.
+response is differenced as well. Where a pinch goes on from angles that the step before came to, the adjoint of that
+step's end follows.
 """
 
 from __future__ import annotations
@@ -28,12 +29,14 @@ from numpy.typing import ArrayLike, NDArray
 from bh.errors import ModelError
 from bh.formulations import formulation
 from bh.model import Model
+from bh.observables import until_of
 from bh.path import Path
-from bh.program import crease_hinges, program
+from bh.program import program
 from bh.solvers.factor import Factor, IndefiniteError
 from bh.solvers.matrices import FreeBodyMatrix
 from bh.solvers.saddle import MultiplierMatrix
 from bh.state import State
+from bh.step_program import crease_hinges
 from bh.supports import directions, select
 from bh.threads import one_blas_thread
 
@@ -62,7 +65,7 @@ class Situation:
     """A solved state with its factorised tangent: what observables are read from."""
 
     def __init__(self, path: Path, index: int) -> None:
-        self.model = path.model
+        self.path, self.model = path, path.model
         self.system, record = path.solved(index)
         if not hasattr(self.system, "design"):
             raise ModelError(
@@ -73,10 +76,17 @@ class Situation:
                 f"the state at lambda {record.lam:.4g} of step {record.step + 1} depends on the step before; "
                 "take its end"
             )
+        if any(until_of(step) is not None for step in path.model.steps[: record.step + 1]):
+            raise ModelError(
+                "a step that ends where an observable has a value has no sensitivities; give it its end"
+            )
+        if self.system.touching is not None:
+            raise ModelError("sheets that bars press on have no sensitivities; leave the bars out")
         self.step, self.q, self.lam = record.step, record.q, record.lam
         self.state: State = path[index]
         before = [i for i, other in enumerate(path.records) if other.step < record.step]
-        self.start: State | None = path[before[-1]] if before else None
+        self._before = before[-1] if before else None
+        self.start: State | None = None if self._before is None else path[self._before]
         self.moving = int(self.system.moving)
         self.matrix = self.system.tangent(self.q, self.lam, self.system.evaluate(self.q, self.lam).forces)
         try:
@@ -90,6 +100,12 @@ class Situation:
         if isinstance(inner, FreeBodyMatrix):
             self._rigid = np.zeros((len(self.q), inner.Z.shape[1]))
             self._rigid[: len(inner.Z)] = inner.Z
+
+    @cached_property
+    def previous(self) -> Situation:
+        """The last state of the step before."""
+        assert self._before is not None
+        return Situation(self.path, self._before)
 
     @cached_property
     def design(self) -> Any:
@@ -215,6 +231,30 @@ class OfPoints:
 
 
 @dataclass(frozen=True)
+class OfNodes:
+    """A function of a few node positions (m, 3) that also takes complex ones: its gradient is a complex step, exact.
+
+    No absolute values or comparisons in it; `np.sqrt((d * d).sum())` rather than `np.linalg.norm(d)`.
+    """
+
+    nodes: Sequence[int]
+    function: Callable[[Any], Any]
+
+    def value(self, at: Situation) -> float:
+        return float(np.real(self.function(at.state.points[list(self.nodes)])))
+
+    def slope(self, at: Situation) -> Slope:
+        places = at.state.points[list(self.nodes)]
+        points = np.zeros_like(at.state.points)
+        for i, node in enumerate(self.nodes):
+            for axis in range(3):
+                moved = places.astype(complex)
+                moved[i, axis] += 1e-100j
+                points[node, axis] += float(np.imag(self.function(moved))) / 1e-100
+        return Slope(points, np.zeros(len(at.q) - at.moving), {})
+
+
+@dataclass(frozen=True)
 class Stiffness:
     """Stiffness of a place along a direction, N/mm: a force over the displacement along it.
 
@@ -293,45 +333,96 @@ def of(
         raise ModelError(f"steps must be {len(p)} positive numbers, one for each parameter")
     with one_blas_thread():
         at = Situation(path, index)
-        _same(build(p), at.model)
-        rates = [_rates(at, build, p, i, h[i]) for i in range(len(p))]
-        return [_sensitivity(at, observable, rates) for observable in observables]
+        around = _Around(build, p, h, at.model)
+        return [_sensitivity(at, observable, around) for observable in observables]
 
 
-def _sensitivity(at: Situation, observable: Observable, rates: list[tuple[Data, Data]]) -> Sensitivity:
-    points, other, explicit = observable.slope(at)
+def _sensitivity(at: Situation, observable: Observable, around: _Around) -> Sensitivity:
     value = observable.value(at)
-    adjoint = at.solve(at.load(points, other), value)
+    return Sensitivity(value, *_gradient(at, observable.slope(at), value, around))
+
+
+def _gradient(at: Situation, slope: Slope, value: float, around: _Around) -> tuple[Array, Array]:
+    """(k,) derivatives to the parameters and their measured errors."""
+    by_data = derivatives_to_data(at, slope, value)
+    rates = around.rates(at)
+    gradient = np.array(
+        [sum(float(np.vdot(by_data[key], rate[key])) for key in by_data) for rate, _ in rates]
+    )
+    error = np.array(
+        [sum(float(np.vdot(np.abs(by_data[key]), off[key])) for key in by_data) for _, off in rates]
+    )
+    # what a pinch imposes follows from the angles that its step began with
+    pinch = program(at.model)[at.step].pinch
+    weights = np.where(np.isnan(pinch.base) & ~np.isnan(pinch.toward), 1.0 - pinch.part, 0.0)
+    weights = weights * at.design.imposed(by_data)
+    follows = np.flatnonzero(weights)
+    if len(follows) == 0:
+        return gradient, error
+    earlier = Slope(*at.previous.design.angle_gradient(follows, weights[follows]))
+    more = _gradient(at.previous, earlier, float(np.abs(weights).sum()), around)
+    return gradient + more[0], error + more[1]
+
+
+def derivatives_to_data(at: Situation, slope: Slope, value: float) -> Data:
+    """Derivatives of an observable to element data at equilibrium: its own, and by way of the state (the adjoint)."""
+    adjoint = at.solve(at.load(slope.points, slope.other), value)
     v, w = at.system.vectors(adjoint), adjoint[at.moving :]
     by_data = {key: -part for key, part in at.design.residual_to_data(v, w).items()}
     # nodes that supports hold move with them
-    by_data["places"] = points - at.design.second_variation(v, w)[0]
-    for key, part in explicit.items():
+    by_data["places"] = slope.points - at.design.second_variation(v, w)[0]
+    for key, part in slope.data.items():
         by_data[key] = by_data[key] + part if key in by_data else part
-    gradient = [sum(float(np.vdot(by_data[key], rate[key])) for key in by_data) for rate, _ in rates]
-    error = [sum(float(np.vdot(np.abs(by_data[key]), off[key])) for key in by_data) for _, off in rates]
-    return Sensitivity(value, np.array(gradient), np.array(error))
+    return by_data
 
 
-def _rates(at: Situation, build: Build, p: Array, i: int, h: float) -> tuple[Data, Data]:
-    """Derivatives of the element data to parameter i, and their measured errors."""
-    around: list[Data] = []
-    for offset in OFFSETS:
-        moved = p.copy()
-        moved[i] += offset * h
-        model = build(moved)
-        if not np.array_equal(model.mesh.triangles, at.model.mesh.triangles):
+class _Around:
+    """Models beside a design, and how the element data of situations change with it."""
+
+    def __init__(self, build: Build, p: Array, steps: Array, solved: Model) -> None:
+        _same(build(p), solved)
+        self.steps = steps
+        moved = [
+            [p + offset * h * row for offset in OFFSETS] for h, row in zip(steps, np.eye(len(p)), strict=True)
+        ]
+        self.models = [[build(point) for point in points] for points in moved]
+        if any(
+            not np.array_equal(m.mesh.triangles, solved.mesh.triangles) for row in self.models for m in row
+        ):
             raise ModelError("the mesh changes its triangles with the design; keep the number of cells fixed")
-        system = formulation(model.formulation).system(model, program(model)[at.step], at.start)
-        if system.size != at.system.size:
-            raise ModelError("the unknowns change with the design; keep supports and creases fixed")
-        around.append(system.design(at.q, at.lam).data())
+        self._known: dict[int, list[tuple[Data, Data]]] = {}
+
+    def rates(self, at: Situation) -> list[tuple[Data, Data]]:
+        """For each parameter derivatives of the element data of a situation, and their measured errors."""
+        if at.step not in self._known:
+            self._known[at.step] = [
+                differences([data_of(at, model) for model in row], h)
+                for row, h in zip(self.models, self.steps, strict=True)
+            ]
+        return self._known[at.step]
+
+
+def data_of(at: Situation, model: Model) -> Data:
+    """Element data of another model where a situation is."""
+    system = formulation(model.formulation).system(model, program(model)[at.step], at.start)
+    if system.size != at.system.size:
+        raise ModelError("the unknowns change with the design; keep supports and creases fixed")
+    here, there = at.system.constraints, system.constraints
+    if here.frames.shape != there.frames.shape or not np.allclose(
+        here.frames, there.frames, rtol=0.0, atol=1e-12
+    ):
+        raise ModelError("the directions of oblique supports change with the design; keep them fixed")
+    data: Data = system.design(at.q, at.lam).data()
+    return data
+
+
+def differences(around: list[Data], h: float) -> tuple[Data, Data]:
     rates, errors = {}, {}
     for key in around[0]:
         samples = np.array([data[key] for data in around])
         rates[key] = np.tensordot(SIXTH, samples, 1) / h
         errors[key] = np.abs(np.tensordot(SIXTH - FOURTH, samples, 1)) / h
-    if "ghost" in rates and np.abs(rates["ghost"]).max() > 0.0:
+    if "ghost" in rates and np.abs(rates["ghost"]).max(initial=0.0) > 0.0:
         raise ModelError(
             "sensitivities to geometry do not know clamped edges; hold their nodes, or keep the geometry"
         )

@@ -107,13 +107,15 @@ def rotate(H, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def scatter(H, n, slots, data):  # type: ignore[no-untyped-def]
+def add_lower(H, n, slots, data):  # type: ignore[no-untyped-def]
     at = 0
     for i in range(n):
         for j in range(i + 1):
             slot = slots[at]
             if slot >= 0:
                 data[slot] += H[i, j]
+            elif slot < -1:
+                data[-2 - slot] += 2.0 * H[i, j]
             at += 1
 
 
@@ -174,7 +176,7 @@ def tangent_values(  # type: ignore[no-untyped-def]
         d_bar[i, 0], d_bar[i, 1], d_bar[i, 2] = d[0], d[1], d[2]
         if turned:
             rotate(B, bars[i], frame_of, frames)
-        scatter(B, 6, bar_slots[i], data)
+        add_lower(B, 6, bar_slots[i], data)
     for i in range(len(hinges)):
         g = g_hinge[i]
         geometry = hinge_geometry(x, hinges[i], g)
@@ -188,7 +190,7 @@ def tangent_values(  # type: ignore[no-untyped-def]
         add_hinge_hessian(geometry, s_hinge[i], H)
         if turned:
             rotate(H, hinges[i], frame_of, frames)
-        scatter(H, 12, hinge_slots[i], data)
+        add_lower(H, 12, hinge_slots[i], data)
 
 
 @njit(**OPTIONS)

@@ -92,6 +92,25 @@ class BarHingeDesign:
             return f, turned[held] - system._compliance * w
         return f, np.zeros(0)
 
+    def support(self) -> dict[str, Ints]:
+        """For every entry of the data that depends on the flat mesh the nodes (..., k) that it depends on, then -1."""
+        e = self.system.elements
+        beside = self.system.mesh.topology.edge_triangles
+        corners = np.where((beside >= 0)[..., None], self.system.mesh.triangles[beside], -1).reshape(
+            len(beside), 6
+        )
+        own = np.arange(len(self.x))[:, None, None].repeat(3, axis=1)
+        on_hinge = dict.fromkeys(("hinge_stiffness", "lock", "rest", "couple"), e.hinges)
+        return {"bar_length": corners, "bar_stiffness": corners, "places": own, **on_hinge}
+
+    def imposed(self, by_data: Data) -> Array:
+        """(m,) derivatives to the imposed angles of hinges of the mesh, of derivatives to the data; zero elsewhere."""
+        e = self.system.elements
+        out = np.zeros(len(self.system.mesh.topology.hinges))
+        if e.held:
+            out[e.source[-e.held :]] = by_data["rest"][-e.held :]
+        return out
+
     # ------------------------------------------------------------------------------- derivatives to data
 
     def residual_to_data(self, v: Array, w: Array) -> Data:

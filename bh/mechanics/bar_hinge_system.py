@@ -19,13 +19,15 @@ from bh.mechanics.assembly import (
 from bh.mechanics.bar_hinge_design import BarHingeDesign
 from bh.mechanics.elements import sheet_elements
 from bh.mechanics.kinematics import dihedral_angles, dihedral_gradients
+from bh.mechanics.mirrored import half_elements, half_program, pattern_nodes
 from bh.mechanics.supported import SupportedSheet
 from bh.model import Model
-from bh.program import StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.system import Evaluation
 from bh.state import State
+from bh.step_program import StepProgram
+from bh.symmetry import Mirror
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -34,9 +36,14 @@ ROUNDING = 8.0 * np.finfo(float).eps
 
 
 class BarsAndHingesSystem(SupportedSheet):
-    """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then held moments (N mm)."""
+    """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then held moments (N mm).
 
-    def __init__(self, model: Model, program: StepProgram, start: State | None) -> None:
+    With a `plane` it is that of the half of a symmetric sheet (`bh.mechanics.mirrored`).
+    """
+
+    def __init__(
+        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+    ) -> None:
         mesh = model.mesh
         if len(program.constraints.clamped):
             raise ModelError(
@@ -49,7 +56,10 @@ class BarsAndHingesSystem(SupportedSheet):
         moments = np.zeros(len(held_start)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
         self.elements = sheet_elements(model, program, held_start, moments)
-        super().__init__(model, program, start)
+        if plane is not None:
+            self.elements = half_elements(self.elements, plane)
+            program, moments = half_program(program, plane), plane.hinge_weight * moments
+        super().__init__(model, program, start, plane)
         self.primal = self.moving
         self.size = self.primal + self.elements.held
         self._bar_scale = model.sheet.E * model.sheet.t
@@ -161,7 +171,7 @@ class BarsAndHingesSystem(SupportedSheet):
         if self.constraints.rigid_body:
             Z = self.displacements.rigid(x)
             ground = self._ground(Z, data)
-            matrix = FreeBodyMatrix(pattern.matrix(data), Z, *ground)
+            matrix = FreeBodyMatrix(pattern.matrix(data), Z, *ground, self.displacements.weight)
         else:
             matrix = pattern.matrix(data)
         if not e.held:
@@ -250,7 +260,8 @@ class BarsAndHingesSystem(SupportedSheet):
             groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
         if self.touching is not None:
             groups += (self.mesh.triangles,)
-        return build_pattern(self.displacements.number, groups, self.reference)
+        number, groups = pattern_nodes(self.displacements, groups)
+        return build_pattern(number, groups, self.reference)
 
     @cached_property
     def _compliance(self) -> Array:

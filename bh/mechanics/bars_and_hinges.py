@@ -13,8 +13,9 @@ from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
 from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
-from bh.program import StepProgram
 from bh.state import Energy, State
+from bh.step_program import StepProgram
+from bh.symmetry import Mirror
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -28,6 +29,39 @@ class BarsAndHinges:
     def system(self, model: Model, program: StepProgram, start: State | None) -> BarsAndHingesSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
         return BarsAndHingesSystem(model, program, start)
+
+    def half(
+        self, model: Model, program: StepProgram, start: State | None, plane: Mirror
+    ) -> BarsAndHingesSystem:
+        """The system of the kept half of a symmetric sheet; `start` is a state of the whole."""
+        return BarsAndHingesSystem(model, program, start, plane)
+
+    def whole(
+        self, whole: BarsAndHingesSystem, half: BarsAndHingesSystem, plane: Mirror, q: Array, lam: float
+    ) -> Array:
+        """Unknowns of the whole sheet from those of its half."""
+        out = np.empty(whole.size)
+        out[: whole.primal] = whole.displacements.unknowns(half.positions(q, lam))
+        if whole.elements.held:
+            at = np.full(len(plane.hinge), np.nan)
+            kept = half.elements.source[-half.elements.held :]
+            at[kept] = q[half.primal :] / plane.hinge_weight[kept]
+            at = np.where(np.isnan(at), at[plane.hinge], at)
+            out[whole.primal :] = at[whole.elements.source[-whole.elements.held :]]
+        return out
+
+    def part(
+        self, whole: BarsAndHingesSystem, half: BarsAndHingesSystem, plane: Mirror, q: Array, lam: float
+    ) -> Array:
+        """Unknowns of the half from those of the whole sheet."""
+        out = np.empty(half.size)
+        out[: half.primal] = half.displacements.unknowns(whole.positions(q, lam))
+        if half.elements.held:
+            at = np.zeros(len(plane.hinge))
+            at[whole.elements.source[-whole.elements.held :]] = q[whole.primal :]
+            kept = half.elements.source[-half.elements.held :]
+            out[half.primal :] = plane.hinge_weight[kept] * at[kept]
+        return out
 
     def observe(
         self,

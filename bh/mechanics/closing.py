@@ -9,10 +9,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.mechanics.assembly import add_product, rotate, scatter
+from bh.mechanics.assembly import add_lower, add_product, rotate
 from bh.mechanics.hinge_lock import ZONE, in_zone, lock, until_closed
 from bh.mechanics.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
-from bh.program import hinge_name
+from bh.step_program import hinge_name
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def lock_tangent(x, hinges, k, L, frame_of, frames, slots, data):  # type: ignor
         if _lock_matrix(x, hinges[h], k[h], L[h], g, H):
             if len(frames) > 0:
                 rotate(H, hinges[h], frame_of, frames)
-            scatter(H, 12, slots[h], data)
+            add_lower(H, 12, slots[h], data)
 
 
 @njit(**OPTIONS)

@@ -15,9 +15,10 @@ from bh.mechanics.consistent_kernels import TURN
 from bh.mechanics.consistent_system import ConsistentSystem
 from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
-from bh.program import StepProgram
 from bh.refinement import Refinement
 from bh.state import Energy, State
+from bh.step_program import StepProgram
+from bh.symmetry import Mirror
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,24 @@ class Consistent:
     def system(self, model: Model, program: StepProgram, start: State | None) -> ConsistentSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
         return ConsistentSystem(model, program, start)
+
+    def half(
+        self, model: Model, program: StepProgram, start: State | None, plane: Mirror
+    ) -> ConsistentSystem:
+        """The system of the kept half of a symmetric sheet; `start` is a state of the whole."""
+        return ConsistentSystem(model, program, start, plane)
+
+    def whole(
+        self, whole: ConsistentSystem, half: ConsistentSystem, plane: Mirror, q: Array, lam: float
+    ) -> Array:
+        """Unknowns of the whole sheet from those of its half; rotations follow from the positions."""
+        return _unknowns(whole, half.positions(q, lam), lam)
+
+    def part(
+        self, whole: ConsistentSystem, half: ConsistentSystem, plane: Mirror, q: Array, lam: float
+    ) -> Array:
+        """Unknowns of the half from those of the whole sheet."""
+        return _unknowns(half, whole.positions(q, lam), lam)
 
     def observe(
         self,
@@ -80,3 +99,7 @@ class Consistent:
             crease_moments=moments, stable=stable,
             pressing={} if system.touching is None else system.touching.pressing(x, lam),
         )  # fmt: skip
+
+
+def _unknowns(system: ConsistentSystem, x: Array, lam: float) -> Array:
+    return np.concatenate((system.displacements.unknowns(x), system.rotations_at(x, lam)))

@@ -115,6 +115,32 @@ class ConsistentDesign:
             closings.lock_force_rates(x, v, system.hinges, e.lock, self.L, f)
         return f, r
 
+    def support(self) -> dict[str, Ints]:
+        """For every entry of the data that depends on the flat mesh the nodes (..., k) that it depends on, then -1."""
+        e, joined = self.system.elements, self.system.elements.patches
+        own = np.arange(len(self.x))[:, None, None].repeat(3, axis=1)
+        inside = np.where((joined.members >= 0)[..., None], e.triangles[joined.members], -1)
+        patch = inside.reshape(len(inside), 1, 1, -1)
+        count = joined.kind.shape[1]
+        triangle = e.triangles[:, None, :]
+        of_spring = dict.fromkeys(("spring_stiffness", "spring_rest", "couple"), e.hinges)
+        return {
+            "places": own,
+            "rest_square": triangle.repeat(3, axis=1),
+            "K": triangle[:, None].repeat(3, axis=1).repeat(3, axis=2),
+            "B": patch.repeat(count, axis=1).repeat(count, axis=2),
+            "lock": self.system.hinges,
+            **of_spring,
+        }
+
+    def imposed(self, by_data: Data) -> Array:
+        """(m,) derivatives to the imposed angles of hinges of the mesh, of derivatives to the data; zero elsewhere."""
+        e = self.system.elements
+        out = np.array(by_data.get("held", np.zeros(len(e.held.end))))
+        here = self.turning & (e.patches.hinge >= 0)
+        np.add.at(out, e.patches.hinge[here], by_data["rest"][here])
+        return np.where(np.isnan(e.held.end), 0.0, out)
+
     # ------------------------------------------------------------------------------- derivatives to data
 
     def residual_to_data(self, v: Array, w: Array) -> Data:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from bh.actuation import Ramp
 from bh.errors import ModelError
+from bh.laws import HELD, SHEET, SPRING
+from bh.mechanics.consistent_half import half_consistent, half_patches
 from bh.mechanics.consistent_kernels import TURN
 from bh.mechanics.consistent_patches import (
     Patches,
@@ -21,8 +23,9 @@ from bh.mechanics.hinge_lock import ZONE, until_closed
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.model import Model
-from bh.program import HELD, SHEET, SPRING, StepProgram
 from bh.solvers.matrices import reverse_cuthill_mckee
+from bh.step_program import StepProgram
+from bh.symmetry import Mirror
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -35,7 +38,7 @@ class ConsistentElements:
     """Element arrays of one step: t triangles, c patches with a angles, h spring hinges.
 
     Attributes:
-        triangles: (t, 3) nodes; edge k is opposite corner k.
+        members: (t,) which triangles of the mesh these are; triangles: (t, 3) nodes; edge k is opposite corner k.
         rest_square: (t, 3) squares of the edges' lengths in the stress-free sheet, mm^2.
         K: (t, 3, 3) energy of stretching 1/2 gamma.K.gamma, N / mm^3.
         B_triangle: (t, 3, 3) energy of bending of a triangle by the angles at its edges, N mm.
@@ -50,6 +53,7 @@ class ConsistentElements:
         rotations: how many there are.
     """
 
+    members: Ints
     triangles: Ints
     rest_square: Array
     K: Array
@@ -75,11 +79,12 @@ class ConsistentElements:
 
 
 def consistent_elements(
-    model: Model, program: StepProgram, held_start: Array, moment_start: Array
+    model: Model, program: StepProgram, held_start: Array, moment_start: Array, plane: Mirror | None = None
 ) -> ConsistentElements:
     """Element arrays of a model in one step; `held_start` and `moment_start` (m,) are what its creases begin with.
 
-    Dihedral angles (rad) and total moments (N mm) of all hinges.
+    Dihedral angles (rad) and total moments (N mm) of all hinges. With a `plane` they are those of the half of a
+    symmetric sheet (`bh.mechanics.mirrored`).
 
     Raises:
         ModelError: given element stiffness, or a couple on a crease that is no spring.
@@ -94,8 +99,11 @@ def consistent_elements(
     clamped = np.zeros(len(topology.edges), dtype=bool)
     clamped[topology.find_edges(program.constraints.clamped)] = True
     spring = law == SPRING
-    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh))
-    rotation, turns, rotations = _number_rotations(mesh, joined, spring)
+    part = None if plane is None else plane.triangle_weight
+    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part)
+    if plane is not None:
+        joined = half_patches(joined, spring, plane)
+    rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
     quad, ghost = _quads(mesh, joined)
     nodes, place = _rows(joined, quad)
     has = rotation >= 0
@@ -119,8 +127,8 @@ def consistent_elements(
     carried = moment_start[springs] - couple.start
     begin = held_start[springs] - carried / np.where(k_fold == 0.0, np.inf, k_fold)
     begin = np.where(np.isnan(program.rest.start[springs]), begin, program.rest.start[springs])
-    return ConsistentElements(
-        triangles=mesh.triangles, rest_square=(edges**2).sum(axis=2),
+    whole = ConsistentElements(
+        members=np.arange(len(mesh.triangles)), triangles=mesh.triangles, rest_square=(edges**2).sum(axis=2),
         K=stretching_matrices(edges, areas, sheet.E, sheet.t, sheet.nu), B_triangle=B, patches=joined,
         quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
         width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
@@ -129,6 +137,7 @@ def consistent_elements(
         held=Ramp(*(np.where(law == HELD, at, np.nan) for at in (held.start, held.end))),
         lock=lock_stiffness(model, program), rotations=rotations,
     )  # fmt: skip
+    return whole if plane is None else half_consistent(whole, plane)
 
 
 def lock_stiffness(model: Model, program: StepProgram) -> Array:
@@ -171,16 +180,23 @@ def triangle_ranks(mesh: SheetMesh) -> Array:
     return np.asarray(position[mesh.triangles].mean(axis=1))
 
 
-def _number_rotations(mesh: SheetMesh, joined: Patches, spring: Bools) -> tuple[Ints, Ints, int]:
+def _number_rotations(
+    mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None
+) -> tuple[Ints, Ints, int]:
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
 
-    There is one for each hinge between two patches, and two for each spring crease.
+    There is one for each hinge between two patches, and two for each spring crease; but one for a spring in the plane
+    of a symmetric sheet, and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
-    count[spring] = 2
+    two_sided = spring.copy()
+    if plane is not None:
+        two_sided &= ~plane.hinge_inside
+        count[plane.hinge_weight == 0.0] = 0
+    count[two_sided & (count > 0)] = 2
     count[joined.hinge[joined.inner]] = 0
     first = np.cumsum(count) - count
-    both = np.column_stack((first, first + spring))
+    both = np.column_stack((first, first + two_sided))
     triangles = mesh.topology.edge_triangles[mesh.topology.hinge_edges, 0]
     side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
     has = (joined.hinge >= 0) & ~joined.inner

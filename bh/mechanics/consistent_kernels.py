@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from bh.mechanics.assembly import rotate, scatter
+from bh.mechanics.assembly import add_lower, rotate
 from bh.mechanics.hinge_lock import in_zone
 from bh.mechanics.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
 
@@ -91,7 +91,7 @@ def stretching_tangent(x, triangles, K, N, frame_of, frames, slots, data):  # ty
                     H[3 * p + i, 3 * q + i] += geometric
         if len(frames) > 0:
             rotate(H, triangles[t], frame_of, frames)
-        scatter(H, 9, slots[t], data)
+        add_lower(H, 9, slots[t], data)
 
 
 @njit(**OPTIONS)
@@ -214,7 +214,7 @@ def bending_tangent(  # type: ignore[no-untyped-def]
                         H[i, j] += G[a, i] * W[a, j]
         if len(frames) > 0:
             rotate(H, nodes[c], frame_of, frames)
-        scatter(H, n, slots[c], data)
+        add_lower(H, n, slots[c], data)
     return closing
 
 
@@ -293,7 +293,7 @@ def spring_tangent(x, hinges, stiffness, S, nodes, frame_of, frames, slots, data
         closing = _spring_matrix(x, hinges[h], stiffness[h], S[h], H, small, g) or closing
         if len(frames) > 0:
             rotate(H, nodes[h], frame_of, frames)
-        scatter(H, 14, slots[h], data)
+        add_lower(H, 14, slots[h], data)
     return closing
 
 

@@ -82,7 +82,13 @@ class Patches:
 
 
 def patches(
-    mesh: SheetMesh, B: Array, spring: Bools, clamped: Bools, rank: Array, joined: int = JOINED
+    mesh: SheetMesh,
+    B: Array,
+    spring: Bools,
+    clamped: Bools,
+    rank: Array,
+    joined: int = JOINED,
+    group: Array | None = None,
 ) -> Patches:
     """Patches of a mesh.
 
@@ -93,12 +99,15 @@ def patches(
         rank: (t,) place of every triangle along the sheet. Neighbours of one place are joined, and of two patches the
             later one measures the turn of the hinge between them, so that the band stays narrow.
         joined: rounds of joining by twos.
+        group: (t,) only triangles of one group are joined, by default all.
     """
     topology = mesh.topology
     sides = topology.edge_triangles[topology.hinge_edges]
     apart = np.abs(rank[sides[:, 0]] - rank[sides[:, 1]])
     order = np.argsort(apart, kind="stable")
     order = order[~spring[order]]
+    if group is not None:
+        order = order[group[sides[order, 0]] == group[sides[order, 1]]]
     patch_of, count = np.arange(len(B)), len(B)
     for _ in range(joined):
         patch_of, count = join_pairs(sides, order, patch_of, count)

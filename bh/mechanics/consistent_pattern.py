@@ -8,18 +8,23 @@ import numpy as np
 from numba import njit
 
 from bh.mechanics.consistent_elements import ConsistentElements
+from bh.mechanics.displacements import Displacements
 from bh.mechanics.kinematics import OPTIONS
+from bh.mechanics.mirrored import pattern_nodes
 from bh.mechanics.pattern import Pattern, build_pattern
 from meshes import SheetMesh
 from meshes.topology import Ints
 
 
-def rotation_pattern(mesh: SheetMesh, e: ConsistentElements, number: Ints, ground: int | None) -> Pattern:
+def rotation_pattern(
+    mesh: SheetMesh, e: ConsistentElements, displacements: Displacements, ground: int | None
+) -> Pattern:
     """Pattern of triangles, patches, spring creases, locks and the triangle `ground`, if there is one.
 
-    `number` (n, 3) numbers the displacements, -1 if prescribed; rotations come after them. To the order of the unknowns
+    Rotations are numbered after the displacements. To the order of the unknowns
     every rotation is a node of its own, in the middle of its edge, with a single unknown.
     """
+    number, _ = pattern_nodes(displacements, ())
     n, moving = len(number), int(number.max()) + 1
     none = n + e.rotations
     table = np.full((none + 1, 3), -1, dtype=np.int64)
@@ -38,8 +43,8 @@ def rotation_pattern(mesh: SheetMesh, e: ConsistentElements, number: Ints, groun
     springs = np.hstack((e.hinges, n + e.turns))
     groups: tuple[Ints, ...] = (e.triangles, patches, springs, hinges)
     if ground is not None:
-        groups += (e.triangles[[ground]],)
-    pattern = build_pattern(table, groups, places)
+        groups += (mesh.triangles[[ground]],)
+    pattern = build_pattern(table, pattern_nodes(displacements, groups)[1], places)
     triangles, wide, wide_springs, *rest = pattern.slots
     # of a rotation's three rows there only the first exists
     rows = np.zeros((len(patches), int(e.width.max())), dtype=np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,13 +17,15 @@ from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent_pattern import rotation_pattern
 from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
+from bh.mechanics.mirrored import half_program
 from bh.mechanics.pattern import Pattern
 from bh.mechanics.supported import SupportedSheet
 from bh.model import Model
-from bh.program import StepProgram
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation
 from bh.state import State
+from bh.step_program import StepProgram
+from bh.symmetry import Mirror
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -63,8 +65,10 @@ class Internal(NamedTuple):
 class ConsistentSystem(SupportedSheet):
     """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then edge rotations (rad)."""
 
-    def __init__(self, model: Model, program: StepProgram, start: State | None) -> None:
-        super().__init__(model, program, start)
+    def __init__(
+        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+    ) -> None:
+        super().__init__(model, program if plane is None else half_program(program, plane), start, plane)
         mesh = self.mesh
         self.hinges = hinges = mesh.topology.hinges
         start_points = mesh.points if start is None else start.points
@@ -80,7 +84,7 @@ class ConsistentSystem(SupportedSheet):
             if start is None
             else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
         )
-        self.elements = consistent_elements(model, program, angles, moments)
+        self.elements = consistent_elements(model, program, angles, moments, plane)
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
@@ -99,10 +103,17 @@ class ConsistentSystem(SupportedSheet):
         """Unknowns of the state that the step begins with; the rotations are those of least energy there."""
         q = np.zeros(self.size)
         q[: self.moving] = self.displacements.start()
-        r = self.internal(self._start_points, q[self.moving :], 0.0).r
-        if np.abs(r).max(initial=0.0) > 0.0:
-            q[self.moving :] = -sp.linalg.splu(self.rotation_stiffness()).solve(r)
+        q[self.moving :] = self.rotations_at(self._start_points, 0.0)
         return q
+
+    def rotations_at(self, x: Array, lam: float) -> Array:
+        """(rotations,) of least energy at positions x (n, 3)."""
+        r = self.internal(x, np.zeros(self.size - self.moving), lam).r
+        return np.asarray(-self._rotation_factor.solve(r)) if np.abs(r).max(initial=0.0) > 0.0 else r
+
+    @cached_property
+    def _rotation_factor(self) -> Any:
+        return sp.linalg.splu(self.rotation_stiffness())
 
     def rotation_stiffness(self) -> sp.csc_matrix:
         """Hessian of the energy in the rotations alone, which does not depend on anything."""
@@ -189,10 +200,11 @@ class ConsistentSystem(SupportedSheet):
     def _heights(self) -> Array:
         """(rotations,) height of a triangle on the edge of each rotation, mm: what turns a moment into a force."""
         e = self.elements
-        height = (2.0 * self.mesh.areas[:, None] / np.sqrt(e.rest_square)).ravel()
+        height = np.ones((len(self.mesh.triangles), 3))
+        height[e.members] = 2.0 * self.mesh.areas[e.members, None] / np.sqrt(e.rest_square)
         out = np.ones(e.rotations)
         used = e.rotation >= 0
-        out[e.rotation[used]] = height[e.patches.half_edge[used]]
+        out[e.rotation[used]] = height.ravel()[e.patches.half_edge[used]]
         return out
 
     @cached_property
@@ -200,7 +212,7 @@ class ConsistentSystem(SupportedSheet):
         """Largest stiffness of an edge, N/mm, and of a hinge over the height of its wing, N / rad."""
         e = self.elements
         stretch = np.einsum("tkk,tk->tk", e.K, e.rest_square).max()
-        height = 2.0 * self.mesh.areas[:, None] / np.sqrt(e.rest_square)
+        height = 2.0 * self.mesh.areas[e.members, None] / np.sqrt(e.rest_square)
         bend = (np.einsum("tkk->tk", e.B_triangle) / height).max()
         spring = (e.spring_stiffness / height.min()).max(initial=0.0)
         return float(stretch), float(max(bend, spring))
@@ -233,7 +245,10 @@ class ConsistentSystem(SupportedSheet):
         slots, number = pattern.slots[4][0], self.displacements.ground_numbers
         np.add.at(data, slots[slots >= 0], block[np.tril_indices(9)][slots >= 0])
         inside = number >= 0
-        return FreeBodyMatrix(pattern.matrix(data), Z, number[inside], block[np.ix_(inside, inside)])
+        weight = self.displacements.weight
+        if weight is not None:
+            weight = np.concatenate((weight, np.ones(self.size - self.moving)))
+        return FreeBodyMatrix(pattern.matrix(data), Z, number[inside], block[np.ix_(inside, inside)], weight)
 
     @cached_property
     def _spring_nodes(self) -> Ints:
@@ -243,7 +258,7 @@ class ConsistentSystem(SupportedSheet):
     @cached_property
     def _pattern(self) -> Pattern:
         ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
-        return rotation_pattern(self.mesh, self.elements, self.displacements.number, ground)
+        return rotation_pattern(self.mesh, self.elements, self.displacements, ground)
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         v = self.vectors(dq)

@@ -28,6 +28,8 @@ class Displacements:
             and in global axes.
     """
 
+    weight: Array | None = None  # (k,) how many nodes an unknown stands for, if not one each
+
     def __init__(self, mesh: SheetMesh, constraints: Constraints, start_points: Array) -> None:
         self.mesh = mesh
         self.reference = mesh.points
@@ -49,6 +51,10 @@ class Displacements:
     def start(self) -> Array:
         """(k,) unknowns of the positions that the step begins with."""
         return np.asarray(self._start.ravel()[self.free])
+
+    def unknowns(self, x: Array) -> Array:
+        """(k,) unknowns of node positions x (n, 3)."""
+        return np.asarray(self.to_local(x - self.reference).ravel()[self.free])
 
     def positions(self, u: Array, lam: float) -> Array:
         """(n, 3) node positions, mm, for unknowns u (k,)."""

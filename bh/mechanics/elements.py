@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.actuation import Ramp
+from bh.laws import HELD, SHEET, SPRING
 from bh.mechanics.hinge_lock import ZONE, lock_terms, until_closed
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness, sheet_bars
 from bh.model import Model
-from bh.program import HELD, SHEET, SPRING, StepProgram
+from bh.step_program import StepProgram
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]

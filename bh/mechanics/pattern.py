@@ -22,7 +22,8 @@ class Pattern(Storage):
 
     Attributes:
         slots: one (elements, entries) array for each group of elements: where the lower entries of its matrix, row
-            by row, go in the values; -1 where an unknown is prescribed.
+            by row, go in the values; -1 where an unknown is prescribed; -2 - slot where the entry stands for two,
+            which happens if two nodes of an element have one unknown in common (images of each other).
     """
 
     slots: tuple[Slots, ...]
@@ -83,7 +84,7 @@ def _node_pairs(vertex: Ints, groups: tuple[Ints, ...]) -> tuple[Ints, Ints]:
         for i in range(group.shape[1]):
             for j in range(i):
                 a, b = nodes[:, i], nodes[:, j]
-                both = (a >= 0) & (b >= 0)
+                both = (a >= 0) & (b >= 0) & (a != b)
                 a, b = a[both], b[both]
                 keys.append(np.maximum(a, b) * len(vertex) + np.minimum(a, b))
     unique = np.unique(np.concatenate(keys)) if keys else np.zeros(0, dtype=np.int64)
@@ -119,6 +120,8 @@ def _band_slots(group, number, place, first, starts):  # type: ignore[no-untyped
                 else:
                     low = min(rows[i], rows[j])
                     slots[e, at] = starts[low] + max(rows[i], rows[j]) - low
+                    if i != j and rows[i] == rows[j]:
+                        slots[e, at] = -2 - slots[e, at]
                 at += 1
     return slots
 
@@ -148,6 +151,8 @@ def _sparse_slots(group, number, place, first, indptr, indices):  # type: ignore
                             if base_row < 0:
                                 base_row, base = r, _find(indices, indptr[c], indptr[c + 1], r)
                             slots[e, at] = base + r - base_row
+                            if i != j and r == c:
+                                slots[e, at] = -2 - slots[e, at]
     return slots
 
 

@@ -7,16 +7,19 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.laws import HELD
 from bh.mechanics import closing
 from bh.mechanics.displacements import Displacements
 from bh.mechanics.kinematics import dihedral_angles
+from bh.mechanics.mirrored import MirroredDisplacements
 from bh.mechanics.motions import describe_motion
 from bh.mechanics.touching import Touching
 from bh.model import Model
-from bh.program import HELD, StepProgram
 from bh.solvers.system import System, grows_ahead
 from bh.state import State
+from bh.step_program import StepProgram
 from bh.supports import TURNED
+from bh.symmetry import Mirror
 
 Array = NDArray[np.float64]
 
@@ -29,12 +32,18 @@ class SupportedSheet:
 
     size: int
 
-    def __init__(self, model: Model, program: StepProgram, start: State | None) -> None:
+    def __init__(
+        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+    ) -> None:
         self.mesh = model.mesh
         self.program = program
         self.force = program.force
         start_points = self.mesh.points if start is None else start.points
-        self.displacements = Displacements(self.mesh, program.constraints, start_points)
+        self.displacements = (
+            Displacements(self.mesh, program.constraints, start_points)
+            if plane is None
+            else MirroredDisplacements(self.mesh, program.constraints, start_points, plane)
+        )
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
         if self.constraints.rigid_body:

@@ -20,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from bh.actuation import Bar, Tether
-from bh.mechanics.assembly import rotate, scatter
+from bh.mechanics.assembly import add_lower, rotate
 from bh.mechanics.kinematics import OPTIONS
 from bh.mechanics.pattern import Slots
 from bh.supports import select
@@ -209,7 +209,7 @@ def _tangent(x, triangles, owner, weights, share, centres, axes, shape, home, sp
                             K[3 * i + c, 3 * j + e] = w * (second * n[c] * n[e] + slope * H[c, e])
             if len(frames) > 0:
                 rotate(K, corners, frame_of, frames)
-            scatter(K, 9, slots[owner[k]], data)
+            add_lower(K, 9, slots[owner[k]], data)
     for v in range(len(home)):
         if spring[v, 0] + spring[v, 1] + spring[v, 2] > 0.0:
             K[:] = 0.0
@@ -217,7 +217,7 @@ def _tangent(x, triangles, owner, weights, share, centres, axes, shape, home, sp
                 K[3 * home[v, 1] + c, 3 * home[v, 1] + c] = spring[v, c]
             if len(frames) > 0:
                 rotate(K, triangles[home[v, 0]], frame_of, frames)
-            scatter(K, 9, slots[home[v, 0]], data)
+            add_lower(K, 9, slots[home[v, 0]], data)
 
 
 @njit(**OPTIONS)

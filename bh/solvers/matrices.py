@@ -165,19 +165,27 @@ class FreeBodyMatrix:
     Loads that are in equilibrium do no work on the rigid motions Z (n, r), so the stiffness that holds them carries
     no force: the solution is the exact one plus some rigid motion, and the rigid part is then taken out. What is left
     is the solution of least displacement; the rigid-body support is r conditions Z^T dq = 0 and nothing else.
+
+    Where unknowns stand for several displacements (half of a symmetric sheet), `weight` (n,) says for how many; then
+    the conditions are Z^T W dq = 0 and Z^T W Z = 1.
     """
 
     grounded: BandMatrix | SparseMatrix
     Z: Array
     ground_rows: Ints
     ground: Array
+    weight: Array | None = None
 
     def factorise(self, shift: float = 0.0) -> FreeBodyFactor:
-        return FreeBodyFactor(self.grounded.factorise(shift), self.Z)
+        return FreeBodyFactor(self.grounded.factorise(shift), self.Z, self._weighted)
 
     def factorise_any(self) -> tuple[Factor, int]:
         factor, negative = self.grounded.factorise_any()
-        return FreeBodyFactor(factor, self.Z), negative
+        return FreeBodyFactor(factor, self.Z, self._weighted), negative
+
+    @property
+    def _weighted(self) -> Array:
+        return self.Z if self.weight is None else self.weight[:, None] * self.Z
 
     def __matmul__(self, x: Array) -> Array:
         out = self.grounded @ x
@@ -192,10 +200,11 @@ class FreeBodyMatrix:
 class FreeBodyFactor(Factor):
     factor: Factor
     Z: Array  # orthonormal columns
+    weighted: Array  # W Z, which is Z itself without weights
 
     def solve(self, b: Array) -> Array:
-        x = self.factor.solve(b - self.Z @ (self.Z.T @ b))
-        return x - self.Z @ (self.Z.T @ x)
+        x = self.factor.solve(b - self.weighted @ (self.Z.T @ b))
+        return x - self.Z @ (self.weighted.T @ x)
 
 
 def reverse_cuthill_mckee(rows: Ints, columns: Ints, n: int) -> tuple[Ints, int]:

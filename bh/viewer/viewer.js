@@ -65,7 +65,7 @@
 
   function look(box) {
     const css = getComputedStyle(box), get = (name, other) => css.getPropertyValue(name).trim() || other;
-    return { ink: get("--ink", "#202124"), soft: get("--soft", "#5c6067") };
+    return { ink: get("--ink", css.color), soft: get("--soft", css.color) };
   }
 
   function setUp(box) {
@@ -167,6 +167,8 @@
       slider.addEventListener("input", draw);
       kindBox.addEventListener("change", draw);
       matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+      // pages with a switch of their own between light and dark write it there
+      new MutationObserver(draw).observe(document.body, { attributes: true, attributeFilter: ["data-theme", "class"] });
       let width = box.clientWidth;
       addEventListener("resize", () => { if (box.clientWidth !== width) { width = box.clientWidth; draw(); } });
       let timer = 0;

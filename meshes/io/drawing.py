@@ -17,7 +17,7 @@ from meshes.io.export import shown
 from meshes.io.strokes import Rules, Stroke
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
-from meshes.planar import DrawnLine, Graph, heal
+from meshes.planar import RIM, DrawnLine, Graph, heal
 from meshes.sheet import pattern_of, region_of
 
 FORMATS = (".svg", ".dxf")
@@ -36,7 +36,7 @@ def read_pattern(path: str | os.PathLike[str], **options: Any) -> CreasePattern:
     Args:
         scale: mm a unit of the drawing; None for the unit that the file states (SVG: CSS lengths, 96 px an inch;
             DXF: $INSUNITS, mm where it is unset).
-        fit: length of the longer side of the bounding box, mm, in place of a scale.
+        fit: length of the longer side of the sheet's bounding box, mm, in place of a scale.
         tolerance: how far chords may stay off curves, mm; None for 1 / 50,000 of the diagonal.
         gap: lines that miss each other by up to so much are joined, mm; None for 1 / 2,000 of the diagonal, but no
             more than 0.4 of the shortest line.
@@ -78,7 +78,7 @@ def _drawn(path: str | os.PathLike[str], **options: Any) -> SheetMesh:
     from meshes.io.fold import sheet_of_frame
     from meshes.io.fold_frame import Frame
 
-    graph, lines, _ = read_graph(path, **options)
+    graph, lines, remarks = read_graph(path, **options)
     region = region_of(graph, lines)
     rim = np.setdiff1d(np.arange(len(graph.edges)), region.inside)
     letters = ["F" if kind in ("boundary", "cut") else LETTERS[kind] for kind in graph.kinds]
@@ -90,7 +90,8 @@ def _drawn(path: str | os.PathLike[str], **options: Any) -> SheetMesh:
     known = any(not math.isnan(line.angle) for line in lines)
     points = np.column_stack((graph.points, np.zeros(len(graph.points))))
     edges = [(int(a), int(b)) for a, b in graph.edges.tolist()]
-    return replace(sheet_of_frame(Frame(points, edges, letters, angles if known else None, [])), kind="drawn")
+    mesh = sheet_of_frame(Frame(points, edges, letters, angles if known else None, []))
+    return replace(mesh, kind="drawn", remarks=(*remarks, *region.remarks))
 
 
 def read_graph(
@@ -118,7 +119,8 @@ def read_graph(
     rough = _box([_finite(stroke, stroke.sample(math.inf)) for stroke, _ in kept])
     fine = TOLERANCE * float(np.linalg.norm(rough[1] - rough[0])) or 1.0
     sampled = [_finite(stroke, stroke.sample(fine)) for stroke, _ in kept]
-    low, high = _box(sampled)
+    rim = [points for points, (_, kind) in zip(sampled, kept, strict=True) if kind in RIM]
+    low, high = _box(rim or sampled)
     if fit is not None:
         scale = fit / float((high - low).max() or 1.0)
     unit = unit if scale is None else scale

@@ -42,7 +42,7 @@ def read_svg(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
         picture = se.SVG.parse(io.BytesIO(text), ppi=PIXELS, reify=True)
     except ParseError as error:
         raise FileFormatError(f"this is not XML ({error}); save the drawing as SVG again") from error
-    except (ValueError, TypeError, KeyError, AttributeError, IndexError, RecursionError) as error:
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise FileFormatError(
             f"the SVG cannot be understood ({error}); save it again as plain SVG"
         ) from error
@@ -126,6 +126,7 @@ def _sampler(se: Any, segments: list[Any]) -> Any:
     return sample
 
 
+@np.errstate(invalid="ignore", over="ignore")  # what is not finite is refused later
 def _pieces(se: Any, segment: Any, tolerance: float) -> int:
     """How many chords keep within the tolerance: the error of one is max |c''| / (8 n^2)."""
     if isinstance(segment, se.CubicBezier):
@@ -136,4 +137,6 @@ def _pieces(se: Any, segment: Any, tolerance: float) -> int:
         bend = 2.0 * np.linalg.norm(p[0] - 2 * p[1] + p[2])
     else:
         bend = max(abs(segment.rx), abs(segment.ry)) * float(segment.sweep) ** 2
+    if not np.isfinite(bend):
+        return 1
     return int(min(max(np.ceil(np.sqrt(bend / (8.0 * tolerance))), 1 if bend < tolerance else 2), 20_000))

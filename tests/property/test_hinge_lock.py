@@ -19,8 +19,9 @@ from bh.mechanics.hinge_lock import ZONE, lock_terms, until_closed
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.stiffness import bending_hinge_stiffness
 from bh.model import ElementStiffness
-from bh.program import crease_hinges, hinge_name, program
+from bh.program import program
 from bh.scene import parse_scene
+from bh.step_program import crease_hinges, hinge_name
 from verification.derivatives import differences
 
 Array = NDArray[np.float64]

@@ -11,9 +11,9 @@ import pytest
 import bh
 from bh.analysis.contact import first_contact
 from bh.mechanics.kinematics import hinge_geometry
-from bh.program import stress_free_angles
 from meshes import structured, unstructured
 from meshes.io import read_drawn, read_fold, read_pattern
+from meshes.topology import dihedral_angles
 
 PATTERNS = Path(__file__).parents[3] / "shared" / "patterns"
 needs_patterns = pytest.mark.skipif(not PATTERNS.is_dir(), reason="the shared crease patterns are not here")
@@ -109,7 +109,7 @@ def test_springs_of_a_folded_sheet_begin_at_its_angles():
         points, triangles, {"crease:ridge": np.array([(2, 3)])}, folds={"ridge": "mountain"}
     )
     angles = [hinge_geometry(np.array(mesh.points), hinge, np.empty(12))[0] for hinge in mesh.topology.hinges]
-    assert stress_free_angles(mesh) == pytest.approx(np.array(angles), abs=1e-14)
+    assert dihedral_angles(mesh.points, mesh.topology.hinges) == pytest.approx(np.array(angles), abs=1e-14)
     path = bh.trace(bh.Model(mesh, SHEET).fold("ridge", by=0.8, Lstar=10.0))
     assert path.outcome == "reached"
     assert path[-1].energy.total < 1e-20

@@ -39,6 +39,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: displace": schema.DisplaceTable,
     "steps: until": schema.UntilTable,
     "outputs": schema.OutputsTable,
+    "accuracy": schema.AccuracyTable,
 }
 
 
@@ -75,7 +76,8 @@ def test_nothing_is_left_out() -> None:
     }
     assert set(TABLES.values()) == every - {scene_tables.Table, scene_patterns.PatternTable}
     named = {title.split(",")[0].split(":")[0].split(".")[0] for title in TABLES}
-    assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS)
+    assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS) - {"symmetry"}
+    assert "`symmetry = " in PAGE
     assert PAGE.count("\n### ") == len(TABLES)
 
 
@@ -88,5 +90,7 @@ def test_places_of_the_page_are_places() -> None:
     places = re.findall(r"^\| `([^`]+)` \|", PAGE.split("\n## Places\n")[1].split("\n## ")[0], re.MULTILINE)
     assert {"all", "crease:NAME", "node:N", "edge:inner", "corner:inner-start"} <= set(places)
     for place in places:
-        assert len(mesh.nodes(place.replace("NAME", "crease").replace(":N", ":3"))) >= 1
+        assert (
+            len(mesh.nodes(place.replace("NAME", "crease").replace(":N", ":3").replace("X,Y", "100,1"))) >= 1
+        )
     assert set(mesh.corners) <= set(places)

@@ -250,7 +250,7 @@ class TestHealing:
                 '<rect width="100" height="60" stroke="red" fill="none"/>',
                 ["rim of the sheet", "boundary (black)"],
             ),
-            (SQUARE + line(50, 0, 50, 80), ["leaves the sheet at (50, 10)"]),
+            (SQUARE + line(50, 0, 50, 80), ["leaves the sheet at (50, -10)"]),
             (SQUARE + '<rect x="200" y="0" width="50" height="60" stroke="black"/>', ["2 separate sheets"]),
             (SQUARE + line(20, 30, 60, 30, 'stroke="green" id="slit"'), ["'slit'", "ends loosely"]),
             (SQUARE + line(0, 30, 100, 30, 'stroke="lime" id="slit"'), ["'slit'", "cut inside the sheet"]),
@@ -465,3 +465,49 @@ def test_area_is_kept(tmp_path):
     mesh = read_drawn(svg(tmp_path, body))
     assert shapely.polygons(mesh.points[mesh.triangles][:, :, :2]).size == len(mesh.triangles)
     assert mesh.areas.sum() == pytest.approx(6000.0)
+
+
+def test_places_by_coordinates(tmp_path):
+    mesh = read_drawn(svg(tmp_path, SQUARE + line(0, 20, 100, 40)))
+    (node,) = mesh.nodes("near:99,1.5")
+    assert mesh.points[node] == pytest.approx([100.0, 0.0, 0.0])
+    wrong = {
+        "near:1": "two lengths",
+        "near:a,b": "two lengths",
+        "near:500,0": "from the sheet",
+        "near:nan,0": "mm",
+    }
+    for place, words in wrong.items():
+        with pytest.raises(meshes.MeshError, match=words):
+            mesh.nodes(place)
+
+
+def test_dxf_blocks_and_splines(tmp_path):
+    """A block that is inserted turned and scaled, a spline, a layer that is off, and a polyline in inches."""
+    drawing = ezdxf.new(units=4)
+    block = drawing.blocks.new("leaf")
+    block.add_line((0, 0), (1, 0), dxfattribs={"color": 5})
+    space = drawing.modelspace()
+    space.add_lwpolyline([(0, 0), (100, 0), (100, 60), (0, 60)], close=True)
+    space.add_blockref("leaf", (10, 10), dxfattribs={"xscale": 40, "yscale": 40, "rotation": 90})
+    space.add_spline([(40, 10), (60, 20), (60, 40), (40, 50)], dxfattribs={"layer": "M"})
+    drawing.layers.add("off").off()
+    space.add_line((0, 0), (500, 500), dxfattribs={"layer": "off", "color": 3})
+    drawing.saveas(tmp_path / "a.dxf")
+    pattern = read_pattern(tmp_path / "a.dxf")
+    assert folds(pattern) == {"m1": "mountain", "v1": "valley"}
+    assert sample(pattern.creases[1].curve) == pytest.approx(np.array([[10, 10], [10, 50]]))
+    assert sample(pattern.creases[0].curve)[0] == pytest.approx([40.0, 10.0])
+
+
+def test_svg_groups_uses_and_transforms(tmp_path):
+    body = (
+        SQUARE + '<defs><path id="p" d="M0,0 V60" stroke="red"/></defs><use href="#p" x="30"/>'
+        '<g transform="translate(60,0) scale(2,1)" stroke="blue"><path d="M5,0 L5,60"/></g>'
+        '<style>.s { stroke: #ff0000; }</style><path class="s" d="M90,0 L90,60"/><text x="5" y="5">a note</text>'
+        '<path d="M20,0 V60" stroke="red" visibility="hidden"/><g display="none"><path d="M1,0 V60" stroke="red"/></g>'
+        '<rect width="100" height="60" fill="#eee" stroke="none"/>'
+    )
+    pattern = read_pattern(svg(tmp_path, body))
+    found = {crease.name: sample(crease.curve)[0, 0] for crease in pattern.creases}
+    assert found == pytest.approx({"m1": 30.0, "v1": 70.0, "m2": 90.0})

@@ -33,8 +33,8 @@ from bh import (
     trace,
 )
 from bh.describe import describe, fingerprint, rebuild
-from bh.program import crease_hinges
 from bh.solvers.newton import Solution
+from bh.step_program import crease_hinges
 
 SHEET = Sheet(E=4000.0, t=0.127)
 D = SHEET.bending_stiffness(nu=0.0)

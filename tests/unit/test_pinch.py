@@ -10,8 +10,10 @@ import pytest
 
 import meshes
 from bh import Fold, Model, ModelError, Pinch, Sheet, trace
+from bh.laws import HELD, SPRING
 from bh.pinch_zone import Chain, chain, parts
-from bh.program import HELD, SPRING, crease_hinges, program
+from bh.program import program
+from bh.step_program import crease_hinges
 
 PLATE = Sheet(E=4000.0, t=0.5)
 ONE = meshes.structured(meshes.annulus_sector(100.0, 5.0, 1.0), along=40)

@@ -12,7 +12,9 @@ import pytest
 import meshes
 from bh import CreaseLaw, Displace, Fold, Force, Model, ModelError, Moment, Sheet
 from bh.actuation import Ramp
-from bh.program import HELD, SHEET, SPRING, crease_hinges, program
+from bh.laws import HELD, SHEET, SPRING
+from bh.program import program
+from bh.step_program import crease_hinges
 
 STEEL = Sheet(E=4000.0, t=0.2)
 K = 4000.0 * 0.2**3 / 12.0  # bending stiffness, N mm

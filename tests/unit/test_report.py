@@ -437,7 +437,8 @@ def test_command_says_where_the_report_is(
 
     asked = []
 
-    def run(cases: Any, folder: Path, quick: bool, tell: Any) -> dict[str, Any]:
+    def run(cases: Any, folder: Path, quick: bool, tell: Any, jobs: int) -> dict[str, Any]:
+        assert jobs >= 1
         asked.append((cases, quick))
         tell("strips: differs")
         return results(folder)

@@ -193,3 +193,18 @@ def test_nothing_is_wider_than_a_phone(chromium: Any, folder: Path, name: str, w
     seen.settle()
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
     seen.page.close()
+
+
+def test_a_notebook_shows_the_sheet(chromium: Any, tmp_path: Path) -> None:
+    """What a notebook puts into its page draws itself there, apart from the page's own scripts."""
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.8), along=4)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127)).fold("crease", to=2.4)
+    shown = interactive.view(bh.trace(model))._repr_html_()
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f"<!DOCTYPE html><title>Notebook</title><body>{shown}</body>", encoding="utf-8")
+    seen = visit(chromium, notebook)
+    frame = seen.page.frame_locator("iframe")
+    frame.locator(".sheet3d[data-ready=yes]").wait_for(timeout=PATIENCE)
+    assert frame.locator("canvas").count() >= 1
+    assert [told for told in seen.told if HARMLESS not in told] == []
+    seen.page.close()

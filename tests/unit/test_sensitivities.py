@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh.analysis import sensitivities
+from bh.analysis.node_sensitivities import of_nodes
+from bh.analysis.polish import polish
 from bh.analysis.sensitivities import (
     Energy,
     FoldAngle,
     Observable,
+    OfNodes,
     OfPoints,
     Position,
     Situation,
@@ -74,10 +77,21 @@ def displaced(formulation: str) -> Build:
     return build
 
 
+def pinched(formulation: str) -> Build:
+    """Width, thickness, L*, rest angle, pinched angle: the pinch goes on from the angles that the fold came to."""
+
+    def build(p: Array) -> bh.Model:
+        model = supported(formulation, 100.0, p[0], p[1]).fold("crease", rest=p[3], Lstar=p[2])
+        return model.pinch("crease", to=p[4], length=30.0).force(TIP, each=[0.0, 0.0, 1e-3])
+
+    return build
+
+
 DESIGNS: dict[str, tuple[Callable[[str], Build], list[float]]] = {
     "held": (held, [100.0, 8.0, 0.2, 1.9]),
     "spring": (spring, [8.0, 0.2, 10.0, 1.6]),
     "displaced": (displaced, [0.6, 2.0, 0.15]),
+    "pinched": (pinched, [8.0, 0.2, 10.0, 1.9, 1.2]),
 }
 
 
@@ -195,6 +209,58 @@ def test_an_error_in_the_kernels_is_seen(monkeypatch: pytest.MonkeyPatch) -> Non
     assert np.abs(of(path, build, p, [Energy("stretching")])[0].gradient / whole - 1.0).max() > 1e-3
 
 
+def test_a_function_of_nodes_by_complex_step() -> None:
+    build, p = held("consistent"), np.array(DESIGNS["held"][1])
+    path = bh.trace(build(p), strategy=EXACT)
+    a, b = 0, int(path.model.mesh.nodes(TIP)[0])
+
+    def distance(x: Array) -> Array:
+        return np.sqrt(((x[1] - x[0]) * (x[1] - x[0])).sum())
+
+    def whole(points: Array) -> tuple[float, Array]:
+        away = points[b] - points[a]
+        gradient = np.zeros_like(points)
+        gradient[b], gradient[a] = away / np.linalg.norm(away), -away / np.linalg.norm(away)
+        return float(np.linalg.norm(away)), gradient
+
+    one, two = of(path, build, p, [OfNodes([a, b], distance), OfPoints(whole)])
+    assert one.value == pytest.approx(two.value)
+    assert one.gradient == pytest.approx(two.gradient, rel=1e-9)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_polishing_meets_targets(formulation: str) -> None:
+    """Tip and energy of another design, from 5 % beside it, with fewer targets than parameters."""
+    build = held(formulation)
+    aim, start = np.array([100.0, 8.0, 0.2, 1.9]), np.array([104.0, 8.4, 0.19, 1.85])
+    targets: list[Observable] = [Position(TIP, "x"), Position(TIP, "y"), Energy()]
+    at = Situation(bh.trace(build(aim)), -1)
+    wanted = [(item, item.value(at)) for item in targets]
+    allowed = [1e-4, 1e-4, 1e-6]
+    found = polish(build, start, wanted, allowed, bounds=([90, 7, 0.1, 1.0], [110, 9, 0.3, 2.5]))
+    assert found.outcome == "reached"
+    assert found.solves <= 8
+    assert (np.abs(found.missed) <= allowed).all()
+    again = Situation(bh.trace(build(found.design)), -1)
+    assert [item.value(again) for item in targets] == pytest.approx([value for _, value in wanted], rel=1e-5)
+
+
+def test_polishing_says_where_it_stops() -> None:
+    build, p = held("bars-and-hinges"), np.array(DESIGNS["held"][1])
+    far = [(Position(TIP, "x"), 500.0)]
+    bounds = ([95, 7, 0.1, 1.5], [105, 9, 0.3, 2.2])
+    found = polish(build, p, far, 0.1, bounds=bounds)
+    assert found.outcome == "no descent"  # at the bounds
+    assert ((found.design == bounds[0]) | (found.design == bounds[1])).any()
+    assert polish(build, p, far, 0.1, bounds=bounds, most=2).outcome == "limit of solves"
+    with pytest.raises(InputError, match="outside its bounds"):
+        polish(build, p, far, 0.1, bounds=([0] * 4, [1] * 4))
+    with pytest.raises(InputError, match="at least one target and positive tolerances"):
+        polish(build, p, far, 0.0)
+    with pytest.raises(InputError, match="scale must be 4 positive numbers"):
+        polish(build, p, far, 0.1, scale=[1.0])
+
+
 def test_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     """What docs/sensitivities.md shows."""
     page = (Path(__file__).resolve().parents[2] / "docs" / "sensitivities.md").read_text(encoding="utf-8")
@@ -230,6 +296,27 @@ def test_bad_input() -> None:
 
     with pytest.raises(InputError, match="keep the number of cells fixed"):
         of(path, finer, p, [Energy()])
+
+    def turning(q: Array) -> bh.Model:
+        mesh = meshes.structured(meshes.annulus_sector(100.0, 8.0, 0.6), along=8)
+        model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.2)).support("corner:inner-start", "xyz")
+        model = model.support("corner:outer-start", [[q[0], 1, 0], [0, 0, 1]]).support(
+            "corner:inner-end", "z"
+        )
+        return model.fold("crease", to=2.0)
+
+    oblique = bh.trace(turning(np.array([0.3])))
+    with pytest.raises(InputError, match="directions of oblique supports change"):
+        of(oblique, turning, [0.3], [Energy()])
+
+    def until(q: Array) -> bh.Model:
+        step = bh.Fold("crease", to=1.0), bh.Until("fold_angle", 1.0, "crease")
+        return supported("bars-and-hinges", q[0], q[1], q[2]).step(*step)
+
+    ended = bh.trace(until(p))
+    assert ended.outcome == "reached"
+    with pytest.raises(InputError, match="has no sensitivities; give it its end"):
+        of(ended, until, p, [Energy()])
     shell = bh.trace(replace(build(p), formulation="shell"))
     with pytest.raises(InputError, match="formulation 'shell' has no sensitivities"):
         of(shell, lambda q: replace(build(q), formulation="shell"), p, [Energy()])
@@ -237,3 +324,41 @@ def test_bad_input() -> None:
     middle = next(i for i, record in enumerate(stepped.records) if record.step == 1 and record.lam < 1.0)
     with pytest.raises(InputError, match="depends on the step before; take its end"):
         of(stepped, lambda q: build(q).fold("crease", to=1.5), p, [Energy()], index=middle)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("name", ["held", "spring"])
+def test_all_nodes_at_once(formulation: str, name: str) -> None:
+    """The chain rule with any smooth move of the nodes gives what `of` gives for that move."""
+    make, start = DESIGNS[name]
+    base = make(formulation)(np.array(start))
+    flat = base.mesh.points
+
+    def moved(p: Array) -> bh.Model:
+        x, y = flat[:, 0], flat[:, 1]
+        shift = np.column_stack((p[0] * np.sin(y / 30.0), p[1] * x * y / 1000.0, 0.0 * x))
+        return replace(base, mesh=replace(base.mesh, points=flat + shift))
+
+    path = bh.trace(base, strategy=EXACT)
+    observables: list[Observable] = [
+        Position(TIP, "x"),
+        Energy(),
+        FoldAngle("crease", 2),
+        Stiffness(TIP, "z"),
+    ]
+    found = of_nodes(path, observables)
+    expected = of(path, moved, [0.0, 0.0], observables, steps=[1e-2, 1e-2])
+    x, y = flat[:, 0], flat[:, 1]
+    for item, known in zip(found, expected, strict=True):
+        mine = [float(item.gradient[:, 0] @ np.sin(y / 30.0)), float(item.gradient[:, 1] @ (x * y / 1000.0))]
+        scale = max(float(np.abs(known.gradient).max()), 1e-3 * abs(known.value))
+        assert np.abs(mine - known.gradient).max() < 1e-7 * scale
+    whole = found[1].gradient.sum(axis=0)  # to move the whole sheet changes no energy
+    assert np.abs(whole).max() < 1e-7 * np.abs(found[1].gradient).max()
+
+
+def test_nodes_of_pinched_sheets_are_refused() -> None:
+    build = pinched("bars-and-hinges")
+    path = bh.trace(build(np.array(DESIGNS["pinched"][1])))
+    with pytest.raises(InputError, match="a pinched zone depends on all nodes"):
+        of_nodes(path, [Energy()])

@@ -29,8 +29,14 @@ SLOW = {
     "fig3_8",
     "fig3_10",
     "fig5_3",
+    "gradients",
     "hard_cases",
     "scan",
+    "fig5_5",
+    "fig5_9",
+    "fig5_10",
+    "fig5_11",
+    "pinch_shell",
 }  # over some five seconds on a slow machine
 
 
@@ -240,6 +246,23 @@ def test_a_run_keeps_what_others_found(tmp_path: Path) -> None:
     assert len(of_case["shear_calibration"]) == len(again["checks"])
 
 
+def test_cases_at_a_time_find_the_same(tmp_path: Path) -> None:
+    """By two processes: the same values in the same order, and what fails there is told here."""
+    names = ["shear_calibration", "derivatives", "strips"]
+    one = run(names, tmp_path / "one", quick=True)
+    told: list[str] = []
+    two = run(names, tmp_path / "two", quick=True, report=told.append, jobs=2)
+    keys = ("case", "quantity", "params", "value", "passed")
+    assert [[r[key] for key in keys] for r in two["checks"]] == [
+        [r[key] for key in keys] for r in one["checks"]
+    ]
+    assert two["machine"]["cases at a time"] == 2
+    assert told[0].startswith("3 cases, 2 at a time")
+    assert sorted(text.split(":")[0] for text in told[1:]) == sorted(names)
+    with pytest.raises(InputError, match="no verification case 'nonsense'"):
+        run([*names, "nonsense"], tmp_path / "three", jobs=2)
+
+
 def test_what_is_left_of_a_file_of_one_run(tmp_path: Path) -> None:
     """A file of a version that kept no date with the cases: they get that of the file."""
     run(["shear_calibration"], tmp_path, quick=True)
@@ -324,7 +347,7 @@ def bad_case(monkeypatch: pytest.MonkeyPatch) -> None:
     module = types.ModuleType("verification.bad_for_tests")
     module.run = disagreeing  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setitem(registry.ALL_CASES, "bad", module.__name__)
+    monkeypatch.setitem(registry.BY_NAME, "bad", registry.Study("bad_for_tests", "solver"))
 
 
 @pytest.mark.usefixtures("bad_case")

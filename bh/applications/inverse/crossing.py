@@ -26,10 +26,10 @@ class Crossing(Protocol):
 
 
 def planar(points: ArrayLike) -> Bools:
-    """(...) True where polygons (..., n + 1, 2) meet themselves; neighbouring segments share their joint.
+    """(...) True where polygons (..., n + 1, 2) cross themselves.
 
-    Two segments meet if the ends of each lie on different sides of the other. Touching counts, overlap of collinear
-    ones too.
+    Two segments cross if the ends of each lie on different sides of the other. Touching is allowed, so that a crease
+    may end where it begins; a segment that goes straight back over the one before is not.
     """
     p = np.asarray(points, dtype=float)
     a, b = p[..., :-1, :], p[..., 1:, :]
@@ -37,7 +37,7 @@ def planar(points: ArrayLike) -> Bools:
     met = np.zeros(p.shape[:-2], dtype=bool)
     for i in range(n):
         for j in range(i + 2, n):
-            met |= _meet(a[..., i, :], b[..., i, :], a[..., j, :], b[..., j, :])
+            met |= _crosses(a[..., i, :], b[..., i, :], a[..., j, :], b[..., j, :])
     for i in range(n - 1):  # neighbours: only where the second goes straight back over the first
         u, v = b[..., i, :] - a[..., i, :], b[..., i + 1, :] - a[..., i + 1, :]
         size = np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1)
@@ -45,15 +45,10 @@ def planar(points: ArrayLike) -> Bools:
     return met
 
 
-def _meet(a: Array, b: Array, c: Array, d: Array) -> Bools:
-    """Do the segments ab and cd share a point? (..., 2) each."""
-    o1, o2 = _cross(b - a, c - a), _cross(b - a, d - a)
-    o3, o4 = _cross(d - c, a - c), _cross(d - c, b - c)
-    proper: Bools = (o1 * o2 < 0.0) & (o3 * o4 < 0.0)
-    for side, x, y, z in ((o1, a, b, c), (o2, a, b, d), (o3, c, d, a), (o4, c, d, b)):
-        on = (side == 0.0) & (((z - x) * (z - y)).sum(axis=-1) <= 0.0)  # z on the line xy, between them
-        proper |= on
-    return proper
+def _crosses(a: Array, b: Array, c: Array, d: Array) -> Bools:
+    """Do the segments ab and cd cross inside both? (..., 2) each."""
+    sides = _cross(b - a, c - a) * _cross(b - a, d - a), _cross(d - c, a - c) * _cross(d - c, b - c)
+    return np.asarray((sides[0] < 0.0) & (sides[1] < 0.0))
 
 
 def _cross(u: Array, v: Array) -> Array:

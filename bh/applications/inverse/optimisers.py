@@ -165,7 +165,8 @@ class Evolution:
 class Polished:
     """Another optimiser's answer, then steepest ways down inside the box with its switches kept.
 
-    Least squares (trust region) where the problem has `residual(x, on)`, else L-BFGS-B on the value.
+    Least squares (trust region) where the problem has `residuals(x, on)`, else L-BFGS-B on the value; differences are
+    taken in one batch.
     """
 
     first: Optimiser = field(default_factory=Genetic)
@@ -191,19 +192,32 @@ def polish(problem: Problem, x: Array, on: Bools) -> Found:
     lower, upper = problem.lower, problem.upper
     width = np.maximum(upper - lower, 1e-300)
     z0 = np.clip((x - lower) / width, 1e-9, 1.0 - 1e-9)
-    residual = getattr(problem, "residual", None)
-    if residual is not None:
+    residuals = getattr(problem, "residuals", None)
+    step = 1e-7 if residuals is not None else 1e-6
+
+    def around(z: Array) -> tuple[Array, Bools, Array]:
+        """A point and its neighbours inside the box, and their signed distances."""
+        inward = np.where(z > 0.5, -step, step)
+        trial = lower + width * np.vstack((z, z + np.diag(inward)))
+        return trial, np.tile(on, (len(trial), 1)), inward
+
+    if residuals is not None:
+
+        def jacobian(z: Array) -> Array:
+            trial, switches, inward = around(z)
+            found = residuals(trial, switches)
+            return np.asarray(((found[1:] - found[0]) / inward[:, None]).T)
+
         done = least_squares(
-            lambda z: residual(lower + width * z, on), z0, bounds=(0.0, 1.0), xtol=1e-12, ftol=1e-12
-        )
+            lambda z: residuals((lower + width * z)[None], on[None])[0], z0, jacobian, bounds=(0.0, 1.0),
+            xtol=1e-10, ftol=1e-10, gtol=1e-10, max_nfev=60,
+        )  # fmt: skip
     else:
-        steps = np.eye(len(x)) * 1e-6
 
         def value(z: Array) -> tuple[float, Array]:
-            inward = np.where(z > 0.5, -1.0, 1.0)  # differences that stay inside the box
-            trial = lower + width * np.vstack((z, z + steps * inward[:, None]))
-            found = problem.evaluate(trial, np.tile(on, (len(trial), 1)))[0]
-            return float(found[0]), (found[1:] - found[0]) / (1e-6 * inward)
+            trial, switches, inward = around(z)
+            found = problem.evaluate(trial, switches)[0]
+            return float(found[0]), (found[1:] - found[0]) / inward
 
         done = minimize(
             value, z0, jac=True, bounds=[(0.0, 1.0)] * len(x), method="L-BFGS-B", options={"maxiter": 400}

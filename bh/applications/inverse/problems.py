@@ -40,6 +40,10 @@ class Design:
         """With all curvatures reversed: its end is the mirror image in y (6.4.3)."""
         return Design(-self.k0, self.length, self.pinched)
 
+    def lists(self) -> tuple[list[float], list[float], list[bool]]:
+        """Curvatures, lengths and pinches as plain lists: the arguments of `simulate`."""
+        return self.k0.tolist(), self.length.tolist(), self.pinched.tolist()
+
     def rows(self) -> list[dict[str, float | bool]]:
         """A plain description, one entry a segment."""
         each = zip(self.k0, self.length, self.pinched, strict=True)
@@ -116,10 +120,6 @@ class FitCurve:
     def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:
         distance = np.linalg.norm(self.points(x) - self.goal, axis=-1).mean(axis=-1) / self.size
         return distance, np.zeros(len(x))
-
-    def residual(self, x: Array, on: Bools) -> Array:
-        """(2 samples,) of a least-squares fit: the mean of squares in place of that of distances."""
-        return np.asarray((self.points(x[None])[0] - self.goal).ravel() / self.size)
 
     def points(self, x: Array) -> Array:
         """(N, samples, 2) points of the folded creases."""
@@ -209,6 +209,7 @@ class ReachPoint(_Segments):
     def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:
         return np.linalg.norm(self.end(x, on) - self.target, axis=-1), self.violation(x, on)
 
-    def residual(self, x: Array, on: Bools) -> Array:
+    def residuals(self, x: Array, on: Bools) -> Array:
+        """(N, 3) from the target to the ends, mm."""
         found: Array = self.end(x, on) - self.target
         return found

@@ -44,7 +44,7 @@ class Setting:
     edge: float = 1.0
     fold: float = 0.5 * math.pi
     pinch: float = math.pi / 14.0
-    zone: float = 20.0
+    zone: float = 40.0
     kind: str = "staggered"
     rows: int = 1
     formulation: str = "bars-and-hinges"

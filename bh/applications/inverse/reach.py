@@ -1,0 +1,197 @@
+"""Problem C in practice: a crease that ends at a point, found in a library of designs and checked by simulation.
+
+Genetic algorithms draw their designs anew for every target. One library of random designs serves all: its ends are in a
+k-d tree, the nearest ones are polished by least squares, and the answer is simulated whole. What the simulation misses
+is added to the aim and the design polished again, so that the distance that counts is that of the full model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from bh.applications.inverse.crossing import Crossing, Projected, Swept
+from bh.applications.inverse.optimisers import Found, polish
+from bh.applications.inverse.problems import Design, ReachPoint
+from bh.applications.inverse.segments import DesignError
+from bh.applications.inverse.simulate import Simulated, simulate
+from bh.applications.inverse.surrogate import Surrogate, shipped
+from bh.errors import InputError
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+REACH = {
+    1: 6.0,
+    2: 20.0,
+    3: 40.0,
+}  # mm from a random design of so many segments; one segment has two variables only
+
+
+@dataclass(frozen=True, eq=False)
+class Library:
+    """Random designs of n segments that their rules allow, and where they end. The seed makes them reproducible."""
+
+    surrogate: Surrogate
+    n: int
+    size: int = 50_000
+    seed: int = 1
+    rules: Sequence[Crossing] = field(default_factory=lambda: (Projected(),))
+
+    @cached_property
+    def designs(self) -> tuple[Array, Bools, Array]:
+        """(N, 2 n) variables of `ReachPoint`, (N, n) pinches and (N, 3) ends."""
+        rng = np.random.default_rng([self.seed, self.n])
+        problem = self.problem(np.zeros(3))
+        x = problem.lower + (problem.upper - problem.lower) * rng.random((self.size, 2 * self.n))
+        on = rng.random((self.size, self.n)) < 0.5
+        fine = problem.violation(x, on) <= 0.0
+        x, on = x[fine], on[fine]
+        return x, on, problem.end(x, on)
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        return cKDTree(self.designs[2])
+
+    def problem(self, target: Array) -> ReachPoint:
+        return ReachPoint(self.surrogate, self.n, self.rules, target)
+
+    def nearest(self, target: Array, count: int) -> Iterator[tuple[Array, Bools]]:
+        """Candidates in the order of their distance from a point, as far as they are near enough to be polished."""
+        x, on, _ = self.designs
+        near = self.tree.query(target, k=min(count, len(x)), distance_upper_bound=REACH[min(self.n, 3)])[1]
+        for i in np.atleast_1d(near):
+            if i < len(x):
+                yield x[i], on[i]
+
+
+@cache
+def library(n: int, seed: int = 1) -> Library:
+    """A library of the shipped data set, made once a process."""
+    return Library(shipped(), n, seed=seed)
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """A design for a target.
+
+    Attributes:
+        target, end: the point asked for and where the surrogate ends, mm; `missed` their distance.
+        simulated: the whole strip by bars and hinges, or None where that was not asked for; `missed_simulated` the
+            distance of its end.
+        clear: the strips do not touch themselves in space (`Swept`).
+        simulations: how many it took.
+    """
+
+    design: Design
+    target: Array
+    end: Array
+    simulated: Simulated | None
+    clear: bool
+    simulations: int
+
+    @property
+    def missed(self) -> float:
+        return float(np.linalg.norm(self.end - self.target))
+
+    @property
+    def missed_simulated(self) -> float:
+        return math.nan if self.simulated is None else float(np.linalg.norm(self.simulated.t - self.target))
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """How a point is reached: segments are added until it is, as in Fig. 6.14.
+
+    Attributes:
+        most: segments; tolerance: of the end, mm; candidates: designs polished for each number of segments.
+        verify: simulate the strip, and aim again up to `rounds` times where that misses by more than `aim` (mm).
+        clear: prefer designs whose strips clear themselves in space; of the others only where no candidate does.
+    """
+
+    most: int = 4
+    tolerance: float = 1.0
+    candidates: int = 24
+    verify: bool = True
+    rounds: int = 3
+    aim: float = 0.5
+    clear: bool = True
+    seed: int = 1
+    libraries: tuple[Library, ...] = ()
+
+    def __call__(self, target: ArrayLike) -> Reached:
+        """The first design that ends within the tolerance.
+
+        Raises:
+            DesignError: a target that is no point, or that no crease of `most` segments reaches.
+        """
+        point = np.asarray(target, dtype=float)
+        if point.shape != (3,) or not np.isfinite(point).all():
+            raise DesignError(f"the target {target!r} is no point; give three coordinates in mm")
+        second: Reached | None = None
+        nearest = math.inf
+        for n in range(1, self.most + 1):
+            book = self.book(n)
+            for found in self._candidates(book, point):
+                nearest = min(nearest, found.value)
+                if found.value > self.tolerance:
+                    continue
+                design = book.problem(point).design(found.x, found.on)
+                clear = not self.clear or not Swept().meets(
+                    book.surrogate, design.k0, design.length, design.pinched
+                )
+                if not clear and second is not None:
+                    continue
+                reached = self._verified(book, point, found, clear)
+                if reached is not None and clear:
+                    return reached
+                second = second or reached
+            # a strip that meets itself is the answer only where one segment more does no better
+            if second is not None and second.design.n < n:
+                return second
+        if second is not None:
+            return second
+        x, y, z = point
+        raise DesignError(
+            f"no crease of up to {self.most} segments was found that ends within {self.tolerance:g} mm of "
+            f"({x:g}, {y:g}, {z:g}); the nearest ends {nearest:.3g} mm away"
+        )
+
+    def book(self, n: int) -> Library:
+        return next((book for book in self.libraries if book.n == n), None) or library(n, self.seed)
+
+    def _candidates(self, book: Library, point: Array) -> Iterator[Found]:
+        problem = book.problem(point)
+        for x, on in book.nearest(point, self.candidates):
+            found = polish(problem, x, on)
+            if found.allowed:
+                yield found
+
+    def _verified(self, book: Library, point: Array, found: Found, clear: bool) -> Reached | None:
+        """The simulated design, aimed again at what its simulation missed; None where it does not come near enough."""
+        problem = book.problem(point)
+        best: Reached | None = None
+        for count in range(1, self.rounds + 1):
+            design = problem.design(found.x, found.on)
+            end = problem.end(found.x, found.on)
+            if not self.verify:
+                return Reached(design, point, end, None, clear, 0)
+            try:
+                strip = simulate(*design.lists(), book.surrogate.setting)
+            except InputError:  # a flat strip that meets itself cannot be cut: another candidate
+                return best
+            reached = Reached(design, point, end, strip, clear, count)
+            if best is None or reached.missed_simulated < best.missed_simulated:
+                best = reached
+            if best.missed_simulated <= self.aim:
+                break
+            problem = replace(problem, target=problem.target + point - strip.t)
+            found = polish(problem, found.x, found.on)
+            if not found.allowed:
+                break
+        return best if best is not None and best.missed_simulated <= self.tolerance else None

@@ -1,0 +1,234 @@
+"""Builds the documentation site: the pages as they are, a gallery of the examples, the reference of all public names.
+
+    python docs/build_site.py build/docs        # what `make docs` does
+
+Sources are copied into the folder first, laid out as in the repository, so that links lead where they lead on a code
+host. Warnings are errors: a broken link or a reference to a name that is not there fails the build.
+"""
+
+from __future__ import annotations
+
+import argparse
+import html
+import inspect
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+ROOT = Path(__file__).resolve().parents[1]
+EXAMPLES = ROOT / "examples"
+PAGES = {
+    "Use": ("installation", "scenes", "plots", "report"),
+    "Studies": ("stiffness", "scan", "performance"),
+    "How it works": ("formulation", "fem", "solver", "decisions"),
+}
+# packages whose __all__ is public, and modules that are public as a whole
+PUBLIC = ("bh", "meshes")
+MODULES = (
+    "bh.plotting", "bh.interactive", "bh.analysis.stiffness_probe", "bh.analysis.contact", "bh.analysis.creases",
+    "bh.analysis.isometric", "bh.scan",
+)  # fmt: skip
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Build the documentation site.")
+    parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "build" / "docs")
+    parser.add_argument(
+        "--no-gallery", action="store_true", help="leave the gallery out; its examples take a minute"
+    )
+    options = parser.parse_args()
+    return build(options.folder, gallery=not options.no_gallery)
+
+
+def build(folder: Path, gallery: bool = True) -> int:
+    """Write the site to `folder`/html; returns sphinx's exit code."""
+    source = folder / "source"
+    for old in (source, folder / "html"):
+        shutil.rmtree(old, ignore_errors=True)
+    shutil.copytree(ROOT / "docs", source / "docs", ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    shutil.copytree(EXAMPLES, source / "examples", ignore=shutil.ignore_patterns("__pycache__", "*-out"))
+    for page in (source / "docs").glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        page.write_text(text.replace("](../examples/)", "](../examples/README.md)"), encoding="utf-8")
+    for name in ("CHANGELOG.md", "LICENSE"):
+        shutil.copyfile(ROOT / name, source / name)
+    shutil.copyfile(ROOT / "docs" / "conf.py", source / "conf.py")
+    write_reference(source / "reference")
+    if gallery:
+        write_gallery(source / "gallery")
+    (source / "viewer").mkdir(exist_ok=True)
+    write_index(source, gallery)
+    command = [sys.executable, "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "-b", "html", str(source)]
+    return subprocess.run([*command, str(folder / "html")], check=False, cwd=ROOT).returncode
+
+
+def write_index(source: Path, gallery: bool) -> None:
+    """The README, and what leads on from it."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = text.replace("](examples/)", "](gallery/index.md)" if gallery else "](examples/README.md)")
+    listed = {name for names in PAGES.values() for name in names}
+    rest = sorted(page.stem for page in (source / "docs").glob("*.md") if page.stem not in listed)
+    trees = {caption: [f"docs/{name}" for name in names] for caption, names in PAGES.items()}
+    trees["Studies"] += [f"docs/{name}" for name in rest]
+    trees["Use"].insert(1, "gallery/index" if gallery else "examples/README")
+    trees["Use"] += ["examples/README"] if gallery else []
+    trees["Reference"] = ["reference/index", "CHANGELOG"]
+    for caption, pages in trees.items():
+        lines = "\n".join(pages)
+        text += f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{lines}\n```\n"
+    (source / "index.md").write_text(text, encoding="utf-8")
+
+
+# --- reference ---------------------------------------------------------------------------------------------------
+
+
+def public_names(module: ModuleType) -> Iterator[str]:
+    """Names of a module that a user may call: those of __all__, else what is defined there without an underscore."""
+    if hasattr(module, "__all__"):
+        yield from sorted(name for name in module.__all__ if not inspect.ismodule(getattr(module, name)))
+        return
+    for name, value in sorted(vars(module).items()):
+        own = getattr(value, "__module__", None) == module.__name__
+        if own and not name.startswith("_") and (inspect.isclass(value) or inspect.isfunction(value)):
+            yield name
+
+
+def write_reference(folder: Path) -> None:
+    """A page a public module, with every public name where it is defined, and a list of them all."""
+    folder.mkdir(parents=True)
+    pages, told = [], set()  # a name that two modules share is described once
+    for name in (*PUBLIC, *MODULES):
+        module = import_module(name)
+        lines = [
+            name,
+            "=" * len(name),
+            "",
+            f".. py:module:: {name}",
+            "   :no-index:" if name in PUBLIC else "",
+            "",
+        ]
+        lines += [(inspect.getdoc(module) or "").split("\n\n")[0], ""]
+        for item in public_names(module):
+            value = getattr(module, item)
+            if id(value) in told:
+                continue
+            told.add(id(value))
+            if inspect.isclass(value):
+                bases = ["   :show-inheritance:"] if value.__bases__ != (object,) else []
+                lines += [f".. autoclass:: {name}.{item}", "   :members:", *bases, ""]
+            elif callable(value):
+                lines += [f".. autofunction:: {name}.{item}", ""]
+        (folder / f"{name}.rst").write_text("\n".join(lines), encoding="utf-8")
+        pages.append(name)
+    tree = [
+        "Reference",
+        "=========",
+        "",
+        ".. toctree::",
+        "   :maxdepth: 2",
+        "",
+        *(f"   {page}" for page in pages),
+        "",
+    ]
+    (folder / "index.rst").write_text("\n".join(tree), encoding="utf-8")
+
+
+# --- gallery -----------------------------------------------------------------------------------------------------
+
+
+def write_gallery(folder: Path) -> None:
+    """Run every example and write a page of what came out, beside what went in."""
+    from bh import interactive
+
+    folder.mkdir(parents=True)
+    static = folder.parent / "viewer"
+    static.mkdir()
+    shutil.copyfile(interactive.FOLDER / "viewer.js", static / "viewer.js")
+    (static / "plotly.min.js").write_text(interactive.library(), encoding="utf-8")
+    scenes, scripts = sorted(EXAMPLES.glob("*.toml")), sorted(EXAMPLES.glob("*.py"))
+    cards = [(file.stem, scene_page(file, folder)) for file in scenes]
+    cards += [(file.stem, script_page(file, folder)) for file in scripts]
+    lines = ["# Gallery", "", "Every example is run when these pages are built, and in the tests.", ""]
+    for stem, title in cards:
+        picture = next(iter(sorted(folder.glob(f"{stem}*.png"))))
+        lines += [f"## [{title}]({stem}.md)", "", f"[![{title}]({picture.name})]({stem}.md)", ""]
+    lines += ["```{toctree}", ":hidden:", "", *(stem for stem, _ in cards), "```", ""]
+    (folder / "index.md").write_text("\n".join(lines), encoding="utf-8")
+
+
+def scene_page(file: Path, folder: Path) -> str:
+    """The page of a scene: what it says, the folded sheet to turn, its pattern, its energies. Returns the title."""
+    import bh
+    from bh import interactive
+
+    text = file.read_text(encoding="utf-8")
+    comment = re.match(r"(?:#.*\n)+", text)
+    about = " ".join(line.lstrip("# ") for line in (comment[0] if comment else "").splitlines())
+    title = re.split(r"[.:](?:\s|$)", about)[0].removeprefix("The ").strip()
+    title = title[:1].upper() + title[1:]
+    path = bh.trace(bh.load_scene(file).model)
+    if path.outcome != "reached":
+        raise SystemExit(f"example '{file.name}' ended early: {path.outcome} ({path.reason})")
+    bh.plotting.picture(path[-1], folder / f"{file.stem}.png", size=(900, 560))
+    bh.plotting.pattern(path.model).savefig(folder / f"{file.stem}_pattern.svg")
+    shutil.copyfile(folder / f"{file.stem}.png", folder.parent / "viewer" / f"{file.stem}.png")
+    image = f'<img src="../_static/{file.stem}.png" alt="{html.escape(title)}, folded">'
+    viewer = interactive.figure(interactive.view(path).data, f"sheet-{file.stem}", title, image)
+    energy = path[-1].energy
+    page = f"""# {title}
+
+{about}
+
+{path.iterations} iterations with {path.unknowns} unknowns; stretching {energy.stretching:.4g}, bending
+{energy.bending:.4g}, folding {energy.folding:.4g} N mm.
+
+```{{raw}} html
+<style>{interactive.style()}</style>
+{viewer}
+<script defer src="../_static/plotly.min.js"></script>
+<script defer src="../_static/viewer.js"></script>
+```
+
+![The flat pattern with its creases and supports]({file.stem}_pattern.svg)
+
+    bh run examples/{file.name} -o out --pictures
+
+```toml
+{text}```
+"""
+    (folder / f"{file.stem}.md").write_text(page, encoding="utf-8")
+    return title
+
+
+def script_page(file: Path, folder: Path) -> str:
+    """The page of a script: what it says, prints and draws. Returns the title."""
+    text = file.read_text(encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, str(file)],
+        cwd=folder, capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    if done.returncode != 0:
+        raise SystemExit(f"example '{file.name}' failed: {done.stderr.strip().splitlines()[-1]}")
+    title = file.stem.replace("_", " ").capitalize()
+    about = (re.match(r'"""(.*?)"""', text, re.DOTALL) or ("", ""))[1]
+    lines = [f"# {title}", "", about, "", "```python", text.rstrip(), "```", ""]
+    if done.stdout:
+        lines += ["It prints", "", "```text", done.stdout.rstrip(), "```", ""]
+    for made in sorted(folder.glob(f"{file.stem}*")):
+        what = made.stem.removeprefix(file.stem).strip("_").replace("_", " ") or title
+        if made.suffix in (".png", ".svg", ".gif"):
+            lines += [f"![{what}]({made.name})", ""]
+        elif made.suffix == ".html":
+            lines += [f"{{download}}`{made.name} <{made.name}>`, a page to open in a browser", ""]
+    (folder / f"{file.stem}.md").write_text("\n".join(lines), encoding="utf-8")
+    return title
+
+
+if __name__ == "__main__":
+    sys.exit(main())

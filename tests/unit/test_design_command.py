@@ -1,0 +1,78 @@
+"""`bh design`: files that it writes, and one line for what cannot be."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("xarray")
+import bh.design
+from bh.cli import main
+from bh.path import Path as Trace
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "design" / "reach.toml"
+
+
+def test_example(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Pattern, picture and path of the strip that reaches a point."""
+    folder = tmp_path / "out"
+    assert main(["design", str(EXAMPLE), "-o", str(folder)]) == 0
+    assert "distance of the simulated strip: 0." in capsys.readouterr().out
+    names = ["design.json", "design.png", "path.bh", "pattern.dxf", "pattern.svg"]
+    assert sorted(file.name for file in folder.iterdir()) == names
+    about = json.loads((folder / "design.json").read_text())
+    assert math.dist(about["end_mm"], (-80.0, 100.0, -5.0)) < 1.0
+    assert about["measures"]["distance of the simulated strip"]["value"] < 1.0
+    path = Trace.load(folder / "path.bh")
+    assert path.outcome == "reached"
+    # the outline that is cut is that of the mesh that was simulated
+    from meshes.io import read_pattern
+
+    drawn = read_pattern(folder / "pattern.svg")
+    size = np.ptp(np.vstack(drawn.rings), axis=0)
+    np.testing.assert_allclose(size, np.ptp(path.model.mesh.points[:, :2], axis=0), atol=0.1)
+
+
+def test_a_curve_from_points(tmp_path: Path) -> None:
+    """A quarter of a circle is one segment."""
+    turn = np.linspace(0.0, 0.5 * math.pi, 60)
+    rows = [f"{100.0 * math.sin(a)},{100.0 * (1.0 - math.cos(a))}" for a in turn]
+    (tmp_path / "quarter.csv").write_text("x,y\n" + "\n".join(rows))
+    (tmp_path / "fit.toml").write_text('[target]\ncurve = "quarter.csv"\n[search]\nsegments = 1\n')
+    answer = bh.design.solve(tmp_path / "fit.toml")
+    assert answer.design.k0[0] == pytest.approx(math.sin(math.pi / 4) / 100.0, rel=1e-3)
+    assert answer.measure["mean distance of the simulated strip"][0] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "empty"),
+        ("[search]\nsegments = 2", "target is missing"),
+        ("[target]", "exactly one"),
+        ('[target]\npoint = [1.0, 2.0, 3.0]\ncurve = "spiral"', "exactly one"),
+        ("[target]\npoint = [1.0, 2.0]", "target.point"),
+        ('[target]\ncurve = "none.csv"', "cannot be read"),
+        ("[target]\npoint = [900.0, 0.0, 0.0]\n[search]\nsegments = 2", "no crease of up to 2 segments"),
+        ("[target]\npoint = [90.0, 0.0, 0.0]\n[search]\nsegment = 2", "segment"),
+        ('[target]\npoint = [90.0, 0.0, 0.0]\n[search]\ndata = "none.nc"', "there is no data set"),
+    ],
+)
+def test_bad_targets(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, told: str) -> None:
+    file = tmp_path / "target.toml"
+    file.write_text(text)
+    assert main(["design", str(file), "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_curves_begin_at_the_origin(tmp_path: Path) -> None:
+    (tmp_path / "off.csv").write_text("10,10\n20,20\n")
+    with pytest.raises(bh.design.DesignError, match="begin at the origin"):
+        bh.design.read_curve(tmp_path / "off.csv")

@@ -1,0 +1,149 @@
+"""docs/extending.md: its module runs, and what it adds works in the API, in scenes and in stored paths."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from importlib import import_module, invalidate_caches
+from pathlib import Path as FilePath
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bh
+import meshes
+from bh.errors import InputError
+from verification import cases
+from verification.run import run
+
+PAGE = (FilePath(__file__).resolve().parents[2] / "docs" / "extending.md").read_text(encoding="utf-8")
+SHEET = bh.Sheet(E=4000.0, t=0.127)
+SECTOR = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), along=12)
+
+
+@pytest.fixture
+def mine(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    blocks = [part.split("```")[0] for part in PAGE.split("```python\n")[1:]]
+    (tmp_path / "mine.py").write_text("\n\n".join(blocks), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    invalidate_caches()
+    yield import_module("mine")
+    sys.modules.pop("mine", None)
+
+
+def scene(folder: FilePath, text: str) -> Any:
+    file = folder / "scene.toml"
+    file.write_text(text, encoding="utf-8")
+    return bh.load_scene(file)
+
+
+SCENE = """
+[pattern]
+kind = "mine:wave"
+rise = 4.0
+[sheet]
+E = 4000.0
+t = 0.127
+[mesh]
+along = 16
+[[supports]]
+kind = "mine:Radial"
+at = "corner:inner-end"
+[[supports]]
+at = "rigid-body"
+[[steps]]
+fold = { crease = "crease", by = 0.5 }
+"""
+
+
+def test_pattern_and_support_in_a_scene(mine: ModuleType, tmp_path: FilePath) -> None:
+    model = scene(tmp_path, SCENE).model
+    assert model.supports[0] == mine.Radial("corner:inner-end")
+    crease = model.mesh.points[model.mesh.nodes("crease:crease")]
+    assert crease[:, 1].max() == pytest.approx(24.0, abs=0.1)
+    path = bh.trace(model, file=tmp_path / "path.bh")
+    assert path.outcome == "reached"
+    move = path[-1].displacement("corner:inner-end")[0]
+    assert abs(move[1]) < 1e-9 < np.abs(move).max()  # it lies on the x axis and slides along it
+    assert bh.Path.load(tmp_path / "path.bh").model.supports == model.supports
+
+
+def test_support_holds_along_its_direction(mine: ModuleType) -> None:
+    held = bh.Model(SECTOR, SHEET).support(mine.Radial("edge:end")).support("edge:end", "z")
+    held = held.support("edge:start", "xyz")
+    state = bh.trace(held.fold("crease", rest=2.0, Lstar=25.0))[-1]
+    nodes = SECTOR.nodes("edge:end")
+    x, y = SECTOR.points[nodes, 0], SECTOR.points[nodes, 1]
+    move = state.displacement("edge:end")
+    assert np.abs(move[:, 0] * -y + move[:, 1] * x).max() < 1e-8
+    assert np.abs(move).max() > 0.01
+
+
+@pytest.mark.parametrize("formulation", ["bars-and-hinges", "consistent", "shell"])
+def test_actuation_in_every_formulation(mine: ModuleType, formulation: str, tmp_path: FilePath) -> None:
+    """A strip that hangs by its own weight: the tip of a cantilever, w L^4 / (8 E I), within some percent."""
+    strip = meshes.structured(meshes.strip(40.0, 8.0), along=40, rows=4)
+    bars = formulation == "bars-and-hinges"
+    model = bh.Model(strip, SHEET, formulation=formulation).support("edge:start", "xyz", clamp=not bars)
+    if bars:
+        model = model.support(np.flatnonzero(strip.points[:, 0] < 1.5).tolist(), "xyz")
+    path = bh.trace(model.step(mine.Weight(1390.0)), file=tmp_path / "path.bh")
+    length = 39.0 if bars else 40.0
+    load = 9.81e-9 * 1390.0 * SHEET.t
+    exact = load * length**4 / (8.0 * SHEET.E * SHEET.t**3 / 12.0)
+    tip = -path[-1].displacement("edge:end")[:, 2].mean()
+    assert tip == pytest.approx(exact, rel=0.25 if bars else 0.05)
+    weight = path[-1].reactions[:, 2].sum()
+    assert weight == pytest.approx(load * 320.0, rel=1e-6)
+    assert bh.Path.load(tmp_path / "path.bh").model.steps == ((mine.Weight(1390.0),),)
+
+
+def test_actuation_in_a_scene(mine: ModuleType, tmp_path: FilePath) -> None:
+    text = SCENE.replace('at = "rigid-body"', 'at = "crease:crease"')
+    text = text.replace('fold = { crease = "crease", by = 0.5 }', '"mine:Weight" = { density = 1390.0 }')
+    assert scene(tmp_path, text).model.steps == ((mine.Weight(1390.0),),)
+
+
+@pytest.mark.usefixtures("mine")
+def test_formulation() -> None:
+    """Without the stiffer diagonals a sheet stretches more easily; folded, both are the same but for a little."""
+    energies = []
+    for name in ("mine:PlainBars", "bars-and-hinges"):
+        model = bh.Model(SECTOR, SHEET, formulation=name).fold("crease", to=math.pi / 2)
+        energies.append(bh.trace(model)[-1].energy.total)
+    assert energies[0] < energies[1]
+    assert energies[0] == pytest.approx(energies[1], rel=0.05)
+
+
+def test_study(mine: ModuleType, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "verification.mine", mine)
+    monkeypatch.setitem(cases.BY_NAME, "mine", cases.Study("mine", "3"))
+    assert run(["mine"], tmp_path)["cases"][0]["verdict"] == "holds"
+
+
+@pytest.mark.usefixtures("mine")
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("mine:wave", "mine:waves", ["pattern", "'mine:waves'", "module:name"]),
+        ("mine:wave", "mime:wave", ["pattern", "'mime:wave'", "module:name"]),
+        ("rise = 4.0", "raise = 4.0", ["pattern", "raise"]),
+        ("mine:wave", "math:sqrt", ["pattern", "math:sqrt"]),
+        ("mine:Radial", "mine:Weight", ["supports[0]", "at"]),
+        ('fold = { crease = "crease", by = 0.5 }', '"mine:Weight" = { mass = 1.0 }', ["steps[0]", "mass"]),
+        (
+            'fold = { crease = "crease", by = 0.5 }',
+            '"mine:Radial" = { at = "all" }',
+            ["steps[0]", "no Actuation"],
+        ),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path: FilePath, old: str, new: str, words: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        scene(tmp_path, SCENE.replace(old, new))
+    message = str(caught.value)
+    assert "\n" not in message
+    assert all(word in message for word in words)
