@@ -26,7 +26,7 @@ report: setup ## set everything up, then write the report (QUICK=1 for fewer poi
 
 test: lint ## set everything up, then run the linters and the tests (PYTEST_ARGS="-k name")
 	@echo "== pytest"
-	@$(PY) -m pytest $(PYTEST_ARGS)
+	@$(PY) -m pytest -n auto --maxprocesses=4 $(PYTEST_ARGS)
 
 lint: setup ## ruff check, ruff format --check, mypy
 	@echo "== ruff check"

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
-    "design": "Find a crease that reaches a point, follows a curve or moves its tip furthest.",
+    "design": "Find a crease for a target, and check it by simulation.",
     "segments": "Make the data set of pinched segments for inverse design.",
     "sweep": "Solve a scene for many parameters into a labelled data set.",
     "verify": "Check the solvers against theory and published numbers.",

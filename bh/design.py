@@ -265,7 +265,7 @@ def design(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> int:
-    """Find a crease for a target: pattern to cut, folded shape, check by simulation."""
+    """Find a crease for a target, and check it by simulation."""
     answer = solve(target)
     folder = Path(f"{target.stem}-design") if output is None else output
     files = write(answer, folder)

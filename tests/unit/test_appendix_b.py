@@ -191,7 +191,7 @@ def test_fields_report_a_failure_without_figures(monkeypatch: pytest.MonkeyPatch
 
 def test_the_command_runs_all_parts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert cases.with_parts(["cone"]) == ["cone"]
-    parts = ["appendix_b", "appendix_b_shell", "appendix_b_cross", "appendix_b_fields"]
+    parts = ["appendix_b", "appendix_b_shell", "appendix_b_cross", "appendix_b_fields", "appendix_b_sheets"]
     assert cases.with_parts(["appendix_b_shell", "appendix_b"]) == [parts[1], parts[0], *parts[2:]]
     asked: list[list[str]] = []
 
