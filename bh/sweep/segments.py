@@ -107,7 +107,7 @@ def segments(
         bool, typer.Option("--resume", help="Go on from the points that are finished.")
     ] = False,
 ) -> int:
-    """Make the data set of pinched segments that `bh design` interpolates in."""
+    """Make the data set of pinched segments for inverse design."""
     from dataclasses import replace
 
     data = build(output, replace(SETTING, zone=zone), pool=workers, resume=resume, progress=True)
