@@ -41,7 +41,7 @@ def sweep(
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> int:
-    """Solve a scene for many parameters into a labelled data set (netCDF-4)."""
+    """Solve a scene for many parameters into a labelled data set."""
     from bh.sweep.file import load_sweep
 
     asked = load_sweep(file)
