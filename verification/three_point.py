@@ -96,7 +96,9 @@ def _test(result: CaseResult, sheet: Folded, name: str, support: str, params: di
         Check(CASE, "first peak of the load", where, test.peak, "N", None, SOURCE, None, **cost)
     )
     whole = float(test.displacement[-1]) if test.outcome == "reached" else math.nan
-    result.checks.append(Check(CASE, "bar went all the way", where, whole, "mm", None, SOURCE, None))
+    result.checks.append(
+        Check(CASE, "bar went all the way", where, whole, "mm", None, SOURCE, None, outcome=test.outcome)
+    )
     return test
 
 

@@ -332,7 +332,9 @@ def test_patches_do_not_matter(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     found = []
     for joined in (0, 1, 2):
         monkeypatch.setattr(
-            consistent_elements, "patches", lambda *args, joined=joined: patches(*args, joined=joined)
+            consistent_elements,
+            "patches",
+            lambda *args, joined=joined, **more: patches(*args, joined=joined, **more),
         )
         found.append(trace(KINDS[name]))
     sizes = [path.unknowns for path in found]

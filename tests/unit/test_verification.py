@@ -37,6 +37,7 @@ SLOW = {
     "fig5_10",
     "fig5_11",
     "pinch_shell",
+    "three_point",
 }  # over some five seconds on a slow machine
 
 
@@ -187,7 +188,8 @@ def test_case_in_quick_mode(name: str, tmp_path: Path) -> None:
         assert record["case"] == name
         assert record["quantity"]
         assert record["source"]
-        assert record["value"] is not None
+        # what was not reached has an outcome and no value
+        assert record["value"] is not None or record["outcome"] not in (None, "reached")
         assert (record["error"] is None) == (record["reference"] is None)
         assert record["passed"] is not False, record
     (summary,) = stored["cases"]
