@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh import scan
+from bh.errors import InputError
 from meshes.pattern import CreasePattern
 from verification.checks import CaseResult, Check, Context, line, plot
 from verification.theory import cone
@@ -262,11 +263,14 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
     series = []
     for mesh, length in (("gmsh", size), ("one row", None)):
         paths = [(folded(sample.pattern, "bars-and-hinges", Lstar, length), Lstar) for Lstar in Lstars]
-        tried = [
-            (_against(cloud, paper[-1], path[-1]), Lstar)
-            for path, Lstar in paths
-            if path.outcome == "reached"
-        ]
+        tried = []
+        for path, Lstar in paths:
+            if path.outcome != "reached":
+                continue
+            try:
+                tried.append((_against(cloud, paper[-1], path[-1]), Lstar))
+            except InputError as lost:  # this stiffness has no place beside the others, and says so
+                result.notes.append(f"{name}, {mesh}, L* = {Lstar:g} mm: no distance, {lost}.")
         if not tried:
             _add(result, "pattern: lowest mean distance over L*", math.nan, "mm", 0.0, "no path was reached",
                  sample.claim, pattern=name, mesh=mesh)  # fmt: skip
