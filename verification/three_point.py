@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from typing import Any
 
@@ -95,10 +94,10 @@ def _test(result: CaseResult, sheet: Folded, name: str, support: str, params: di
     result.checks.append(
         Check(CASE, "first peak of the load", where, test.peak, "N", None, SOURCE, None, **cost)
     )
-    whole = float(test.displacement[-1]) if test.outcome == "reached" else math.nan
-    result.checks.append(
-        Check(CASE, "bar went all the way", where, whole, "mm", None, SOURCE, None, outcome=test.outcome)
-    )
+    went = float(
+        test.displacement[-1]
+    )  # less than asked where the test stopped before; the stiffness then says so
+    result.checks.append(Check(CASE, "how far the bar went", where, went, "mm", None, SOURCE, None))
     return test
 
 
