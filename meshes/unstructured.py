@@ -6,7 +6,9 @@ them the sheet is filled with nearly equilateral triangles. Named edge sets know
 
 from __future__ import annotations
 
+import ctypes
 import math
+import signal
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -264,6 +266,7 @@ def _fill(
     """Nodes (n, 2), the given points first, and counter-clockwise triangles (t, 3) by gmsh."""
     import gmsh
 
+    broken_pipe = _BrokenPipe()
     gmsh.initialize(argv=["", "-v", "0"], readConfigFiles=False, interruptible=False)
     try:
         for name, value in (("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.Algorithm", 6),
@@ -307,6 +310,26 @@ def _fill(
         raise MeshError(f"gmsh could not mesh the pattern ({failed}); try another size") from failed
     finally:
         gmsh.finalize()
+        broken_pipe.restore()
+
+
+class _BrokenPipe:
+    """How this process takes a broken pipe, kept from gmsh, which has SIGPIPE end the process without a word: a
+    sweep of which one worker dies would go down with it. Python's `signal` would do in the main thread only.
+    """
+
+    def __init__(self) -> None:
+        self.handler: int | None = None
+        if hasattr(signal, "SIGPIPE"):
+            ask = ctypes.pythonapi.PyOS_getsig
+            ask.argtypes, ask.restype = [ctypes.c_int], ctypes.c_void_p
+            self.handler = ask(signal.SIGPIPE)
+
+    def restore(self) -> None:
+        if hasattr(signal, "SIGPIPE"):
+            tell = ctypes.pythonapi.PyOS_setsig
+            tell.argtypes, tell.restype = [ctypes.c_int, ctypes.c_void_p], ctypes.c_void_p
+            tell(signal.SIGPIPE, self.handler)
 
 
 def _grade(gmsh: Any, sizes: Sizes, lines: dict[str, list[int]]) -> None:

@@ -215,38 +215,23 @@ def test_a_failed_point_stops_nothing(tmp_path: Path, tasks: Any) -> None:
     assert np.isnan(data["inverse"].values[1])
 
 
-def deadly(folder: Path, **options: Any) -> dict[str, Any]:
-    """A sweep over nine points of which one kills its worker, in an interpreter of its own: after all other tests the
-    process of pytest went down with the pool (3 of 5 whole runs, never alone), which nobody wants to wait for."""
-    always = options.pop("always")
-    given = "".join(f", {key}={value!r}" for key, value in options.items())
-    script = folder / "deadly.py"
-    script.write_text(
-        f"import json, sys\nsys.path.insert(0, {str(HERE)!r})\nimport bh.sweep, sweep_tasks\n"
-        "if __name__ == '__main__':\n"
-        f"    task = sweep_tasks.Deadly({str(folder)!r}, always={always})\n"
-        "    points = bh.sweep.grid({'x': list(range(9))})\n"
-        f"    data = bh.sweep.run(task, points, {str(folder / 'd.nc')!r}, pool=2{given})\n"
-        "    names = ('outcome', 'double', 'attempts', 'reason')\n"
-        "    print(json.dumps({name: data[name].values.tolist() for name in names}))\n"
-    )
-    ran = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
-    found: dict[str, Any] = json.loads(ran.stdout)
-    return found
-
-
 @pytest.mark.parametrize("chunk", [1, 4])
-def test_a_dead_worker_is_replaced(tmp_path: Path, chunk: int) -> None:
-    data = deadly(tmp_path, always=False, chunk=chunk)
-    assert data["outcome"] == ["reached"] * 9
-    assert data["double"] == [2.0 * i for i in range(9)]
-    assert data["attempts"][3] > 1
+def test_a_dead_worker_is_replaced(tmp_path: Path, tasks: Any, chunk: int) -> None:
+    points = bh.sweep.grid({"x": list(range(9))})
+    task = tasks.Deadly(str(tmp_path), always=False)
+    data = bh.sweep.run(task, points, tmp_path / "d.nc", pool=2, chunk=chunk)
+    assert (data["outcome"] == "reached").all()
+    assert data["double"].values.tolist() == [2.0 * i for i in range(9)]
+    assert data["attempts"].values[3] > 1
 
 
-def test_a_deadly_point_is_recorded(tmp_path: Path) -> None:
-    data = deadly(tmp_path, always=True, retries=1)
-    assert data["outcome"] == ["reached"] * 3 + ["died"] + ["reached"] * 5
-    assert "died" in data["reason"][3]
+def test_a_deadly_point_is_recorded(tmp_path: Path, tasks: Any) -> None:
+    points = bh.sweep.grid({"x": list(range(9))})
+    data = bh.sweep.run(
+        tasks.Deadly(str(tmp_path), always=True), points, tmp_path / "d.nc", pool=2, retries=1
+    )
+    assert data["outcome"].values.tolist() == ["reached"] * 3 + ["died"] + ["reached"] * 5
+    assert "died" in data["reason"].values[3]
 
 
 def test_a_killed_sweep_goes_on(tmp_path: Path, tasks: Any) -> None:

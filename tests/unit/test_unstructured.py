@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -151,3 +154,24 @@ def test_gradings_that_cannot_be(near: dict[str, float], growth: float, words: l
     with pytest.raises(MeshError) as caught:
         meshes.unstructured(PATTERNS["sector"], size=3.0, near=near, growth=growth)
     assert all(word in str(caught.value) for word in words)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGPIPE"), reason="this system has no SIGPIPE")
+@pytest.mark.parametrize("where", ["main thread", "another thread"])
+def test_a_broken_pipe_stays_an_error(where: str) -> None:
+    """gmsh makes SIGPIPE end the process; a mesh must not change what the process around it does."""
+    code = (
+        "import os, threading, meshes\n"
+        "def mesh():\n"
+        "    meshes.unstructured(meshes.strip(30.0, 10.0), size=5.0)\n"
+        "thread = threading.Thread(target=mesh)\n"
+        f"{'mesh()' if where == 'main thread' else 'thread.start(); thread.join()'}\n"
+        "read, write = os.pipe()\n"
+        "os.close(read)\n"
+        "try:\n"
+        "    os.write(write, b'lost')\n"
+        "except BrokenPipeError:\n"
+        "    print('told')\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (ran.returncode, ran.stdout) == (0, "told\n"), ran.stderr
