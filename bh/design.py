@@ -25,6 +25,7 @@ from bh.provenance import versions
 from bh.scene_schema import Vector
 from bh.scene_tables import Table, check_keys, one_line, read_table, read_toml
 from meshes import parallel_creases
+from meshes.curves import arc_lengths, interpolated
 from meshes.io import write_pattern
 from meshes.io.export import replacing
 
@@ -126,8 +127,8 @@ def _curve(name: str, search: SearchTable, folder: Path, surrogate: Surrogate) -
     strip = simulate(*design.lists(), surrogate.setting)
     at = np.linspace(0.0, 1.0, problem.samples)
     crease = strip.crease()
-    s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(crease, axis=0), axis=1))))
-    points = np.column_stack([np.interp(at * s[-1], s, crease[:, axis]) for axis in range(3)])
+    s = arc_lengths(crease)
+    points = interpolated(at * s[-1], s, crease)
     goal = np.column_stack((problem.goal, np.zeros(problem.samples)))
     measure = {
         "mean distance by the arcs": (top.value * problem.size, "mm"),

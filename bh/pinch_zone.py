@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.laws import HELD, SHEET
 from meshes import SheetMesh
+from meshes.curves import arc_lengths
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
@@ -106,8 +107,7 @@ def chain(mesh: SheetMesh, crease: str) -> Chain:
             f"pinch of crease '{crease}': it is not one line, so there is no way along it; name one line of it"
         )
     pairs = mesh.crease_edges(crease)
-    steps = np.linalg.norm(mesh.points[pairs[:, 1]] - mesh.points[pairs[:, 0]], axis=1)
-    s = np.concatenate(([0.0], np.cumsum(steps)))
+    s = arc_lengths(mesh.points[np.append(pairs[:, 0], pairs[-1, 1])])
     return Chain(np.column_stack((s[:-1], s[1:])), bool(pairs[0, 0] == pairs[-1, 1]))
 
 

@@ -20,7 +20,6 @@ LARGEST = 1e9  # of any number
 TURN = 2.0 * math.pi
 
 Length = Annotated[float, Field(ge=SHORTEST, le=LONGEST)]
-Height = Annotated[float, Field(gt=0.0, le=LONGEST)]
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(ge=1e-12, le=LARGEST)]
 Stiffness = Annotated[float, Field(ge=0.0, le=LARGEST)]

@@ -21,7 +21,8 @@ import numpy as np
 
 from meshes.curves import Array, Curve, Line, Polyline
 from meshes.errors import PatternError
-from meshes.pattern import Crease, CreasePattern, FoldKind
+from meshes.library import alternating, between_rails
+from meshes.pattern import CreasePattern, FoldKind
 
 KINDS = ("straight", "parabolic-point", "parabolic-edge", "elliptical-point", "elliptical-edge")
 FAMILY = {  # exponent p, root q and spread s
@@ -140,28 +141,7 @@ def curved_corrugation(
 
 
 def _pattern(rails: list[Curve], folds: FoldKind | Sequence[FoldKind] | None) -> CreasePattern:
-    count = len(rails) - 2
-    if folds is None:
-        kinds: list[FoldKind] = ["valley" if i % 2 else "mountain" for i in range(count)]
-    else:
-        kinds = [folds] * count if isinstance(folds, str) else list(folds)
-    if len(kinds) != count:
-        raise PatternError(f"{len(kinds)} folds for {count} creases; give one word a crease, or one for all")
-    names = ["crease"] if count == 1 else [f"crease-{i + 1}" for i in range(count)]
-    creases = tuple(
-        Crease(name, rail, kind) for name, rail, kind in zip(names, rails[1:-1], kinds, strict=True)
-    )
-    inner, outer = rails[0], rails[-1]
-    ends = np.array([0.0, 1.0])
-    (a, b), (c, d) = inner.point(ends), outer.point(ends)
-    edges: tuple[tuple[str, Curve], ...] = (("inner", inner), ("outer", outer))
-    rim = outer.vertices if isinstance(outer, Polyline) else outer.point(ends)
-    if math.dist(a, c) > 0.0:
-        edges += (("start", Line(tuple(a), tuple(c))), ("end", Line(tuple(b), tuple(d))))
-        ring = np.vstack((inner.point(ends), rim[::-1]))
-    else:
-        ring = rim[::-1]
-    return CreasePattern(rings=(ring,), creases=creases, rails=tuple(rails), edges=edges)
+    return between_rails(rails, alternating(len(rails) - 2) if folds is None else folds)
 
 
 def _sizes(width: float, height: float, panels: int) -> tuple[float, float, int]:

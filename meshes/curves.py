@@ -23,6 +23,16 @@ class Curve(Protocol):
     def point(self, u: Array) -> Array: ...
 
 
+def arc_lengths(points: Array) -> Array:
+    """(k,) lengths along a polyline (k, 2) or (k, 3) from its first point, in the unit of the points."""
+    return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+
+
+def interpolated(at: Array, lengths: Array, values: Array) -> Array:
+    """(n, d) values (k, d), known at rising lengths (k,), linear between them, at lengths (n,)."""
+    return np.column_stack([np.interp(at, lengths, column) for column in values.T])
+
+
 @dataclass(frozen=True)
 class Line:
     """The straight segment from `start` to `end`, each (x, y) in mm."""
@@ -79,8 +89,7 @@ class Polyline:
 
     @property
     def _arc_length(self) -> Array:
-        steps = np.linalg.norm(np.diff(self.vertices, axis=0), axis=1)
-        return np.concatenate(([0.0], np.cumsum(steps)))
+        return arc_lengths(self.vertices)
 
     @property
     def length(self) -> float:

@@ -112,7 +112,7 @@ def sine_tessellation(
         return _graph(width, lambda x: middle + amplitude * np.sin(k * x))
 
     curves = [sine(i * pitch) for i in range(1, creases + 1)]
-    return _rectangle(width, height, curves, _alternating(creases) if folds is None else folds)
+    return _rectangle(width, height, curves, alternating(creases) if folds is None else folds)
 
 
 def parabolic_canopy(
@@ -137,7 +137,7 @@ def parabolic_canopy(
         return _graph(width, lambda x: top - sag * (2.0 * x / width - 1.0) ** 2)
 
     curves = [parabola(i * pitch + 0.5 * sag) for i in range(1, creases + 1)]
-    return _rectangle(width, height, curves, _alternating(creases) if folds is None else folds)
+    return _rectangle(width, height, curves, alternating(creases) if folds is None else folds)
 
 
 def opposite_parabolas(
@@ -175,7 +175,8 @@ def _graph(width: float, y: Callable[[Array], Array]) -> Polyline:
     return Polyline(np.column_stack((x, y(x))))
 
 
-def _alternating(count: int) -> list[FoldKind]:
+def alternating(count: int) -> list[FoldKind]:
+    """Mountain and valley in turn."""
     return ["valley" if i % 2 else "mountain" for i in range(count)]
 
 
@@ -205,7 +206,7 @@ def _radii(radius: float | Sequence[float], width: float) -> list[float]:
 
 
 def between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
-    """A sheet between the first and the last of some curves, with creases along the others."""
+    """A sheet between the first and the last of some curves, with creases along the others; these two may meet."""
     count = len(rails) - 2
     kinds: list[FoldKind] = [folds] * count if isinstance(folds, str) else list(folds)
     if len(kinds) != count:
@@ -217,13 +218,15 @@ def between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
     inner, outer = rails[0], rails[-1]
     rings: tuple[Array, ...]
     edges: tuple[tuple[str, Curve], ...] = (("inner", inner), ("outer", outer))
+    ends = np.array([0.0, 1.0])
+    (a, b), (c, d) = inner.point(ends), outer.point(ends)
     if inner.closed:
         rings = (sample(outer)[:-1], sample(inner)[:-1])
-    else:
+    elif math.dist(a, c) > 0.0:
         rings = (np.vstack((sample(inner), sample(outer)[::-1])),)
-        ends = np.array([0.0, 1.0])
-        (a, b), (c, d) = inner.point(ends), outer.point(ends)
         edges += (("start", Line(tuple(a), tuple(c))), ("end", Line(tuple(b), tuple(d))))
+    else:
+        rings = (np.vstack((sample(inner), sample(outer)[-2:0:-1])),)
     return CreasePattern(rings=rings, creases=creases, rails=tuple(rails), edges=edges)
 
 

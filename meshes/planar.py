@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from meshes.curves import Array
+from meshes.curves import Array, arc_lengths
 from meshes.errors import PatternError
 from meshes.topology import Ints
 
@@ -102,7 +102,7 @@ class _Web:
 
         self.lines = list(lines)
         self.gap = gap
-        self.along = [_lengths(line.points) for line in self.lines]
+        self.along = [arc_lengths(line.points) for line in self.lines]
         self.marks: list[dict[float, int]] = [{} for _ in self.lines]  # place along the line: node
         self.shapes = np.array([shapely.LineString(line.points) for line in self.lines], dtype=object)
         self.nodes: list[tuple[float, float]] = []
@@ -290,7 +290,3 @@ def _meeting(a: Array, b: Array, c: Array, d: Array) -> tuple[float | None, floa
     s = float(w[0] * v[1] - w[1] * v[0]) / cross
     t = float(w[0] * u[1] - w[1] * u[0]) / cross
     return min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
-
-
-def _lengths(points: Array) -> Array:
-    return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))

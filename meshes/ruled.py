@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from meshes.curves import Array, Curve, sample
+from meshes.curves import Array, Curve, arc_lengths, sample
 from meshes.errors import FileFormatError, MeshError
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
@@ -93,7 +93,7 @@ class _Net:
         import shapely
 
         points = np.asarray(line.coords)
-        along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+        along = arc_lengths(points)
         found = [0.0, *along[corners(points)].tolist(), float(line.length)]
         for other in self.lines:
             for end in (other.coords[0], other.coords[-1]):

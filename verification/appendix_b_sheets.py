@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import math
 
-from bh import Model, Path
+from bh import Model
 from meshes.structured import Kind
 from verification.checks import CaseResult, Context
-from verification.folded_frames import compare, in_frames, store
+from verification.folded_frames import by_every_formulation, store
 from verification.shell_folding import sheet_model
 
 CASE = "appendix_b_sheets"
 ANGLE = math.pi / 2
-# rows a side and mesh pattern that suit each: one row of staggered cells for bars and hinges
-MESHES: dict[str, tuple[int, Kind]] = {
-    "bars-and-hinges": (1, "staggered"),
-    "consistent": (4, "mirrored"),
-    "shell": (2, "mirrored"),
-}
 TOLERANCE = {False: 0.03, True: 0.06}  # of the shell's energy, the second of quick runs
 HOW = {"a": "edges held in height", "d": "four corners held in height"}
 
@@ -32,15 +26,14 @@ def run(context: Context) -> CaseResult:
     )
     along = 16 if context.quick else 32
     for actuation, how in HOW.items():
-        paths: dict[str, Path] = {}
-        for formulation, (rows, kind) in MESHES.items():
-            context.tell(f"{CASE}: ({actuation}), {formulation}")
-            model = sheet_model(actuation, along, rows, formulation=formulation, kind=kind)
-            paths[formulation] = in_frames(model, _fold)
-        for formulation in ("bars-and-hinges", "consistent"):
-            params = {"actuation": actuation, "formulation": formulation, "along": along}
-            judged = TOLERANCE[context.quick] if formulation == "consistent" else None
-            compare(result, params, paths[formulation], paths["shell"], judged)
+        params = {"actuation": actuation, "along": along}
+
+        def model(formulation: str, rows: int, kind: Kind, actuation: str = actuation) -> Model:
+            return sheet_model(actuation, along, rows, formulation=formulation, kind=kind)
+
+        paths = by_every_formulation(
+            result, context, f"({actuation})", model, _fold, params, TOLERANCE[context.quick]
+        )
         store(
             result, context, f"{CASE}_{actuation}", paths, f"App. B ({actuation}), {how}",
             f"App. B ({actuation}), folded by 90 degrees, {how}.",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from bh import Sheet
-from verification.checks import CaseResult, Context, line, plot
-from verification.pinching import NEARLY, SHEET, WAYS, Pinched, Way, add, pinched, reached
+from verification.checks import CaseResult, Context
+from verification.pinching import NEARLY, SHEET, WAYS, Pinched, Way, add, angle_plots, pinched, reached
 
 STIFFNESS = (250.0, 500.0, 1000.0, 1500.0, 2000.0, 3000.0, 4000.0)  # E t^3, N mm
 CURVATURES = (0.0, 0.005, 0.01)  # 1/mm
@@ -24,7 +24,7 @@ def run(context: Context) -> CaseResult:
     )
     found: Found = {}
     for way in WAYS:
-        for mesh in way.meshes[:1] if context.quick else way.meshes:
+        for mesh in way.taken(context.quick):
             context.tell(f"fig5_10: {way.name}, {mesh[0]} x {mesh[1]}")
             for s in STIFFNESS:
                 for k in CURVATURES:
@@ -32,7 +32,7 @@ def run(context: Context) -> CaseResult:
                     found[way.name, mesh, s, k] = pinched(way, mesh, k, 3, sheet=sheet, left=NEARLY)
     reached(result, list(found.values()))
     for way in WAYS:
-        for mesh in way.meshes[:1] if context.quick else way.meshes:
+        for mesh in way.taken(context.quick):
             _claims(result, way, mesh, found)
     _plots(result, found)
     _notes(result)
@@ -63,16 +63,13 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
 
 
 def _plots(result: CaseResult, found: Found) -> None:
-    for name, unit, read in (("bending", "beta_f - beta", "bend"), ("twist", "theta_f - theta", "twist")):
-        series = []
-        for way in WAYS:
-            for k in CURVATURES:
-                values = [getattr(found[way.name, way.meshes[0], s, k], read) for s in STIFFNESS]
-                series.append(line(f"{way.name}, kappa_0 = {k:g} /mm", list(STIFFNESS), values))
-        result.plots.append(
-            plot(f"fig5-10-{name}", f"Change of the {name} angle against stiffness", "E t^3, N mm", f"{unit}, degrees",
-                 series, "Three creases, w = 5 mm (Fig. 5.10).")
-        )  # fmt: skip
+    curves = {
+        f"{way.name}, kappa_0 = {k:g} /mm": [found[way.name, way.meshes[0], s, k] for s in STIFFNESS]
+        for way in WAYS
+        for k in CURVATURES
+    }
+    x = ("E t^3, N mm", STIFFNESS)
+    angle_plots(result, "fig5-10", " against stiffness", x, curves, "Three creases, w = 5 mm (Fig. 5.10).")
 
 
 def _notes(result: CaseResult) -> None:
@@ -86,6 +83,5 @@ def _notes(result: CaseResult) -> None:
     result.notes.append(
         "From E t^3 = 1000 to 500 N mm at 0.01 /mm the source bends 9.80 % and twists 9.93 % more. Bend: "
         f"{gains('bending')}. Twist: {gains('twist')}. The crease goes with the sheet (L* = 2 mm), so only the "
-        f"share of "
-        "stretching can matter, which goes with the square of the thickness."
+        "share of stretching can matter, which goes with the square of the thickness."
     )

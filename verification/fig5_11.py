@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from verification.checks import CaseResult, Context, line, plot
+from verification.checks import CaseResult, Context
 from verification.pinching import (
     AS_SOURCE,
     CONVERGED,
@@ -15,6 +15,7 @@ from verification.pinching import (
     Pinched,
     Way,
     add,
+    angle_plots,
     pinched,
     proportion,
     reached,
@@ -90,16 +91,13 @@ def _claims(result: CaseResult, way: Way, level: int, found: Found) -> None:
 
 
 def _plots(result: CaseResult, found: Found) -> None:
-    for name, unit, read in (("bending", "beta_f - beta", "bend"), ("twist", "theta_f - theta", "twist")):
-        series = []
-        for way in (*WAYS, SAME_CELLS):
-            for k in CURVATURES[::2]:
-                values = [getattr(found[way.name, 0, w, k], read) for w in SPACINGS]
-                series.append(line(f"{way.name}, kappa_0 = {k:g} /mm", list(SPACINGS), values))
-        result.plots.append(
-            plot(f"fig5-11-{name}", f"Change of the {name} angle against spacing", "spacing, mm", f"{unit}, degrees",
-                 series, "Three creases, t = 0.5 mm (Fig. 5.11).")
-        )  # fmt: skip
+    curves = {
+        f"{way.name}, kappa_0 = {k:g} /mm": [found[way.name, 0, w, k] for w in SPACINGS]
+        for way in (*WAYS, SAME_CELLS)
+        for k in CURVATURES[::2]
+    }
+    x = ("spacing, mm", SPACINGS)
+    angle_plots(result, "fig5-11", " against spacing", x, curves, "Three creases, t = 0.5 mm (Fig. 5.11).")
 
 
 def _notes(result: CaseResult) -> None:
@@ -115,12 +113,8 @@ def _notes(result: CaseResult) -> None:
     )
     result.notes.append(
         "Proportional it is only where the cells stay 1 mm long while the panels grow wider: then the aspect "
-        "ratio is the "
-        "spacing, the excess of torsion (alpha + 1/alpha)^2 grows tenfold from 2 to 8 mm, and the pinch reaches "
-        "so much "
-        "farther. At one aspect ratio the bend of bars and hinges is a straight line that does not begin at "
-        "nothing. The "
-        "converged sheet bends less where the spacing is larger: the zone is short against the panels, which "
-        "then stretch "
-        "rather than follow."
+        "ratio is the spacing, the excess of torsion (alpha + 1/alpha)^2 grows tenfold from 2 to 8 mm, and the "
+        "pinch reaches so much farther. At one aspect ratio the bend of bars and hinges is a straight line that "
+        "does not begin at nothing. The converged sheet bends less where the spacing is larger: the zone is short "
+        "against the panels, which then stretch rather than follow."
     )

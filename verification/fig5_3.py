@@ -13,6 +13,7 @@ from bh import Model, Path, Sheet, State, trace
 from bh.analysis.creases import along
 from bh.analysis.isometric import folded_curvature
 from bh.plotting import picture
+from meshes.curves import arc_lengths, interpolated
 from verification.checks import CaseResult, Check, Context, cost_of, line, plot
 
 Array = NDArray[np.float64]
@@ -123,10 +124,9 @@ def opening(state: State) -> float:
     middles = []
     for place in ("crease:crease", "edge:inner", "edge:outer"):
         nodes = state.mesh.nodes(place)
-        steps = np.linalg.norm(np.diff(state.mesh.points[nodes], axis=0), axis=1)
-        s = np.concatenate(([0.0], np.cumsum(steps)))
-        middles.append([np.interp(0.5 * s[-1], s, state.points[nodes][:, i]) for i in range(3)])
-    crease, inner, outer = np.array(middles)
+        s = arc_lengths(state.mesh.points[nodes])
+        middles.append(interpolated(0.5 * s[-1:], s, state.points[nodes])[0])
+    crease, inner, outer = middles
     a, b = inner - crease, outer - crease
     return float(math.atan2(np.linalg.norm(np.cross(a, b)), a @ b))
 

@@ -4,8 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from verification.checks import CaseResult, Context, line, plot
-from verification.pinching import AS_SOURCE, CONVERGED, NEARLY, WAYS, Pinched, Way, add, pinched, reached
+from verification.checks import CaseResult, Context
+from verification.pinching import (
+    AS_SOURCE,
+    CONVERGED,
+    NEARLY,
+    WAYS,
+    Pinched,
+    Way,
+    add,
+    angle_plots,
+    pinched,
+    reached,
+)
 
 NUMBERS = (1, 2, 3, 4, 5, 6, 7)
 CURVATURES = (0.0, 0.005, 0.01)  # 1/mm
@@ -23,14 +34,14 @@ def run(context: Context) -> CaseResult:
     )
     found: Found = {}
     for way in WAYS:
-        for mesh in way.meshes[:1] if context.quick else way.meshes:
+        for mesh in way.taken(context.quick):
             context.tell(f"fig5_9: {way.name}, {mesh[0]} x {mesh[1]}")
             for n in NUMBERS:
                 for k in CURVATURES:
                     found[way.name, mesh, n, k] = pinched(way, mesh, k, n, left=NEARLY)
     reached(result, list(found.values()))
     for way in WAYS:
-        for mesh in way.meshes[:1] if context.quick else way.meshes:
+        for mesh in way.taken(context.quick):
             _angles(result, way, mesh, found)
             _claims(result, way, mesh, found)
     _plots(result, found)
@@ -100,21 +111,12 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
 
 
 def _plots(result: CaseResult, found: Found) -> None:
-    for name, unit, read in (("bending", "beta_f - beta", "bend"), ("twist", "theta_f - theta", "twist")):
-        for way in WAYS:
-            mesh = way.judged if (way.name, way.judged, 1, 0.0) in found else way.meshes[0]
-            series = [
-                line(
-                    f"kappa_0 = {k:g} /mm",
-                    list(NUMBERS),
-                    [getattr(found[way.name, mesh, n, k], read) for n in NUMBERS],
-                )
-                for k in CURVATURES
-            ]
-            result.plots.append(
-                plot(f"fig5-9-{name}-{way.formulation}", f"Change of the {name} angle, {way.name}", "number of creases",
-                     f"{unit}, degrees", series, f"{way.formulation}, {mesh[0]} x {mesh[1]} cells a panel (Fig. 5.9).")
-            )  # fmt: skip
+    for way in WAYS:
+        mesh = way.judged if (way.name, way.judged, 1, 0.0) in found else way.meshes[0]
+        curves = {f"kappa_0 = {k:g} /mm": [found[way.name, mesh, n, k] for n in NUMBERS] for k in CURVATURES}
+        caption = f"{way.formulation}, {mesh[0]} x {mesh[1]} cells a panel (Fig. 5.9)."
+        angle_plots(result, "fig5-9", f", {way.name}", ("number of creases", NUMBERS), curves, caption,
+                    f"-{way.formulation}")  # fmt: skip
 
 
 def _pictures(result: CaseResult, context: Context, found: Found) -> None:
@@ -151,10 +153,10 @@ def _notes(result: CaseResult, found: Found) -> None:
         )
     result.notes.append(
         "Odd and straight: no twist. Even: far more, to the other side. Both formulations say so; from five "
-        "creases on the "
-        "converged twist of odd numbers is within a degree of nothing, of either sign. With straight creases the twist "
-        f"of even numbers does not fade as the source says: {values(CONVERGED, NUMBERS[1::2], 0.0, 'twist')} degrees "
+        "creases on the converged twist of odd numbers is within a degree of nothing, of either sign. With straight "
+        f"creases the twist of even numbers does not fade as the source says: "
+        f"{values(CONVERGED, NUMBERS[1::2], 0.0, 'twist')} degrees "
         f"(2, 4, 6) once converged, {values(AS_SOURCE, NUMBERS[1::2], 0.0, 'twist')} with its model. Its model "
-        f"bends several "
-        "times too much, because torsion of bars and hinges carries the pinch along the whole crease (case fig5_5)."
+        "bends several times too much, because torsion of bars and hinges carries the pinch along the whole "
+        "crease (case fig5_5)."
     )

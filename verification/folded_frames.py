@@ -8,9 +8,16 @@ from typing import Any
 from bh import Model, Path, trace
 from bh.interactive import frames
 from bh.plotting import picture
+from meshes.structured import Kind
 from verification.checks import CaseResult, Check, Context, cost_of
 from verification.run import write_json
 
+# rows of cells a side and mesh pattern that suit each
+MESHES: dict[str, tuple[int, Kind]] = {
+    "bars-and-hinges": (1, "staggered"),
+    "consistent": (4, "mirrored"),
+    "shell": (2, "mirrored"),
+}
 FRAMES = 8  # steps that a folding is told in
 NAMES = {"bars-and-hinges": "bars and hinges", "consistent": "consistent", "shell": "shell"}
 Fold = Callable[[Model, float], Model]
@@ -21,6 +28,27 @@ def in_frames(model: Model, fold: Fold, count: int = FRAMES) -> Path:
     for number in range(1, count + 1):
         model = fold(model, number / count)
     return trace(model)
+
+
+def by_every_formulation(
+    result: CaseResult,
+    context: Context,
+    name: str,
+    model: Callable[[str, int, Kind], Model],
+    fold: Fold,
+    params: dict[str, Any],
+    tolerance: float,
+) -> dict[str, Path]:
+    """A sheet folded in frames by every formulation, `model` of its name, rows a side and mesh pattern, and compared
+    with the shell: the consistent one within a tolerance, bars and hinges without."""
+    paths: dict[str, Path] = {}
+    for formulation, (rows, kind) in MESHES.items():
+        context.tell(f"{result.name}: {name}, {formulation}")
+        paths[formulation] = in_frames(model(formulation, rows, kind), fold)
+    for formulation in ("bars-and-hinges", "consistent"):
+        judged = tolerance if formulation == "consistent" else None
+        compare(result, {**params, "formulation": formulation}, paths[formulation], paths["shell"], judged)
+    return paths
 
 
 def compare(

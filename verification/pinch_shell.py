@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 import bh
 from bh.applications.inverse.transforms import frame
+from meshes.curves import arc_lengths
 from verification.alignment import aligned
 from verification.checks import CaseResult, Context, line, plot
 from verification.pinching import AS_SOURCE, CONVERGED, Pinched, Way, add, pinched
@@ -161,9 +162,7 @@ def end_distance(found: Pinched, judge: Pinched) -> float:
         rows = []
         for crease in mesh.creases:
             nodes = mesh.nodes(f"crease:{crease}")
-            s = np.concatenate(
-                ([0.0], np.cumsum(np.linalg.norm(np.diff(mesh.points[nodes], axis=0), axis=1)))
-            )
+            s = arc_lengths(mesh.points[nodes])
             rows.append(CubicSpline(s, state.points[nodes])(at * s[-1]))
         curves.append(np.vstack(rows))
     apart = np.linalg.norm(aligned(curves[0], curves[1])[0] - curves[1], axis=1).reshape(-1, len(at))

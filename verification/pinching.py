@@ -12,7 +12,7 @@ panel (alpha = 5). Two ways stand for that:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -24,7 +24,7 @@ import bh
 import meshes
 from bh import Model, Path, Sheet, State, trace
 from bh.analysis.midplane import MidPlane, midplane
-from verification.checks import CaseResult, Check
+from verification.checks import CaseResult, Check, line, plot
 
 Array = NDArray[np.float64]
 LENGTH, SPACING, LSTAR = 100.0, 5.0, 2.0  # mm (5.3.2)
@@ -51,6 +51,10 @@ class Way:
     couple: float | None = (
         None  # N mm / mm, more than is needed, where couples close the crease and nothing is held
     )
+
+    def taken(self, quick: bool) -> tuple[tuple[int, int], ...]:
+        """Meshes of a run."""
+        return self.meshes[:1] if quick else self.meshes
 
 
 AS_SOURCE = Way("as the source", "bars-and-hinges", "grip", 10.0, ((100, 1), (200, 2)))
@@ -189,3 +193,29 @@ def add(
     result.checks.append(
         Check(result.name, quantity, params, value, unit, reference, source, tolerance, **cost)
     )
+
+
+def angle_plots(
+    result: CaseResult,
+    figure: str,
+    title: str,
+    x: tuple[str, Sequence[float]],
+    curves: Mapping[str, Sequence[Pinched]],
+    caption: str,
+    way: str = "",
+) -> None:
+    """Changes of the bending and of the twist angle over x (label, values), a line for each of some rows of sheets."""
+    for name, angle, read in (("bending", "beta_f - beta", "bend"), ("twist", "theta_f - theta", "twist")):
+        series = [
+            line(label, list(x[1]), [getattr(p, read) for p in sheets]) for label, sheets in curves.items()
+        ]
+        result.plots.append(
+            plot(
+                f"{figure}-{name}{way}",
+                f"Change of the {name} angle{title}",
+                x[0],
+                f"{angle}, degrees",
+                series,
+                caption,
+            )
+        )

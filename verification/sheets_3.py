@@ -6,10 +6,11 @@ import math
 from typing import Literal
 
 import meshes
-from bh import Model, Path, Sheet
+from bh import Model, Sheet
+from meshes import CreasePattern
 from meshes.structured import Kind
 from verification.checks import CaseResult, Context
-from verification.folded_frames import compare, in_frames, store
+from verification.folded_frames import by_every_formulation, store
 
 CASE = "sheets_3"
 SHEET = Sheet(E=4000.0, nu=0.38, t=0.127)
@@ -17,12 +18,6 @@ ANGLE = math.pi / 2
 LSTAR = 25.0  # mm
 CREASES = (80.0, 90.0, 100.0, 110.0, 120.0)  # radii of the pleats, mm
 FOLDS: tuple[Literal["mountain", "valley"], ...] = ("mountain", "valley", "mountain", "valley", "mountain")
-# rows of cells between creases and mesh pattern that suit each
-MESHES: dict[str, tuple[int, Kind]] = {
-    "bars-and-hinges": (1, "staggered"),
-    "consistent": (4, "mirrored"),
-    "shell": (2, "mirrored"),
-}
 TOLERANCE = {False: 0.03, True: 0.08}  # of the shell's energy; quick meshes are twice as coarse
 
 
@@ -47,15 +42,15 @@ def run(context: Context) -> CaseResult:
         ),
         ("pleats", pleats, _exactly, along, "Five pleats, folded by 90 degrees"),
     ):
-        paths: dict[str, Path] = {}
-        for formulation, (rows, kind) in MESHES.items():
-            context.tell(f"{CASE}: {name}, {formulation}")
+        params = {"sheet": name, "along": cells}
+
+        def model(
+            formulation: str, rows: int, kind: Kind, pattern: CreasePattern = pattern, cells: int = cells
+        ) -> Model:
             mesh = meshes.structured(pattern, along=cells, rows=rows, kind=kind)
-            paths[formulation] = in_frames(Model(mesh, SHEET, formulation=formulation), fold)
-        for formulation in ("bars-and-hinges", "consistent"):
-            params = {"sheet": name, "formulation": formulation, "along": cells}
-            judged = TOLERANCE[context.quick] if formulation == "consistent" else None
-            compare(result, params, paths[formulation], paths["shell"], judged)
+            return Model(mesh, SHEET, formulation=formulation)
+
+        paths = by_every_formulation(result, context, name, model, fold, params, TOLERANCE[context.quick])
         store(result, context, f"{CASE}_{name}", paths, what, f"{what}; the sheet is free.", what)
     return result
 

@@ -21,6 +21,7 @@ from bh.errors import ModelError
 from bh.state import State
 from bh.step_program import crease_hinges
 from meshes import SheetMesh
+from meshes.curves import arc_lengths
 
 Array = NDArray[np.float64]
 STRAIGHT = (
@@ -129,7 +130,7 @@ def along(state: State, crease: str, method: Differentiation | None = None) -> C
     mesh = state.mesh
     nodes, closed = _chain(mesh, crease)
     flat = mesh.points[nodes]
-    u = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(flat, axis=0), axis=1))))
+    u = arc_lengths(flat)
     curve = curve_of(state.points[nodes], u, method, closed)
     up = _up(state, crease, closed)
     up = _unit(up - _dot(up, curve.tangent)[:, None] * curve.tangent)
@@ -173,7 +174,7 @@ def curve_of(
         raise ModelError("the points of a curve must be a finite array (k, 3) or (k, 2) in mm")
     x = np.column_stack((x, np.zeros((len(x), 3 - x.shape[1]))))
     if u is None:
-        u = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))))
+        u = arc_lengths(x)
     at = np.asarray(u, dtype=float)
     if at.shape != (len(x),) or not (np.diff(at) > 0.0).all():
         raise ModelError(

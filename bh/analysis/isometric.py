@@ -33,7 +33,7 @@ from bh.analysis.ruled import Panel
 from bh.analysis.starts import Relaxed, relax
 from bh.errors import ModelError
 from meshes import SheetMesh
-from meshes.curves import Arc, Line
+from meshes.curves import Arc, Line, arc_lengths
 
 Array = NDArray[np.float64]
 SAMPLES = 401
@@ -240,7 +240,7 @@ def of_mesh(
             heading=float(np.arctan2(way[1], way[0])),
         )  # fmt: skip
     drawn = of_crease(
-        np.column_stack((nodes, np.zeros(len(nodes)))), np.pi, u=_chords(nodes), up=(0.0, 0.0, 1.0)
+        np.column_stack((nodes, np.zeros(len(nodes)))), np.pi, u=arc_lengths(nodes), up=(0.0, 0.0, 1.0)
     )
     arc = InterpolatingSpline(7).through(drawn.arc_length, drawn.curvature)
     first = drawn.tangent[0]
@@ -254,10 +254,6 @@ def _same_way(curve: Arc, nodes: Array) -> float:
     """+1 if the nodes run as the curve does, -1 if against it."""
     first = curve.point(np.array([0.0]))[0]
     return 1.0 if np.linalg.norm(nodes[0] - first) < np.linalg.norm(nodes[-1] - first) else -1.0
-
-
-def _chords(nodes: Array) -> Array:
-    return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))))
 
 
 def _check_dihedral(phi: Array, u: Array) -> None:

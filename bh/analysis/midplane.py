@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from bh.errors import ModelError
 from bh.state import State
 from meshes import SheetMesh
+from meshes.curves import arc_lengths, interpolated
 
 Array = NDArray[np.float64]
 STATIONS = 201
@@ -89,5 +90,5 @@ def midplane(state: State, stations: int = STATIONS) -> MidPlane:
 def _rail(state: State, mesh: SheetMesh, place: str, u: Array) -> Array:
     """(k, 3) points of a deformed rail at parts u of its length in the flat sheet."""
     nodes = mesh.nodes(place)
-    s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(mesh.points[nodes], axis=0), axis=1))))
-    return np.column_stack([np.interp(u * s[-1], s, state.points[nodes, axis]) for axis in range(3)])
+    s = arc_lengths(mesh.points[nodes])
+    return interpolated(u * s[-1], s, state.points[nodes])

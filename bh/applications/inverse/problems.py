@@ -14,6 +14,7 @@ from bh.applications.inverse.crossing import Crossing, Projected, allowed
 from bh.applications.inverse.segments import DesignError, folded
 from bh.applications.inverse.surrogate import Surrogate
 from bh.applications.inverse.transforms import chain, matrix
+from meshes.curves import arc_lengths, interpolated
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -62,11 +63,10 @@ def resample(curve: ArrayLike, count: int) -> Array:
     points = np.asarray(curve, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
         raise DesignError("a target curve needs at least two points (x, y) in mm")
-    s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+    s = arc_lengths(points)
     if s[-1] <= 0.0:
         raise DesignError("the target curve has no length; give different points")
-    at = np.linspace(0.0, s[-1], count)
-    return np.column_stack([np.interp(at, s, points[:, axis]) for axis in range(2)])
+    return interpolated(np.linspace(0.0, s[-1], count), s, points)
 
 
 def _sampled(curve: Callable[[Array], tuple[Array, Array]], last: float) -> Array:
