@@ -69,26 +69,9 @@ def trace(
             raise ModelError(
                 "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
             )
-        from bh.accuracy import Goal, solve
-
-        goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-        path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)
-        if file is not None:
-            path.save(file)
-        return path
+        return _to_accuracy(model, accuracy, symmetry, progress, strategy, file)
     strategy = strategy or Automatic()
-    path = Path(model, symmetry=symmetry) if after is None else _continued(after, model, symmetry)
-    target: PathFile | None = None
-    if file is not None:
-        if after is not None:
-            raise ModelError(
-                "a path that goes on from another one cannot have a file; save it when it is solved"
-            )
-        if resume:
-            path, target = _resume(model, FilePath(file), symmetry)
-        else:
-            path._system(0)  # a model that cannot be solved must not replace the file of one that was
-            target = new_file(path, FilePath(file))
+    path, target = _opened(model, symmetry, file, resume, after)
     report = meter(progress)
     try:
         for step in range(len(path.steps), len(model.steps)):
@@ -104,6 +87,38 @@ def trace(
         if target is not None:
             target.close()
     return path
+
+
+def _to_accuracy(
+    model: Model,
+    accuracy: float | Goal,
+    symmetry: Plane | None,
+    progress: bool | ProgressMeter,
+    strategy: Strategy | None,
+    file: str | FilePath | None,
+) -> Path:
+    from bh.accuracy import Goal, solve
+
+    goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
+    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)
+    if file is not None:
+        path.save(file)
+    return path
+
+
+def _opened(
+    model: Model, symmetry: Plane | None, file: str | FilePath | None, resume: bool, after: Path | None
+) -> tuple[Path, PathFile | None]:
+    """The path to go on with, and its file."""
+    path = Path(model, symmetry=symmetry) if after is None else _continued(after, model, symmetry)
+    if file is None:
+        return path, None
+    if after is not None:
+        raise ModelError("a path that goes on from another one cannot have a file; save it when it is solved")
+    if resume:
+        return _resume(model, FilePath(file), symmetry)
+    path._system(0)  # a model that cannot be solved must not replace the file of one that was
+    return path, new_file(path, FilePath(file))
 
 
 def _run_step(

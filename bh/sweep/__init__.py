@@ -113,16 +113,7 @@ def run(
     journal = _open(file, meta, resume)
     meter = (Bar() if progress else Silent()) if isinstance(progress, bool) else progress
     with closing(journal):
-        done = journal.done()
-        if warm:  # lines are whole or not there: a task is one transaction
-            lines = range(0, len(points), chunk)
-            todo = [
-                runner.Job(tuple(range(i, i + chunk)))
-                for i in lines
-                if not done.issuperset(range(i, i + chunk))
-            ]
-        else:
-            todo = runner.jobs([i for i in range(len(points)) if i not in done], chunk)
+        todo = _todo(len(points), journal.done(), chunk, warm)
         if todo:
             workers, ours = _pool(pool)
             try:
@@ -138,6 +129,17 @@ def run(
     save(data, file)
     _journal(file).unlink()
     return data
+
+
+def _todo(count: int, done: set[int], chunk: int, lines: bool) -> list[runner.Job]:
+    """Jobs for the points that are not done; `lines` are whole or not there: a task is one transaction."""
+    if not lines:
+        return runner.jobs([i for i in range(count) if i not in done], chunk)
+    return [
+        runner.Job(tuple(range(i, i + chunk)))
+        for i in range(0, count, chunk)
+        if not done.issuperset(range(i, i + chunk))
+    ]
 
 
 def partial(file: str | Path) -> Dataset:
