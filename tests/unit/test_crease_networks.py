@@ -1,4 +1,4 @@
-"""Sheets with creases that meet, end inside, or close on themselves fold: closed forms, and drawings as other programs write them."""
+"""Sheets with creases that meet, end inside, or close on themselves fold: closed forms and drawings."""
 
 from __future__ import annotations
 
