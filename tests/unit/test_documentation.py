@@ -104,7 +104,9 @@ def test_reference_has_every_public_module_of_bh(reference: dict[str, str], shor
     page = reference[module.__name__]
     assert f"``bh.{short}``" in page
     assert f"   {module.__name__}\n" in reference["index"]
-    public = [name for name in getattr(module, "__all__", own_names(module)) if callable(getattr(module, name))]
+    public = [
+        name for name in getattr(module, "__all__", own_names(module)) if callable(getattr(module, name))
+    ]
     assert public
     missing = [name for name in public if id(getattr(module, name)) not in described(reference)]
     assert missing == []
