@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bh
+import meshes
 from bh.analysis.contact import first_contact
 from bh.mechanics.shared.kinematics import hinge_geometry
 from meshes import structured, unstructured
