@@ -39,7 +39,8 @@ PAGES = {
 PUBLIC = ("bh", "meshes")
 USE = ("meshes.io",)
 EXTENSION = (
-    "bh.supports", "bh.actuation", "bh.ramps", "bh.step_program", "bh.formulations", "bh.solvers.system",
+    "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
+    "bh.formulations.registry", "bh.solvers.system",
 )  # fmt: skip
 
 
@@ -171,7 +172,7 @@ def write_module(folder: Path, name: str, described: set[int]) -> bool:
 
 def write_gallery(folder: Path) -> None:
     """Run every example and write a page of what came out, beside what went in."""
-    from bh import interactive
+    from bh.plotting import interactive
 
     folder.mkdir(parents=True)
     static = folder.parent / "viewer"
@@ -192,7 +193,7 @@ def write_gallery(folder: Path) -> None:
 def scene_page(file: Path, folder: Path) -> str:
     """The page of a scene: what it says, the folded sheet to turn, its pattern, its energies. Returns the title."""
     import bh
-    from bh import interactive
+    from bh.plotting import interactive
 
     text = file.read_text(encoding="utf-8")
     comment = re.match(r"(?:#.*\n)+", text)

@@ -10,8 +10,8 @@ import pytest
 
 import bh
 import meshes
-from bh.formulations import formulation
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.loading.program import program
 
 # columns of cells; total, bending and folding energy (N mm) on which six independent codes agree (Green's strain)
 PUBLISHED = {
