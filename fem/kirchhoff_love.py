@@ -12,8 +12,9 @@ from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
 from bh.model.refinement import Refinement
+from bh.model.sheet import Sheet
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point

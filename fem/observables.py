@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from bh.formulations.state import Energy, State
 from bh.loading.load_step import crease_hinges
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from fem.kernels import Frames
 from fem.shell import ShellElements
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
-from bh.model.actuations import Ramp
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from bh.model.supports import TURNED, UNBALANCED
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation, grows_ahead

@@ -22,7 +22,8 @@ import meshes
 from bh.analysis.midplane import MidPlane, midplane
 from bh.errors import InputError, ModelError
 from bh.formulations.state import State
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from bh.paths.path import Path
 from bh.solving.follow import trace
 from meshes import CreasePattern

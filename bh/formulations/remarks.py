@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bh.model.actuations import Displace, Force, Pinch
+from bh.model.actuations import Displace, Force
+from bh.model.pinch import Pinch
 
 if TYPE_CHECKING:
     from bh.model.model import Model
@@ -116,7 +117,7 @@ def _twisted(model: Model) -> Remark | None:
 
 
 def _pinched(model: Model) -> Remark | None:
-    if not any(isinstance(item, Pinch) for step in model.steps for item in step):
+    if not any(isinstance(item, Pinch) for step in model.steps for item in step.actuations):
         return None
     return Remark(
         "pinch",
@@ -150,4 +151,4 @@ def _folds(model: Model) -> bool:
 
 
 def _loaded(model: Model) -> bool:
-    return any(isinstance(item, Force | Displace) for step in model.steps for item in step)
+    return any(isinstance(item, Force | Displace) for step in model.steps for item in step.actuations)

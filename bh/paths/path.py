@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.formulations.observables import until_of
 from bh.formulations.registry import Formulation, formulation
 from bh.formulations.state import State
 from bh.loading.builder import load_steps
@@ -254,7 +253,7 @@ class Path:
     def _system(self, step: int) -> Any:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
-            if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
+            if any(each.until is not None for each in self.model.steps[:step]):
                 self._load_steps = load_steps(self.model, self._ended(step))
             self._systems[step] = self._formulation.system(
                 self.model, self._load_steps[step], self._start(step)
@@ -277,7 +276,7 @@ class Path:
         last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
         found = {}
         for step, index in last.items():
-            if until_of(self.model.steps[step]) is not None and self.records[index].lam < 1.0:
+            if self.model.steps[step].until is not None and self.records[index].lam < 1.0:
                 state = self[index]
                 found[step] = StepEnd(state.lam, state.points, state.dihedral_angles)
         return found

@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
 from bh.errors import ModelError, PathFileError
-from bh.formulations.observables import until_of
+from bh.formulations.observables import measure
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
 from bh.paths.path import Path, Record, StepOutcome, new_file
@@ -175,14 +175,14 @@ def _run_step(
 
 def _goal(path: Path, step: int, half: Half | None) -> tuple[Callable[[Point], float] | None, float]:
     """What is zero where the step ends early, and to which tolerance; None if nothing ends it early."""
-    until = until_of(path.model.steps[step])
+    until = path.model.steps[step].until
     if until is None:
         return None, 0.0
 
     def missed(at: Point) -> float:
         q = at.q if half is None else half.unknowns(at.q, at.lam)
         state = path._formulation.observe(path.model, path._system(step), q, at.lam, step)
-        return until.measure(state) - until.value
+        return measure(until, state) - until.value
 
     return missed, until.tolerance
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model.model import Sheet
+from bh.model.sheet import Sheet
 from bh.paths.path import Path
 from meshes import SheetMesh
 

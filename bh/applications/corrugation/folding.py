@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from bh.applications.corrugation.folded import Folded, moved_to
 from bh.errors import ModelError
-from bh.formulations.observables import depth, depth_of
-from bh.model.model import Model, Sheet
+from bh.formulations.observables import depth_of
+from bh.model.model import Model
+from bh.model.sheet import Sheet
+from bh.model.until import depth
 from bh.paths.path import Path
 from bh.solvers.trace import Strategy
 from bh.solving.follow import trace

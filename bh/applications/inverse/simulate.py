@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.transforms import angles, frame, relative
 from bh.formulations.state import State
-from bh.model.actuations import Actuation, Pinch
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.pinch import Pinch
+from bh.model.sheet import Sheet
+from bh.model.step import Actuation
 from bh.paths.path import Path
 from bh.solving.follow import trace
 from meshes import SheetMesh, parallel_creases, structured

@@ -21,9 +21,9 @@ from bh.mechanics.consistent.patches import (
 )
 from bh.mechanics.shared.hinge_lock import ZONE, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.model.actuations import Ramp
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from bh.solvers.matrices import reverse_cuthill_mckee
 from meshes import SheetMesh
 from meshes.topology import Ints

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bh.loading.symmetry import Mirror
 from bh.mechanics.consistent.kernels import NONE, TURN
 from bh.mechanics.consistent.patches import Patches
-from bh.model.actuations import Ramp
+from bh.model.ramp import Ramp
 
 if TYPE_CHECKING:
     from bh.mechanics.consistent.elements import ConsistentElements
