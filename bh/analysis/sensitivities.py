@@ -37,7 +37,7 @@ from bh.model.supports import directions, select
 from bh.paths.path import Path
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.factor import Factor, IndefiniteError
-from bh.solvers.matrices import FreeBodyMatrix
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import MultiplierMatrix
 
 Array = NDArray[np.float64]
@@ -88,7 +88,8 @@ class Situation:
         self._before = before[-1] if before else None
         self.start: State | None = None if self._before is None else path[self._before]
         self.moving = int(self.system.moving)
-        self.matrix = self.system.tangent(self.q, self.lam, self.system.evaluate(self.q, self.lam).forces)
+        forces = self.system.evaluate(self.q, self.lam).forces
+        self.matrix: Matrix = self.system.tangent(self.q, self.lam, forces).matrix
         try:
             self._factor: Factor = self.matrix.factorise_any()[0]
         except IndefiniteError:

@@ -128,7 +128,7 @@ class Probe:
         self._held = self._places(hold)
         with one_blas_thread():
             forces = self.system.evaluate(self.q, self.lam).forces
-            self.matrix: Matrix = self.system.tangent(self.q, self.lam, forces)
+            self.matrix: Matrix = self.system.tangent(self.q, self.lam, forces).matrix
             try:
                 self._factor: Factor = self.matrix.factorise_any()[0]
             except IndefiniteError:

@@ -78,4 +78,4 @@ class Halves:
     def negative(sheet: Any, record: Any) -> int:
         """Negative modes of the whole sheet, symmetric or not."""
         forces = sheet.evaluate(record.q, record.lam).forces
-        return count_negative(sheet.tangent(record.q, record.lam, forces))
+        return count_negative(sheet.tangent(record.q, record.lam, forces).matrix)
