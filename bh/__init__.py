@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.formulations.observables import Until, depth
     from bh.formulations.state import Energy, State
-    from bh.model.actuations import Bar, Displace, Fold, Force, Moment, Pinch, Tether
+    from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pinch, Tether
     from bh.model.model import CreaseLaw, Model, Sheet
     from bh.model.refinement import Goal
     from bh.model.supports import RigidBody, Support
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Accuracy": "bh.solving.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
-    "Bar": "bh.model.actuations", "CreaseLaw": "bh.model.model", "Tether": "bh.model.actuations",
+    "Indenter": "bh.model.actuations", "CreaseLaw": "bh.model.model", "Tether": "bh.model.actuations",
     "Displace": "bh.model.actuations", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.formulations.state",
     "Fold": "bh.model.actuations",
     "Force": "bh.model.actuations", "Goal": "bh.model.refinement", "InputError": "bh.errors",
@@ -53,10 +53,36 @@ _SUBMODULES = {
 }  # fmt: skip
 
 __all__ = [
-    "Accuracy", "ArcLength", "Automatic", "Bar", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold",
-    "Force", "Goal", "InputError", "LoadControl", "Model", "ModelError", "Moment",
-    "Newton", "Path", "PathFileError", "Pinch", "RigidBody", "SceneError", "Sheet", "State", "Support", "Tether",
-    "Until", "depth", "load_scene", "trace",
+    "Accuracy",
+    "ArcLength",
+    "Automatic",
+    "CreaseLaw",
+    "Displace",
+    "DisplacementControl",
+    "Energy",
+    "Fold",
+    "Force",
+    "Goal",
+    "Indenter",
+    "InputError",
+    "LoadControl",
+    "Model",
+    "ModelError",
+    "Moment",
+    "Newton",
+    "Path",
+    "PathFileError",
+    "Pinch",
+    "RigidBody",
+    "SceneError",
+    "Sheet",
+    "State",
+    "Support",
+    "Tether",
+    "Until",
+    "depth",
+    "load_scene",
+    "trace",
 ]  # fmt: skip
 
 _ensure_kernel_cache()

@@ -145,7 +145,7 @@ def lay_out(
     turns = elements.tables.rotations
     still = np.zeros((edges, turns), dtype=bool)
     still[clamped] = True
-    fixed = np.concatenate((constraints.fixed.ravel(), still.ravel(), np.repeat(creases.held, turns)))
+    fixed = np.concatenate((constraints.fixed.ravel(), still.ravel(), np.repeat(creases.prescribed, turns)))
     none = np.zeros(turns * edges)
     displacement = local_axes(constraints, positions - mesh.nodes).ravel()
     begin = np.concatenate((displacement, none, beta[creases.hinges].ravel()))

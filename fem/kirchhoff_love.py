@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations.state import State
-from bh.loading.load_step import StepProgram
-from bh.loading.program import program
+from bh.loading.builder import load_steps
+from bh.loading.load_step import LoadStep
 from bh.model.model import Model, Sheet
 from bh.model.refinement import Refinement
 from bh.runtime.threads import one_blas_thread
@@ -40,7 +40,7 @@ class Shell:
     )
 
     def system(
-        self, model: Model, program: StepProgram, start: State | None, moments: EdgeMoments = FREE
+        self, model: Model, load_step: LoadStep, start: State | None, moments: EdgeMoments = FREE
     ) -> ShellSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet).
 
@@ -51,7 +51,7 @@ class Shell:
             raise ModelError(
                 f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
             )
-        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet, self.degree), moments)
+        return ShellSystem(model, load_step, start, _elements(model.mesh, model.sheet, self.degree), moments)
 
     def observe(
         self,
@@ -104,10 +104,10 @@ def _follow(
     shell = Shell()
     states: list[ShellState] = []
     increments: list[Increment] = []
-    programs = program(model)
-    for step, ramps in enumerate(programs):
+    steps = load_steps(model)
+    for step, load_step in enumerate(steps):
         now = moments[step] if moments else FREE
-        system = shell.system(model, ramps, states[-1] if states else None, now)
+        system = shell.system(model, load_step, states[-1] if states else None, now)
         begin = point(system, system.start(), 0.0)
         if not states:
             states.append(shell.observe(model, system, begin.q, 0.0))

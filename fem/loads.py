@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations.observables import Until
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.model.actuations import Actuation, Displace, Fold, Force, Ramp
 from bh.model.model import Model
 from bh.model.supports import Constraints, select
@@ -39,7 +39,7 @@ def constraints(mesh: ElementMesh, model: Model, step: int) -> Constraints:
     A support of listed nodes holds just these corners.
     """
     steps = tuple(tuple(_plain(item) for item in actuations) for actuations in model.steps[: step + 1])
-    return program(replace(model, mesh=mesh.linear, steps=steps))[step].constraints
+    return load_steps(replace(model, mesh=mesh.linear, steps=steps))[step].constraints
 
 
 def _plain(item: Actuation | Until) -> Actuation | Until:

@@ -127,7 +127,7 @@ def _couples(system: ShellSystem, here: Here) -> Array:
     sheet = system.components.beta(system.components.spread(here.pull))
     turn = creases.rest.at(here.lam) - system.components.beta(here.components)
     spring = creases.stiffness[:, None] * np.einsum("cij,cj->ci", creases.mass, turn)
-    out: Array = np.where(creases.held[:, None], sheet, spring)
+    out: Array = np.where(creases.prescribed[:, None], sheet, spring)
     return out
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.model.actuations import Ramp
 from bh.model.model import Model
 from bh.model.supports import TURNED, UNBALANCED
@@ -65,7 +65,7 @@ class ShellSystem:
     def __init__(
         self,
         model: Model,
-        program: StepProgram,
+        load_step: LoadStep,
         start: ShellState | None,
         elements: ShellElements,
         moments: EdgeMoments,
@@ -74,11 +74,11 @@ class ShellSystem:
             raise ModelError(
                 "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
             )
-        if program.bodies:
+        if load_step.bodies:
             raise ModelError(
                 "the shell knows no bars and tethers; take formulation consistent or bars-and-hinges"
             )
-        self.program, self.elements = program, elements
+        self.load_step, self.elements = load_step, elements
         mesh = self.mesh = elements.mesh
         step = 0 if start is None else start.step + 1
         x = mesh.nodes if start is None else start.nodes
@@ -86,9 +86,9 @@ class ShellSystem:
         flat = np.zeros((len(model.mesh.topology.hinges), elements.tables.rotations))
         beta = flat if start is None else start.fold_angles
         couple = flat if start is None else start.crease_couples
-        self.creases = connectors(mesh, model, program, beta, couple)
+        self.creases = connectors(mesh, model, load_step, beta, couple)
         self.constraints = loads.constraints(mesh, model, step)
-        clamped = mesh.sheet.topology.find_edges(program.constraints.clamped)
+        clamped = mesh.sheet.topology.find_edges(load_step.constraints.clamped)
         self.components = lay_out(elements, self.constraints, self.creases, x, beta, clamped)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
@@ -97,7 +97,7 @@ class ShellSystem:
 
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
-        force = loads.forces(self.mesh, model, step, self.program.force, self.elements.lengths)
+        force = loads.forces(self.mesh, model, step, self.load_step.force, self.elements.lengths)
         couple = loads.edge_moments(self.elements, moments)
         none = np.zeros(self.elements.tables.rotations * len(self.creases))
         ends = [
@@ -118,7 +118,7 @@ class ShellSystem:
 
     @property
     def rotation(self) -> float:
-        return self.program.rotation
+        return self.load_step.rotation
 
     @cached_property
     def energy_scale(self) -> float:

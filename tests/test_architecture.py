@@ -173,7 +173,7 @@ def test_imports(name: str) -> None:
         ("bh.solvers.newton", "from bh.mechanics import kinematics", "bh.mechanics.shared.kinematics"),
         ("bh.solvers.newton", "from ..mechanics import kinematics", "bh.mechanics.shared.kinematics"),
         ("bh.solvers.newton", "from bh.model import Model", "bh.model"),
-        ("bh.solvers.newton", "from bh.program import StepProgram", "bh.program"),
+        ("bh.solvers.newton", "from bh.program import LoadStep", "bh.program"),
         ("bh.path", "from bh.mechanics.bars_and_hinges import X", "bh.mechanics.bars_and_hinges"),
         ("bh.commands.cli", "from fem import shell", "fem.shell"),
         ("bh.analysis.observables", "import bh.commands.cli", "bh.commands.cli"),

@@ -24,7 +24,7 @@ from bh.analysis.sensitivities import (
     differences,
 )
 from bh.errors import ModelError
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.paths.path import Path
 from bh.runtime.threads import one_blas_thread
 
@@ -61,7 +61,7 @@ def of_nodes(path: Path, observables: Sequence[Observable], index: int = -1) -> 
         mesh = at.model.mesh
         if not mesh.flat:
             raise ModelError("sensitivities to nodes are those of flat sheets; this one is made curved")
-        if any(not np.isnan(step.pinch.toward).all() for step in program(at.model)[: at.step + 1]):
+        if any(not np.isnan(step.pinch.toward).all() for step in load_steps(at.model)[: at.step + 1]):
             raise ModelError("a pinched zone depends on all nodes of its crease; take bh.sensitivities.of")
         slopes = [(observable.value(at), observable.slope(at)) for observable in observables]
         weights = [derivatives_to_data(at, slope, value) for value, slope in slopes]

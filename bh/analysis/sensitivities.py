@@ -30,8 +30,8 @@ from bh.errors import ModelError
 from bh.formulations.observables import until_of
 from bh.formulations.registry import formulation
 from bh.formulations.state import State
+from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges
-from bh.loading.program import program
 from bh.model.model import Model
 from bh.model.supports import directions, select
 from bh.paths.path import Path
@@ -80,7 +80,7 @@ class Situation:
             raise ModelError(
                 "a step that ends where an observable has a value has no sensitivities; give it its end"
             )
-        if self.system.touching is not None:
+        if self.system.rigid_contact is not None:
             raise ModelError("sheets that bars press on have no sensitivities; leave the bars out")
         self.step, self.q, self.lam = record.step, record.q, record.lam
         self.state: State = path[index]
@@ -354,7 +354,7 @@ def _gradient(at: Situation, slope: Slope, value: float, around: _Around) -> tup
         [sum(float(np.vdot(np.abs(by_data[key]), off[key])) for key in by_data) for _, off in rates]
     )
     # what a pinch imposes follows from the angles that its step began with
-    pinch = program(at.model)[at.step].pinch
+    pinch = load_steps(at.model)[at.step].pinch
     weights = np.where(np.isnan(pinch.base) & ~np.isnan(pinch.toward), 1.0 - pinch.part, 0.0)
     weights = weights * at.design.imposed(by_data)
     follows = np.flatnonzero(weights)
@@ -405,7 +405,7 @@ class _Around:
 
 def data_of(at: Situation, model: Model) -> Data:
     """Element data of another model where a situation is."""
-    system = formulation(model.formulation).system(model, program(model)[at.step], at.start)
+    system = formulation(model.formulation).system(model, load_steps(model)[at.step], at.start)
     if system.size != at.system.size:
         raise ModelError("the unknowns change with the design; keep supports and creases fixed")
     here, there = at.system.constraints, system.constraints

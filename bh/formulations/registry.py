@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations.state import State
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.model.model import Model
 from bh.model.plugins import named
 
@@ -28,7 +28,7 @@ class Formulation(Protocol):
 
     name: str
 
-    def system(self, model: Model, program: StepProgram, start: State | None) -> Any: ...
+    def system(self, model: Model, load_step: LoadStep, start: State | None) -> Any: ...
 
     def observe(
         self,

@@ -10,8 +10,8 @@ from bh.errors import ModelError
 from bh.formulations.registry import formulation as registered
 from bh.formulations.registry import names
 from bh.formulations.state import State
-from bh.loading.load_step import Ended, StepProgram
-from bh.loading.program import program
+from bh.loading.builder import load_steps
+from bh.loading.load_step import LoadStep, StepEnd
 from bh.loading.symmetry import Mirror, Plane, check, halved, mirror
 from bh.model.model import Model
 from bh.solvers.modes import count_negative
@@ -54,7 +54,7 @@ class Halves:
         ModelError: the formulation cannot be solved by halves, or something is not symmetric; one line names it.
     """
 
-    def __init__(self, formulation: Any, model: Model, steps: Sequence[StepProgram], plane: Plane) -> None:
+    def __init__(self, formulation: Any, model: Model, steps: Sequence[LoadStep], plane: Plane) -> None:
         if not hasattr(formulation, "half"):
             able = ", ".join(name for name in names() if hasattr(registered(name), "half"))
             raise ModelError(
@@ -66,11 +66,11 @@ class Halves:
         self._half = halved(model, self.plane, any(step.constraints.rigid_body for step in steps))
         self._found: dict[int, Half] = {}
 
-    def of(self, step: int, sheet: Any, start: State | None, ended: Mapping[int, Ended]) -> Half:
+    def of(self, step: int, sheet: Any, start: State | None, ends: Mapping[int, StepEnd]) -> Half:
         """The half of a step that begins at a state of the whole sheet, whose system is `sheet`."""
         if step not in self._found:
-            ramps = program(self._half, ended)[step]
-            system = self.formulation.half(self.model, ramps, start, self.plane)
+            load_step = load_steps(self._half, ends)[step]
+            system = self.formulation.half(self.model, load_step, start, self.plane)
             self._found[step] = Half(self.formulation, self.plane, system, sheet)
         return self._found[step]
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from bh.errors import ModelError
 from bh.formulations.observables import Until
-from bh.loading.load_step import Ended, StepProgram, edge_hinges, hinge_name
-from bh.model.actuations import Actuation, Array, Bar, Ramp, Tether
-from bh.model.laws import HELD, SPRING
+from bh.loading.load_step import LoadStep, StepEnd, edge_hinges, hinge_name
+from bh.model.actuations import Actuation, Array, Indenter, Ramp, Tether
+from bh.model.laws import PRESCRIBED, SPRING
 from bh.model.model import CreaseLaw, Model
 from bh.model.pinch import Pinched
 from bh.model.supports import Prescribed, resolve
@@ -20,15 +20,15 @@ from meshes.topology import Ints, dihedral_angles
 Direction = tuple[float, float, float]
 
 
-class Ramps:
+class StepBuilder:
     """Walks through the steps and remembers what the last one left behind.
 
-    An actuation calls what it needs in `apply`: `creases` to find hinges, then `hold`, `rest_at`, `couple`, `pull`,
-    `displace` or `touch`. What nobody calls stays as it was.
+    An actuation calls what it needs in `apply`: `creases` to find hinges, then `prescribe`, `rest_at`, `couple`,
+    `pull`, `displace` or `attach`. What nobody calls stays as it was.
 
     Attributes:
         mesh, sheet: of the model; steps: number of the step, from one.
-        law, rest, rest_ends, held: see `bh.loading.load_step.StepProgram`, at the end of the step.
+        law, rest, rest_ends, prescribed: see `bh.loading.load_step.LoadStep`, at the end of the step.
     """
 
     def __init__(self, model: Model) -> None:
@@ -39,12 +39,12 @@ class Ramps:
         self.rest = dihedral_angles(model.mesh.points, model.mesh.topology.hinges)
         self.made = self.rest.copy()  # rest angles of the laws; they come in during the first step
         self.rest_ends = np.full((hinges, 2), math.pi)
-        self.held = np.full(hinges, np.nan)
+        self.prescribed = np.full(hinges, np.nan)
         self.moment = np.zeros(hinges)
         self.force = np.zeros((nodes, 3))
         self.displaced: dict[tuple[int, Direction], float] = {}
         self.steps = 0
-        self.pinched = np.zeros(hinges, dtype=bool)  # held at an angle that follows from a solved state
+        self.pinched = np.zeros(hinges, dtype=bool)  # prescribed at an angle that follows from a solved state
         self._begin()
         for name, crease in model.creases.items():
             self.spring(self.hinges(name), crease.Lstar, crease.stiffness)
@@ -100,17 +100,17 @@ class Ramps:
         self.law[hinges] = SPRING
         self.stiffness[hinges] = value
 
-    def hold(self, hinges: Ints, angle: Array) -> None:
+    def prescribe(self, hinges: Ints, angle: Array) -> None:
         """Impose dihedral angles, rad, at the end of this step."""
         self._turn(hinges, angle)
-        self.law[hinges], self.held[hinges] = HELD, angle
+        self.law[hinges], self.prescribed[hinges] = PRESCRIBED, angle
 
     def rest_at(self, hinges: Ints, angle: Array, release: bool = False) -> None:
-        """Turn the rest angles of springs, rad; `release` lets go of angles that are held now."""
+        """Turn the rest angles of springs, rad; `release` lets go of angles that are prescribed now."""
         self._turn(hinges, angle)
         if release:
-            self.released[hinges] = self.law[hinges] == HELD
-            self.law[hinges], self.held[hinges] = SPRING, np.nan
+            self.released[hinges] = self.law[hinges] == PRESCRIBED
+            self.law[hinges], self.prescribed[hinges] = SPRING, np.nan
         if (self.law[hinges] != SPRING).any():
             row = int(hinges[int(np.argmax(self.law[hinges] != SPRING))])
             raise ModelError(
@@ -139,26 +139,28 @@ class Ramps:
                 )
             self.displaced[node, (x, y, z)] = by
 
-    def touch(self, body: Bar | Tether) -> None:
-        """A body that the sheet touches in this step."""
+    def attach(self, body: Indenter | Tether) -> None:
+        """A body that acts on the sheet in this step."""
         self.bodies.append(body)
 
     def present(self) -> Array:
         """(m,) angles that the steps so far are meant to bring about, rad."""
-        return np.select([self.law == HELD, self.law == SPRING], [self.held, self.rest], math.pi)
+        return np.select([self.law == PRESCRIBED, self.law == SPRING], [self.prescribed, self.rest], math.pi)
 
     # ------------------------------------------------------------------------------- steps
 
-    def step(self, items: Sequence[Actuation | Until]) -> StepProgram:
+    def step(self, items: Sequence[Actuation | Until]) -> LoadStep:
         """The ramps of the next step."""
-        rest, held, moment, force = (part.copy() for part in (self.rest, self.held, self.moment, self.force))
+        rest, prescribed, moment, force = (
+            part.copy() for part in (self.rest, self.prescribed, self.moment, self.force)
+        )
         ends, displaced = self.rest_ends.copy(), dict(self.displaced)
         self.steps += 1
         if self.steps == 1:
             self.rest = self.made.copy()
             self.rest_ends = np.repeat(self.made, 2).reshape(-1, 2)
         self._begin()
-        held[self.pinched] = np.nan  # it begins where it is
+        prescribed[self.pinched] = np.nan  # it begins where it is
         acting = [item for item in items if isinstance(item, Actuation)]
         for item in acting:
             if not item.late:
@@ -169,31 +171,31 @@ class Ramps:
                 item.apply(self)
         rest[self.released] = np.nan
         ends[self.released] = np.nan
-        return StepProgram(
+        return LoadStep(
             law=self.law.copy(),
             stiffness=self.stiffness.copy(),
             rest=Ramp(rest, self.rest.copy()),
             rest_ends=Ramp(ends, self.rest_ends.copy()),
-            held=Ramp(held, self.held.copy()),
+            prescribed=Ramp(prescribed, self.prescribed.copy()),
             pinch=self.pinch,
             moment=Ramp(moment, self.moment.copy()),
             force=Ramp(force, self.force.copy()),
             constraints=resolve(
-                self.mesh, self.model.supports, self._prescribed(displaced), touching=bool(self.bodies)
+                self.mesh, self.model.supports, self._prescribed(displaced), in_contact=bool(self.bodies)
             ),
             bodies=tuple(self.bodies),
         )
 
-    def stop(self, step: StepProgram, end: Ended) -> None:
+    def stop(self, step: LoadStep, end: StepEnd) -> None:
         """What the next step begins with where `step` ended early."""
         self.rest, self.rest_ends, self.moment, self.force = (
             ramp.at(end.lam) for ramp in (step.rest, step.rest_ends, step.moment, step.force)
         )
         if np.isnan(self.rest).any():
             raise ModelError(
-                "a held crease is released in a step that ends early (until); release it in a step before"
+                "a prescribed crease is released in a step that ends early (until); release it in a step before"
             )
-        self.held = np.where(self.law == HELD, end.dihedral_angles, np.nan)
+        self.prescribed = np.where(self.law == PRESCRIBED, end.dihedral_angles, np.nan)
         moved = end.points - self.mesh.points
         self.displaced = {(node, axis): float(moved[node] @ axis) for node, axis in self.displaced}
 
@@ -204,10 +206,10 @@ class Ramps:
         self.folded = np.zeros(hinges, dtype=bool)
         self.given = np.full((2, hinges), np.nan)  # angles and moments
         self.now: dict[tuple[int, Direction], float] = {}
-        self.bodies: list[Bar | Tether] = []
+        self.bodies: list[Indenter | Tether] = []
         self.claimed: dict[int, tuple[float, float]] = {}  # angles that pinches want, and where these are
         self.pinch = Pinched.none(hinges)
-        self.pinch.toward[self.pinched] = self.held[self.pinched]
+        self.pinch.toward[self.pinched] = self.prescribed[self.pinched]
         self.pinch.present[:] = self.before = self.present()
 
     def _turn(self, hinges: Ints, angle: Array) -> None:
@@ -236,3 +238,18 @@ class Ramps:
             Prescribed(np.array([node]), direction, before.get((node, direction), start), end)
             for (node, direction), end in self.displaced.items()
         ]
+
+
+def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple[LoadStep, ...]:
+    """The load steps of `model`, in order; nothing is solved. `ends` tells of steps that ended early.
+
+    Raises:
+        ModelError, MeshError: an actuation or support that the sheet cannot take; the message names it.
+    """
+    builder = StepBuilder(model)
+    steps = []
+    for number, actuations in enumerate(model.steps):
+        steps.append(builder.step(actuations))
+        if ends is not None and number in ends:
+            builder.stop(steps[-1], ends[number])
+    return tuple(steps)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.model.model import Model
 from bh.model.supports import Constraints, RigidBody, Support
 from meshes import Arc, SheetMesh
@@ -154,7 +154,7 @@ def halved(model: Model, plane: Mirror, free: bool) -> Model:
     return replace(model, supports=(*model.supports, *extra))
 
 
-def check(model: Model, steps: Sequence[StepProgram], plane: Mirror) -> None:
+def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
     """Raises `ModelError` with one line that names what is not symmetric."""
     for number, step in enumerate(steps):
         where = f"step {number + 1}"
@@ -177,9 +177,9 @@ def check(model: Model, steps: Sequence[StepProgram], plane: Mirror) -> None:
             raise ModelError(f"{where}: the clamped edges are not mirror-symmetric; {ADVICE}")
 
 
-def _check_hinges(model: Model, step: StepProgram, plane: Mirror, where: str) -> None:
+def _check_hinges(model: Model, step: LoadStep, plane: Mirror, where: str) -> None:
     values = {"law": step.law, "stiffness": step.stiffness}
-    for name in ("rest", "held", "moment"):
+    for name in ("rest", "prescribed", "moment"):
         ramp = getattr(step, name)
         values |= {f"{name} at the start": ramp.start, f"{name} at the end": ramp.end}
     values |= {"pinch": step.pinch.toward, "extent of the pinch": step.pinch.part}

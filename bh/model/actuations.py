@@ -1,6 +1,7 @@
 """Actuations: what drives a sheet while the control parameter lambda runs from 0 to 1 in a step.
 
-All of them are data, and know what they ask of the hinges and nodes of a sheet (`apply`); `bh.loading.builder` makes ramps of it.
+All of them are data, and know what they ask of the hinges and nodes of a sheet (`apply`); `bh.loading.builder` makes load
+steps of it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from bh.model.pinch import PROFILES, Profile, pinch
 from bh.model.supports import AXES, select
 
 if TYPE_CHECKING:
-    from bh.loading.builder import Ramps
+    from bh.loading.builder import StepBuilder
 
 Array = NDArray[np.float64]
 Angles = float | Sequence[float]
@@ -46,10 +47,10 @@ class Actuation:
 
     late: ClassVar[bool] = False  # applied after the others of its step, from where they lead
 
-    def prepare(self, ramps: Ramps) -> None:
+    def prepare(self, builder: StepBuilder) -> None:
         """Before the first step: springs that must be there from the start."""
 
-    def apply(self, ramps: Ramps) -> None:
+    def apply(self, builder: StepBuilder) -> None:
         """What is asked for at the end of the step."""
         raise NotImplementedError
 
@@ -114,21 +115,21 @@ class Fold(Actuation):
     def _spring(self) -> bool:
         return self.Lstar is not None or self.stiffness is not None
 
-    def prepare(self, ramps: Ramps) -> None:
+    def prepare(self, builder: StepBuilder) -> None:
         if self._spring:
-            ramps.spring(ramps.creases(self.crease)[0], self.Lstar, self.stiffness)
+            builder.spring(builder.creases(self.crease)[0], self.Lstar, self.stiffness)
 
-    def apply(self, ramps: Ramps) -> None:
-        hinges, sense, drawn = ramps.creases(self.crease)
+    def apply(self, builder: StepBuilder) -> None:
+        hinges, sense, drawn = builder.creases(self.crease)
         angle = self._target(sense, drawn)
         if self.rest is not None or self._spring:
-            ramps.rest_at(hinges, angle, release=self._spring)
+            builder.rest_at(hinges, angle, release=self._spring)
             return
         if not ((angle > 0.0) & (angle < 2.0 * math.pi)).all():
             raise ModelError(
                 f"fold of crease '{self.crease}' closes it completely; stay inside (0, 2 pi) rad"
             )
-        ramps.hold(hinges, angle)
+        builder.prescribe(hinges, angle)
 
     def _target(self, sense: Array, drawn: Array) -> Array:
         """(k,) dihedral angles at the end of the step, rad."""
@@ -225,8 +226,8 @@ class Pinch(Actuation):
 
     late: ClassVar[bool] = True
 
-    def apply(self, ramps: Ramps) -> None:
-        pinch(ramps, self)
+    def apply(self, builder: StepBuilder) -> None:
+        pinch(builder, self)
 
 
 @dataclass(frozen=True)
@@ -239,9 +240,9 @@ class Moment(Actuation):
     def __post_init__(self) -> None:
         _finite(f"moment on crease '{self.crease}'", (self.to,))
 
-    def apply(self, ramps: Ramps) -> None:
-        hinges, sense, _ = ramps.creases(self.crease)
-        ramps.couple(hinges, sense * self.to)
+    def apply(self, builder: StepBuilder) -> None:
+        hinges, sense, _ = builder.creases(self.crease)
+        builder.couple(hinges, sense * self.to)
 
 
 @dataclass(frozen=True)
@@ -261,11 +262,11 @@ class Force(Actuation):
         assert vector is not None
         _vector(f"force at '{self.at}'", vector)
 
-    def apply(self, ramps: Ramps) -> None:
-        nodes = select(ramps.mesh, self.at)
+    def apply(self, builder: StepBuilder) -> None:
+        nodes = select(builder.mesh, self.at)
         vector = self.each if self.each is not None else self.total
         share = 1.0 if self.each is not None else 1.0 / len(nodes)
-        ramps.pull(nodes, share * np.asarray(vector, dtype=float))
+        builder.pull(nodes, share * np.asarray(vector, dtype=float))
 
 
 @dataclass(frozen=True)
@@ -291,21 +292,21 @@ class Displace(Actuation):
             if not any(self.direction):
                 raise ModelError(f"displacement at '{self.at}': the direction is the zero vector")
 
-    def apply(self, ramps: Ramps) -> None:
+    def apply(self, builder: StepBuilder) -> None:
         raw = AXES[self.direction] if isinstance(self.direction, str) else self.direction
         unit = np.asarray(raw, dtype=float) / np.linalg.norm(raw)
-        ramps.displace(select(ramps.mesh, self.at), unit.tolist(), self.by)
+        builder.displace(select(builder.mesh, self.at), unit.tolist(), self.by)
 
 
 @dataclass(frozen=True)
-class Bar(Actuation):
-    """A rigid bar that the sheet can touch, without friction, in the step that names it (`bh.mechanics.shared.contact`).
+class Indenter(Actuation):
+    """A rigid body that presses on the sheet, without friction, in the step that names it.
 
-    Its section is a rectangle with rounded edges, its axis as long as it needs to be. Bars take the place of the
+    Its section is a rectangle with rounded edges, its axis as long as it needs to be. Indenters take the place of the
     rigid-body support in their step.
 
     Attributes:
-        name: in `State.pressing`.
+        name: in `State.contact_forces`.
         at: centre of the section where the step begins, mm.
         azimuth: of the axis, from the x axis towards y, rad; tilt: of the axis, upwards, rad.
         width, height: of the whole section, mm; radius: of its edges, mm. Width and height of twice the radius make a
@@ -327,19 +328,19 @@ class Bar(Actuation):
 
     def __post_init__(self) -> None:
         for key in ("at", "by"):
-            _vector(f"bar '{self.name}': {key}", getattr(self, key))
-        _finite(f"bar '{self.name}': azimuth or tilt", (self.azimuth, self.tilt))
+            _vector(f"indenter '{self.name}': {key}", getattr(self, key))
+        _finite(f"indenter '{self.name}': azimuth or tilt", (self.azimuth, self.tilt))
         for key in ("width", "height", "radius", "stiffness", "gap"):
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0.0):
-                raise ModelError(f"bar '{self.name}': {key} = {value} cannot be; give a positive number")
+                raise ModelError(f"indenter '{self.name}': {key} = {value} cannot be; give a positive number")
         if 2.0 * self.radius > min(self.width, self.height) * (1.0 + 1e-12):
             raise ModelError(
-                f"bar '{self.name}': its radius {self.radius:g} mm is more than half of its section"
+                f"indenter '{self.name}': its radius {self.radius:g} mm is more than half of its section"
             )
 
-    def apply(self, ramps: Ramps) -> None:
-        ramps.touch(self)
+    def apply(self, builder: StepBuilder) -> None:
+        builder.attach(self)
 
     @property
     def half(self) -> tuple[float, float]:
@@ -370,8 +371,8 @@ class Tether(Actuation):
         if min(self.total) < 0.0:
             raise ModelError(f"tether at '{self.at}': {self.total} cannot be; stiffness is not negative")
 
-    def apply(self, ramps: Ramps) -> None:
-        ramps.touch(self)
+    def apply(self, builder: StepBuilder) -> None:
+        builder.attach(self)
 
 
 def _finite(what: str, values: Sequence[float]) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from bh.errors import ModelError
 from bh.formulations.observables import Until
 from bh.model.actuations import Actuation, Displace, Fold, Force, Moment, Pinch
-from bh.model.supports import Holding, RigidBody, Support
+from bh.model.supports import Constraint, RigidBody, Support
 from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
@@ -122,7 +122,7 @@ class Model:
 
     mesh: SheetMesh
     sheet: Sheet
-    supports: tuple[Holding, ...] = ()
+    supports: tuple[Constraint, ...] = ()
     steps: tuple[tuple[Actuation | Until, ...], ...] = ()
     creases: Mapping[str, CreaseLaw] = field(default_factory=dict)
     formulation: str = "bars-and-hinges"
@@ -207,14 +207,14 @@ class Model:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What the mesh does to the answer with this formulation (`bh.formulations.remarks`); empty where there is nothing to say."""
+        """What the mesh does to the answer with this formulation; empty where there is nothing to say."""
         from bh.formulations.remarks import remarks
 
         return remarks(self)
 
     def support(
         self,
-        at: str | Sequence[int] | Holding,
+        at: str | Sequence[int] | Constraint,
         fix: str | Sequence[Sequence[float]] = "xyz",
         clamp: bool = False,
     ) -> Model:
@@ -223,7 +223,11 @@ class Model:
         `at` can be a support of your own. See `bh.model.supports`.
         """
         item = (
-            at if isinstance(at, Holding) else RigidBody() if at == "rigid-body" else Support(at, fix, clamp)
+            at
+            if isinstance(at, Constraint)
+            else RigidBody()
+            if at == "rigid-body"
+            else Support(at, fix, clamp)
         )
         return replace(self, supports=(*self.supports, item))
 

@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.model.laws import HELD, SHEET
+from bh.model.laws import PRESCRIBED, SHEET
 from meshes import SheetMesh
 from meshes.curves import arc_lengths
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
-    from bh.loading.builder import Ramps
+    from bh.loading.builder import StepBuilder
     from bh.model.actuations import Pinch
 
 Array = NDArray[np.float64]
@@ -161,57 +161,57 @@ def zone(line: Chain, name: str, at: float, length: float | None) -> float:
     return length
 
 
-def pinch(ramps: Ramps, item: Pinch) -> None:
+def pinch(builder: StepBuilder, item: Pinch) -> None:
     """Ask for a pinch, from the angles that the other actuations of its step lead to."""
     names = [item.crease]
     if item.crease == "all":
-        folds, mesh = ramps.mesh.folds, ramps.mesh
+        folds, mesh = builder.mesh.folds, builder.mesh
         names = [name for name in mesh.creases if folds.get(name) != "flat" and is_chain(mesh, name)]
         if not names:
             raise ModelError("pinch of crease 'all': the sheet has no mountain or valley crease")
     for name in names:
-        _pinch_one(ramps, name, item)
+        _pinch_one(builder, name, item)
 
 
-def _pinch_one(ramps: Ramps, name: str, item: Pinch) -> None:
-    hinges, sense, _ = ramps.creases(name)
-    line = chain(ramps.mesh, name)
+def _pinch_one(builder: StepBuilder, name: str, item: Pinch) -> None:
+    hinges, sense, _ = builder.creases(name)
+    line = chain(builder.mesh, name)
     part, ends = parts(line, item.at, zone(line, name, item.at, item.length), item.profile)
-    turned = ramps.mesh.crease_edges(name)
+    turned = builder.mesh.crease_edges(name)
     ends = np.where((turned[:, 0] > turned[:, 1])[:, None], ends[:, ::-1], ends)
     inside = np.flatnonzero(part > 0.0)
     rows, part, ends = hinges[inside], part[inside], ends[inside]
-    now, target = ramps.before[rows], item.target(sense)[inside]
-    _check(ramps, name, item, rows, now, target)
+    now, target = builder.before[rows], item.target(sense)[inside]
+    _check(builder, name, item, rows, now, target)
     nominal = now + part * (target - now)
     wanted = nominal if item.couple is None else part * item.couple
     for row, angle in zip(rows.tolist(), wanted.tolist(), strict=True):
-        known, other = ramps.claimed.setdefault(row, (angle, item.at))
+        known, other = builder.claimed.setdefault(row, (angle, item.at))
         if abs(known - angle) > 1e-9:
             raise ModelError(
                 f"two pinches of crease '{name}' overlap and contradict each other (at {other:g} and "
                 f"{item.at:g}); keep their zones apart, or pinch one after the other"
             )
     if item.couple is not None:
-        ramps.moment[rows] = sense[inside] * wanted
+        builder.moment[rows] = sense[inside] * wanted
         return
     if item.how == "rest":
-        ramps.rest[rows] = nominal
-        ramps.rest_ends[rows] += ends * (target[:, None] - ramps.rest_ends[rows])
+        builder.rest[rows] = nominal
+        builder.rest_ends[rows] += ends * (target[:, None] - builder.rest_ends[rows])
         return
-    ramps.law[rows], ramps.held[rows] = HELD, nominal
-    ramps.pinch.toward[rows], ramps.pinch.part[rows], ramps.pinch.ends[rows] = target, part, ends
-    ramps.pinch.base[rows] = np.where(ramps.folded[rows], now, np.nan)
-    ramps.pinched[rows] = True
+    builder.law[rows], builder.prescribed[rows] = PRESCRIBED, nominal
+    builder.pinch.toward[rows], builder.pinch.part[rows], builder.pinch.ends[rows] = target, part, ends
+    builder.pinch.base[rows] = np.where(builder.folded[rows], now, np.nan)
+    builder.pinched[rows] = True
 
 
-def _check(ramps: Ramps, name: str, item: Pinch, rows: Ints, now: Array, target: Array) -> None:
-    law = ramps.law[rows]
+def _check(builder: StepBuilder, name: str, item: Pinch, rows: Ints, now: Array, target: Array) -> None:
+    law = builder.law[rows]
     if (law == SHEET).any():
         raise ModelError(
             f"pinch of crease '{name}': it is ordinary sheet there; fold it before, or in the same step"
         )
-    if item.how != "imposed" and (law == HELD).any():
+    if item.how != "imposed" and (law == PRESCRIBED).any():
         by = "rest angles" if item.how == "rest" else "couples"
         raise ModelError(
             f"pinch of crease '{name}' by {by}: its angle is imposed there and no spring acts; use how = 'imposed'"

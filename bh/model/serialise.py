@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from bh.errors import PathFileError
 from bh.formulations.observables import Until
-from bh.model.actuations import Actuation, Bar, Displace, Fold, Force, Moment, Pinch, Tether
+from bh.model.actuations import Actuation, Displace, Fold, Force, Indenter, Moment, Pinch, Tether
 from bh.model.model import CreaseLaw, ElementStiffness, Model, Sheet
 from bh.model.plugins import named
-from bh.model.supports import Holding, RigidBody, Support
+from bh.model.supports import Constraint, RigidBody, Support
 from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
@@ -31,7 +31,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 STEP_ITEMS: dict[str, type[Actuation | Until]] = {
     **ACTUATIONS,
-    "bar": Bar,
+    "indenter": Indenter,
     "tether": Tether,
     "until": Until,
 }
@@ -93,7 +93,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
         return Model(
             mesh=mesh,
             sheet=Sheet(**data["sheet"]),
-            supports=tuple(_held(s) for s in data["supports"]),
+            supports=tuple(_constraint(s) for s in data["supports"]),
             steps=tuple(tuple(_untagged(item, STEP_ITEMS) for item in step) for step in data["steps"]),
             creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
             formulation=data["formulation"],
@@ -140,17 +140,17 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
     return named(data["kind"])(**lists)
 
 
-def _support(item: Holding) -> Any:
+def _support(item: Constraint) -> Any:
     if isinstance(item, RigidBody):
         return "rigid-body"
     return _plain(item) if type(item) is Support else _tagged(item, {})
 
 
-def _held(data: Any) -> Holding:
+def _constraint(data: Any) -> Constraint:
     if data == "rigid-body":
         return RigidBody()
-    held: Holding = _untagged(data, {}) if "kind" in data else Support(**data)
-    return held
+    found: Constraint = _untagged(data, {}) if "kind" in data else Support(**data)
+    return found
 
 
 def _jsonable(value: Any) -> Any:

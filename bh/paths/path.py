@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from bh.formulations.observables import until_of
 from bh.formulations.registry import Formulation, formulation
 from bh.formulations.state import State
-from bh.loading.load_step import Ended, StepProgram, open_ends
-from bh.loading.program import program
+from bh.loading.builder import load_steps
+from bh.loading.load_step import LoadStep, StepEnd, open_ends
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
 from bh.paths.provenance import provenance_of
@@ -86,12 +86,12 @@ class Path:
         self.steps: list[StepOutcome] = []
         self.accuracy: Accuracy | None = None
         self._formulation: Formulation = formulation(model.formulation)
-        self._programs: tuple[StepProgram, ...] = program(model)
+        self._load_steps: tuple[LoadStep, ...] = load_steps(model)
         self._halves = None
         if symmetry is not None:
             from bh.formulations.symmetry_reduction import Halves
 
-            self._halves = Halves(self._formulation, model, self._programs, symmetry)
+            self._halves = Halves(self._formulation, model, self._load_steps, symmetry)
         self._systems: dict[int, Any] = {}
         self._states: dict[int, State] = {}
 
@@ -138,7 +138,7 @@ class Path:
         if arc:
             found.append(f"{count(len(arc), 'state')} found by arc length")
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
-        ends = [line for step in self._programs for line in open_ends(self.model.mesh, step)]
+        ends = [line for step in self._load_steps for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
         if self.accuracy is not None and not self.accuracy.met:
             found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
@@ -255,9 +255,9 @@ class Path:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
             if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
-                self._programs = program(self.model, self._ended(step))
+                self._load_steps = load_steps(self.model, self._ended(step))
             self._systems[step] = self._formulation.system(
-                self.model, self._programs[step], self._start(step)
+                self.model, self._load_steps[step], self._start(step)
             )
         return self._systems[step]
 
@@ -272,14 +272,14 @@ class Path:
         last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
         return None if last is None else self[last]
 
-    def _ended(self, before: int) -> dict[int, Ended]:
+    def _ended(self, before: int) -> dict[int, StepEnd]:
         """Steps before `before` that ended early, by an `Until`."""
         last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
         found = {}
         for step, index in last.items():
             if until_of(self.model.steps[step]) is not None and self.records[index].lam < 1.0:
                 state = self[index]
-                found[step] = Ended(state.lam, state.points, state.dihedral_angles)
+                found[step] = StepEnd(state.lam, state.points, state.dihedral_angles)
         return found
 
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations.registry import formulation, names
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane
 from bh.model.model import Model
 from bh.model.refinement import Goal, Refinement, mesh_at, pattern_of, with_mesh
@@ -228,7 +228,7 @@ def _check(model: Model, goal: Goal) -> None:
                 f"accuracy at '{goal.at}' names a node of one mesh; name a corner, an edge or a crease"
             )
         model.mesh.nodes(goal.at)
-    if goal.of == "tip" and any(step.constraints.rigid_body for step in program(model)):
+    if goal.of == "tip" and any(step.constraints.rigid_body for step in load_steps(model)):
         raise ModelError(
             "a sheet that is free to move has no tip displacement of its own; hold it, or ask for the energy"
         )

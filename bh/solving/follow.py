@@ -40,8 +40,8 @@ def trace(
     """Follow the equilibrium of `model` through all its steps.
 
     Args:
-        symmetry: "x", "y" or a normal [x, y, 0]: solve one half of a mirror-symmetric model (`bh.loading.symmetry`). States are
-            of the whole sheet; what leaves the symmetry is only looked for in the last state (`path.stable`).
+        symmetry: "x", "y" or a normal [x, y, 0]: solve one half of a mirror-symmetric model (`bh.loading.symmetry`).
+            States are of the whole sheet; what leaves the symmetry is only looked for in the last state (`path.stable`).
         progress: True for a bar in the terminal, or an object that is told about every increment.
         strategy: how increments are chosen; the default suits all scenes.
         file: write every accepted state to this file before the next increment begins.

@@ -14,8 +14,8 @@ import bh
 import meshes
 from bh import Fold, Force, Model, Sheet, trace
 from bh.formulations.registry import formulation
+from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges, hinge_name
-from bh.loading.program import program
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.shared.hinge_lock import ZONE, lock_terms, until_closed
@@ -118,7 +118,7 @@ def mirrored(model: Model) -> Model:
 
 
 def first_system(model: Model) -> BarsAndHingesSystem:
-    return formulation(model.formulation).system(model, program(model)[0], None)  # type: ignore[no-any-return]
+    return formulation(model.formulation).system(model, load_steps(model)[0], None)  # type: ignore[no-any-return]
 
 
 def bent_to(model: Model, angle: float) -> tuple[BarsAndHingesSystem, Array]:
@@ -178,9 +178,9 @@ def test_stiffness_of_the_locks() -> None:
     assert e.lock == pytest.approx(e.hinge_stiffness, rel=1e-14)
     assert not first_system(replace(model, hinge_lock=False)).elements.lock.any()
     e = first_system(Model(mesh, SHEET).fold("crease", to=2.0)).elements
-    assert e.held > 0
-    assert not e.lock[-e.held :].any()
-    assert e.lock[: -e.held].all()
+    assert e.prescribed > 0
+    assert not e.lock[-e.prescribed :].any()
+    assert e.lock[: -e.prescribed].all()
 
 
 def test_stiffness_of_the_locks_where_stiffness_is_given() -> None:
@@ -318,7 +318,7 @@ def test_nothing_changes_where_no_hinge_is_near() -> None:
         Model(mesh, SHEET).fold("crease", rest=1.2, Lstar=2.0),
         Model(mesh, SHEET).fold(
             "crease", to=math.radians(1.0)
-        ),  # a held crease may go where the lock would be
+        ),  # a prescribed crease may go where the lock would be
     ):
         on, off = trace(model), trace(replace(model, hinge_lock=False))
         assert on.outcome == "reached"

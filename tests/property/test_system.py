@@ -15,7 +15,7 @@ import bh
 import meshes
 from bh import Displace, Fold, Force, Model, Moment, Sheet, trace
 from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.shared import sparsity as patterns
 from bh.model.model import ElementStiffness
@@ -72,7 +72,7 @@ def kinds() -> dict[str, Model]:
     )
     return {
         "free, spring crease": Model(mesh, SHEET).fold("crease", rest=2.3, Lstar=8.0),
-        "free, held crease": Model(mesh, SHEET).fold("crease", to=2.3),
+        "free, prescribed crease": Model(mesh, SHEET).fold("crease", to=2.3),
         "free, moment": Model(mesh, SHEET).crease("crease", stiffness=0.4).moment("crease", 0.2),
         "free, forces": Model(mesh, SHEET).step(Fold("crease", to=2.6), *balanced(mesh, 0.01)),
         "free, all z held": Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
@@ -80,12 +80,12 @@ def kinds() -> dict[str, Model]:
         "point and rigid body": Model(mesh, SHEET).support("corner:outer-end", "xyz").support("rigid-body")
         .fold("crease", to=2.5),
         "supported, spring crease": clamped(mesh).fold("crease", rest=2.3, Lstar=8.0),
-        "supported, held crease": clamped(mesh).fold("crease", to=3.9),
+        "supported, prescribed crease": clamped(mesh).fold("crease", to=3.9),
         "supported, no fold": clamped(mesh).force("edge:end", total=(0.0, 0.02, 0.05)),
         "oblique, spring crease": oblique.fold("crease", rest=2.3, Lstar=8.0),
-        "oblique, held crease": oblique.fold("crease", to=2.3),
+        "oblique, prescribed crease": oblique.fold("crease", to=2.3),
         "displaced": clamped(mesh).displace("corner:outer-end", "z", 0.4),
-        "displaced obliquely, held crease": clamped(mesh)
+        "displaced obliquely, prescribed crease": clamped(mesh)
         .step(Fold("crease", to=2.8), Displace("corner:outer-end", DIAGONAL, 0.3)),
         "everything": held_at_corners(pair).step(
             Fold("crease-1", rest=2.5, Lstar=5.0), Fold("crease-2", to=3.6), Force("edge:end", each=(0.0, 0.001, 0.002))
@@ -104,8 +104,14 @@ def kinds() -> dict[str, Model]:
 
 
 KINDS = kinds()
-HELD = [name for name in KINDS if "held" in name or "everything" in name]
-FREE = ["free, spring crease", "free, held crease", "free, moment", "free, forces", "2 rows, alternating"]
+PRESCRIBED = [name for name in KINDS if "prescribed" in name or "everything" in name]
+FREE = [
+    "free, spring crease",
+    "free, prescribed crease",
+    "free, moment",
+    "free, forces",
+    "2 rows, alternating",
+]
 
 
 @cache
@@ -234,7 +240,7 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     responses = []
     for banded in (True, False):
         force_storage(monkeypatch, banded)
-        system = formulation(model.formulation).system(model, program(model)[0], None)
+        system = formulation(model.formulation).system(model, load_steps(model)[0], None)
         q = one.records[0].q
         A = system.tangent(q, 0.0, system.evaluate(q, 0.0).forces).matrix
         b = np.random.default_rng(0).normal(size=system.size)
@@ -252,7 +258,7 @@ def test_order_is_a_permutation(banded: bool, monkeypatch: pytest.MonkeyPatch) -
     """A scrambled numbering gives the same matrix in the user's order, whatever the order inside."""
     force_storage(monkeypatch, banded)
     system, q, lam = systems("supported, spring crease")[0]
-    system = BarsAndHingesSystem(KINDS["supported, spring crease"], system.program, None)
+    system = BarsAndHingesSystem(KINDS["supported, spring crease"], system.load_step, None)
     order = system._pattern.order
     assert np.array_equal(np.sort(order), np.arange(system.primal))
     assert not np.array_equal(order, np.arange(system.primal))
@@ -312,7 +318,7 @@ def test_unbalanced_part_of_a_load_is_left_out() -> None:
 # --------------------------------------------------------------------------------------- multipliers
 
 
-@pytest.mark.parametrize("name", HELD)
+@pytest.mark.parametrize("name", PRESCRIBED)
 def test_multipliers_solve_the_saddle(name: str) -> None:
     """Against a dense solve of [[K + gamma G^T G, G^T], [G, 0]]: constraints met, first row exact."""
     for system, q, lam in systems(name):
@@ -337,7 +343,7 @@ def test_multipliers_solve_the_saddle(name: str) -> None:
         assert np.abs(x[n:] - expected[n:]).max() <= 1e-3 * np.abs(expected[n:]).max()
 
 
-@pytest.mark.parametrize("name", HELD)
+@pytest.mark.parametrize("name", PRESCRIBED)
 def test_linear_response_is_exact_enough(name: str) -> None:
     """One solve that nobody corrects: against a dense solve, at the flat sheet and where the step ends."""
     path = solved(name)
@@ -357,9 +363,9 @@ def test_linear_response_is_exact_enough(name: str) -> None:
 
 @pytest.mark.parametrize("force", [(0.0, 0.0, 1e-4), (1.0, 0.0, 0.0)])
 def test_multipliers_without_a_gap(force: tuple[float, float, float]) -> None:
-    """A held crease that does not move: the iteration on the multipliers must come to an end."""
+    """A prescribed crease that does not move: the iteration on the multipliers must come to an end."""
     model = clamped(sector()).step(Fold("crease", to=math.pi), Force("corner:outer-end", each=force))
-    system = formulation(model.formulation).system(model, program(model)[0], None)
+    system = formulation(model.formulation).system(model, load_steps(model)[0], None)
     q = system.start()
     A = dense(system.tangent(q, 0.0, system.evaluate(q, 0.0).forces).matrix, system.size)
     rate = system.control_rate(q, 0.0)

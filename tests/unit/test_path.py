@@ -162,7 +162,7 @@ def test_steps_begin_where_the_last_one_ended() -> None:
 
 
 def test_spring_that_becomes_a_held_crease() -> None:
-    """The held crease begins at the angle and the moment that the spring had: still in balance."""
+    """The prescribed crease begins at the angle and the moment that the spring had: still in balance."""
     path = reached(FREE.fold("crease", rest=1.5, Lstar=20.0).fold("crease", to=2.0))
     system = path._system(1)
     first = system.evaluate(system.start(), 0.0)

@@ -10,7 +10,7 @@ import pytest
 
 import bh
 from bh.errors import SceneError
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.model.actuations import Displace, Fold, Force, Moment
 from bh.model.model import CreaseLaw
 from bh.model.serialise import ACTUATIONS as KINDS
@@ -232,7 +232,7 @@ def test_angles_an_edge_and_drawn(tmp_path):
         steps='[[steps]]\nfold = { crease = "all", by = "drawn" }\n',
         folder=tmp_path,
     )
-    assert program(drawn.model)[0].held.end.tolist() == pytest.approx([1.25 * math.pi])
+    assert load_steps(drawn.model)[0].prescribed.end.tolist() == pytest.approx([1.25 * math.pi])
 
 
 def test_outputs():

@@ -13,7 +13,7 @@ import pytest
 import bh
 import meshes
 from bh.errors import InputError, ModelError
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.model.actuations import Displace, Fold, Moment
 from bh.model.model import Model, Sheet
 from bh.paths.path import Path
@@ -115,7 +115,7 @@ def test_free_hinge_carries_no_moment() -> None:
 
 
 def test_released_crease_stays_until_its_spring_is_turned() -> None:
-    """A held crease that becomes a spring begins in equilibrium."""
+    """A prescribed crease that becomes a spring begins in equilibrium."""
     model = sheet().fold("crease", by=0.8).fold("crease", rest=math.pi - 0.8, stiffness=0.02)
     path = solve(model)
     begin = [s for s in path if s.step == 0][-1]
@@ -219,7 +219,7 @@ def test_states_of_bars_cannot_begin_a_step_of_the_shell() -> None:
     bars = solve(Model(SECTOR, MYLAR).fold("crease", by=0.1))[-1]
     model = sheet().fold("crease", by=0.2)
     with pytest.raises(ModelError, match="begins at a state of the shell"):
-        Shell().system(model, program(model)[0], bars)
+        Shell().system(model, load_steps(model)[0], bars)
 
 
 def test_a_free_hinge_is_named() -> None:

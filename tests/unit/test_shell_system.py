@@ -10,7 +10,7 @@ import pytest
 
 import bh
 import meshes
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.model.model import Model, Sheet
 from fem import system as system_module
 from fem.assembly import build_pattern
@@ -37,7 +37,7 @@ def distorted(mesh: SheetMesh, amount: float = 0.25) -> SheetMesh:
 
 
 def system_of(model: Model, shell: type[Shell] = Shell) -> ShellSystem:
-    return shell().system(model, program(model)[0], None)
+    return shell().system(model, load_steps(model)[0], None)
 
 
 def held() -> Model:

@@ -105,7 +105,7 @@ def test_answers_and_inertia(tangents: dict[str, SparseMatrix], state: str, back
 
 
 def test_paths_agree_with_those_of_the_band(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Energies of a folded sheet to 1e-10, held crease and spring crease, whoever factorises."""
+    """Energies of a folded sheet to 1e-10, prescribed crease and spring crease, whoever factorises."""
     for model in (
         sheet("staggered", 12, 3).fold("crease", to=2.2),
         sheet("alternating", 12, 3).fold("crease", rest=2.0, Lstar=25.0),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from bh.applications.corrugation.folded import moved_to
 from bh.errors import ModelError
 from bh.formulations.observables import crease_nodes, depth_of
-from bh.model.actuations import Bar, Displace, Tether
+from bh.model.actuations import Displace, Indenter, Tether
 from bh.paths.path import Path
 from bh.solvers.continuation import LoadControl
 from bh.solving.follow import trace
@@ -39,7 +39,7 @@ class Rig:
         span: between the inner edges of the supports, mm; bar: its width, mm; travel: of the bar, mm.
         tape: 0 is a sheet that lies free, without friction. Else valley creases over the supports are first pulled down
             onto them and stay there, held along x and y by this stiffness, N/mm in all (double-sided tape, 4.5.1).
-        gap, stiffness: of the contact (`bh.model.actuations.Bar`).
+        gap, stiffness: of the contact (`bh.model.actuations.Indenter`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
         largest: displacement between two states, mm.
         offset: of the sheet's middle from the bar, along the span, mm.
@@ -110,8 +110,8 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     half = 0.5 * rig.span + 0.5 * SUPPORT
     depth = 5.0 + rig.gap
 
-    def bar(name: str, s: float, z: float, width: float, fall: float = 0.0, tilt: float = 0.0) -> Bar:
-        return Bar(
+    def bar(name: str, s: float, z: float, width: float, fall: float = 0.0, tilt: float = 0.0) -> Indenter:
+        return Indenter(
             name, place(s, z), azimuth, width, 10.0, ROUND, (0.0, 0.0, -fall), tilt, rig.stiffness, rig.gap
         )
 
@@ -119,7 +119,7 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
         x, y, z = (s * across + [0.0, 0.0, z]).tolist()
         return x, y, z
 
-    items: list[Bar | Tether] = [
+    items: list[Indenter | Tether] = [
         bar("left", -half, -depth, SUPPORT),
         bar("right", half, -depth, SUPPORT),
         Tether("all", (CRADLE, CRADLE, CRADLE)),
@@ -152,7 +152,7 @@ def _evaluate(path: Path, azimuth: float, rig: Rig) -> BendingTest:
     step = len(path.model.steps) - 1
     states = [i for i, record in enumerate(path.records) if record.step == step]
     moved_by = np.array([0.0, *(rig.travel * path.records[i].lam for i in states)])
-    load = np.array([0.0, *(-float(path[i].pressing["bar"][2]) for i in states)])
+    load = np.array([0.0, *(-float(path[i].contact_forces["bar"][2]) for i in states)])
     touched = int(np.argmax(load >= TRIGGER)) if (load >= TRIGGER).any() else len(load) - 1
     if touched > 0:  # where the load passes the trigger
         part = (TRIGGER - load[touched - 1]) / max(load[touched] - load[touched - 1], 1e-300)

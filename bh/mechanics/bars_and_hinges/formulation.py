@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.formulations.state import Energy, State
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles
@@ -30,15 +30,15 @@ class BarsAndHinges:
 
     name = "bars-and-hinges"
 
-    def system(self, model: Model, program: StepProgram, start: State | None) -> BarsAndHingesSystem:
+    def system(self, model: Model, load_step: LoadStep, start: State | None) -> BarsAndHingesSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
-        return BarsAndHingesSystem(model, program, start)
+        return BarsAndHingesSystem(model, load_step, start)
 
     def half(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror
+        self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror
     ) -> BarsAndHingesSystem:
         """The system of the kept half of a symmetric sheet; `start` is a state of the whole."""
-        return BarsAndHingesSystem(model, program, start, plane)
+        return BarsAndHingesSystem(model, load_step, start, plane)
 
     def whole(
         self, whole: BarsAndHingesSystem, half: BarsAndHingesSystem, plane: Mirror, q: Array, lam: float
@@ -46,12 +46,12 @@ class BarsAndHinges:
         """Unknowns of the whole sheet from those of its half."""
         out = np.empty(whole.size)
         out[: whole.primal] = whole.displacements.unknowns(half.positions(q, lam))
-        if whole.elements.held:
+        if whole.elements.prescribed:
             at = np.full(len(plane.hinge), np.nan)
-            kept = half.elements.source[-half.elements.held :]
+            kept = half.elements.source[-half.elements.prescribed :]
             at[kept] = q[half.primal :] / plane.hinge_weight[kept]
             at = np.where(np.isnan(at), at[plane.hinge], at)
-            out[whole.primal :] = at[whole.elements.source[-whole.elements.held :]]
+            out[whole.primal :] = at[whole.elements.source[-whole.elements.prescribed :]]
         return out
 
     def part(
@@ -60,10 +60,10 @@ class BarsAndHinges:
         """Unknowns of the half from those of the whole sheet."""
         out = np.empty(half.size)
         out[: half.primal] = half.displacements.unknowns(whole.positions(q, lam))
-        if half.elements.held:
+        if half.elements.prescribed:
             at = np.zeros(len(plane.hinge))
-            at[whole.elements.source[-whole.elements.held :]] = q[whole.primal :]
-            kept = half.elements.source[-half.elements.held :]
+            at[whole.elements.source[-whole.elements.prescribed :]] = q[whole.primal :]
+            kept = half.elements.source[-half.elements.prescribed :]
             out[half.primal :] = plane.hinge_weight[kept] * at[kept]
         return out
 
@@ -107,7 +107,7 @@ class BarsAndHinges:
             ),
             dihedral_angles=angles, energy_density=density, reactions=reactions,
             crease_moments=moments, stable=stable,
-            pressing={} if system.touching is None else system.touching.pressing(x, lam),
+            contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
         )  # fmt: skip
 
 

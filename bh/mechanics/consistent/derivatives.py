@@ -46,8 +46,8 @@ class ConsistentDesign:
     def data(self) -> Data:
         """What the residual is made of. `places` (n, 3) are positions along supports, the rest element data.
 
-        `held` (m,) are imposed angles: of the residual they are part of `rest`, but states show them. `ghost` is where
-        the sheet would go on beyond clamped edges.
+        `prescribed` (m,) are imposed angles: of the residual they are part of `rest`, but states show them. `ghost` is
+        where the sheet would go on beyond clamped edges.
         """
         e, lam = self.system.elements, self.lam
         return {
@@ -60,7 +60,7 @@ class ConsistentDesign:
             "spring_stiffness": e.spring_stiffness,
             "spring_rest": e.spring_rest.at(lam),
             "couple": e.couple.at(lam),
-            "held": np.nan_to_num(e.held.at(lam)),
+            "prescribed": np.nan_to_num(e.prescribed.at(lam)),
             "lock": e.lock,
             "load": self.system.force.at(lam),
         }
@@ -88,19 +88,19 @@ class ConsistentDesign:
     def angle_gradient(self, hinges: Ints, weights: Array) -> tuple[Array, Array, Data]:
         """Gradient of the weighted sum of `State.dihedral_angles` of some hinges of the mesh; and to the data."""
         e = self.system.elements
-        free = np.isnan(e.held.end[hinges])
-        held = np.zeros(len(e.held.end))
-        held[hinges[~free]] = weights[~free]
+        free = np.isnan(e.prescribed.end[hinges])
+        prescribed = np.zeros(len(e.prescribed.end))
+        prescribed[hinges[~free]] = weights[~free]
         quads = self.system.hinges[hinges[free]]
         f, r = np.zeros_like(self.x), np.zeros(e.rotations)
         g = dihedral_gradients(self.x, quads).reshape(-1, 4, 3)
         np.add.at(f, quads, weights[free][:, None, None] * g)
-        row = np.full(len(held), -1)
+        row = np.full(len(prescribed), -1)
         row[e.springs] = np.arange(len(e.springs))
         of_spring = row[hinges] >= 0
         for side in range(2):
             np.add.at(r, e.turns[row[hinges[of_spring]], side], -weights[of_spring])
-        return f, r, {"held": held}
+        return f, r, {"prescribed": prescribed}
 
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the rotations, along v (n, 3) and w."""
@@ -136,10 +136,10 @@ class ConsistentDesign:
     def imposed(self, by_data: Data) -> Array:
         """(m,) derivatives to the imposed angles of hinges of the mesh, of derivatives to the data; zero elsewhere."""
         e = self.system.elements
-        out = np.array(by_data.get("held", np.zeros(len(e.held.end))))
+        out = np.array(by_data.get("prescribed", np.zeros(len(e.prescribed.end))))
         here = self.turning & (e.patches.hinge >= 0)
         np.add.at(out, e.patches.hinge[here], by_data["rest"][here])
-        return np.where(np.isnan(e.held.end), 0.0, out)
+        return np.where(np.isnan(e.prescribed.end), 0.0, out)
 
     # ------------------------------------------------------------------------------- derivatives to data
 

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from bh.formulations.state import State
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.mechanics.consistent import kernels, setup
 from bh.mechanics.consistent.elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent.sparsity import rotation_pattern
@@ -65,13 +65,13 @@ class ConsistentSystem(SupportedSheet):
     """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then edge rotations (rad)."""
 
     def __init__(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+        self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
     ) -> None:
-        of_half = program
+        of_half = load_step
         if plane is not None:
-            from bh.mechanics.shared.mirrored import half_program
+            from bh.mechanics.shared.mirrored import half_load_step
 
-            of_half = half_program(program, plane)
+            of_half = half_load_step(load_step, plane)
         super().__init__(model, of_half, start, plane)
         mesh = self.mesh
         self.hinges = hinges = mesh.topology.hinges
@@ -81,14 +81,14 @@ class ConsistentSystem(SupportedSheet):
         moments = np.zeros(len(hinges)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         # a released crease begins with the moment that it has; what its lock takes of it is not the spring's
-        moments -= lock_terms(dihedral_angles(start_points, hinges), lock_stiffness(model, program))[:, 1]
+        moments -= lock_terms(dihedral_angles(start_points, hinges), lock_stiffness(model, load_step))[:, 1]
         # a crease that was ordinary sheet up to here is smooth, whatever its triangles do
         angles = (
             reference
             if start is None
             else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
         )
-        self.elements = consistent_elements(model, program, angles, moments, plane)
+        self.elements = consistent_elements(model, load_step, angles, moments, plane)
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
@@ -176,7 +176,7 @@ class ConsistentSystem(SupportedSheet):
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
-        touched = 0.0 if self.touching is None else self.touching.forces(x, lam, now.f)
+        touched = 0.0 if self.rigid_contact is None else self.rigid_contact.forces(x, lam, now.f)
         energy = (
             float(now.stretching.sum())
             + now.bending
@@ -234,8 +234,8 @@ class ConsistentSystem(SupportedSheet):
         closing |= kernels.spring_tangent(
             x, e.hinges, e.spring_stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
         )
-        if self.touching is not None:
-            self.touching.tangent(x, lam, *axes, pattern.slots[0], data)
+        if self.rigid_contact is not None:
+            self.rigid_contact.tangent(x, lam, *axes, pattern.slots[0], data)
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
         matrix: Matrix = pattern.matrix(data)
@@ -322,8 +322,8 @@ class ConsistentSystem(SupportedSheet):
         kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
         if L.any():
             closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
-        if self.touching is not None:
-            self.touching.force_rates(x, v, lam, 1.0, f)
+        if self.rigid_contact is not None:
+            self.rigid_contact.force_rates(x, v, lam, 1.0, f)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         return f, r, second
 
@@ -343,14 +343,18 @@ class ConsistentSystem(SupportedSheet):
         _, M, S, _ = self.split(now.forces)
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
         total -= float(np.vdot(self.force.rate, x - self.mesh.points))
-        if self.touching is not None:
-            total += self.touching.power(x, lam)
-            self.touching.forces(x, lam, now.f)
+        if self.rigid_contact is not None:
+            total += self.rigid_contact.power(x, lam)
+            self.rigid_contact.forces(x, lam, now.f)
         unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
         """d^2 energy / d lambda^2 at fixed q, N mm."""
         v = self.displacements.prescribed_motion
-        more = 0.0 if self.touching is None else self.touching.control_stiffness(self.positions(q, lam), lam)
+        more = (
+            0.0
+            if self.rigid_contact is None
+            else self.rigid_contact.control_stiffness(self.positions(q, lam), lam)
+        )
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more

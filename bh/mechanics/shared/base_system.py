@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.formulations.state import State
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.mechanics.shared import penetration as closing
-from bh.mechanics.shared.contact import Touching
+from bh.mechanics.shared.contact import RigidContact
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.mechanics.shared.motions import describe_motion
-from bh.model.laws import HELD
+from bh.model.laws import PRESCRIBED
 from bh.model.model import Model
 from bh.model.supports import TURNED
 from bh.solvers.system import System, grows_ahead
@@ -34,27 +34,29 @@ class SupportedSheet:
     size: int
 
     def __init__(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+        self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
     ) -> None:
         self.mesh = model.mesh
-        self.program = program
-        self.force = program.force
+        self.load_step = load_step
+        self.force = load_step.force
         start_points = self.mesh.points if start is None else start.points
         if plane is None:
-            self.displacements = Displacements(self.mesh, program.constraints, start_points)
+            self.displacements = Displacements(self.mesh, load_step.constraints, start_points)
         else:
             from bh.mechanics.shared.mirrored import MirroredDisplacements
 
-            self.displacements = MirroredDisplacements(self.mesh, program.constraints, start_points, plane)
+            self.displacements = MirroredDisplacements(self.mesh, load_step.constraints, start_points, plane)
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
         if self.constraints.rigid_body:
             self.displacements.check_balance(self.force)
-        self.touching = Touching(self.mesh, program.bodies, start_points) if program.bodies else None
+        self.rigid_contact = (
+            RigidContact(self.mesh, load_step.bodies, start_points) if load_step.bodies else None
+        )
 
     @property
     def rotation(self) -> float:
-        return self.program.rotation
+        return self.load_step.rotation
 
     def positions(self, q: Array, lam: float) -> Array:
         """(n, 3) node positions, mm."""
@@ -81,9 +83,11 @@ class SupportedSheet:
         return closing.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def contact(self, q: Array, lam: float) -> str:
-        """Which panels have met at a hinge that is not held, or an empty string."""
+        """Which panels have met at a hinge that is not prescribed, or an empty string."""
         reference = dihedral_angles(self.mesh.points, self.mesh.topology.hinges)
-        return closing.touching(self.mesh, self.angles(q, lam), reference, self.program.law != HELD)
+        return closing.panels_in_contact(
+            self.mesh, self.angles(q, lam), reference, self.load_step.law != PRESCRIBED
+        )
 
     def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
         touching = self.contact(q, lam)

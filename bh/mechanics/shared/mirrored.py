@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.loading.symmetry import Mirror
 from bh.mechanics.bars_and_hinges.elements import Elements
 from bh.mechanics.shared.displacements import Displacements
@@ -126,10 +126,10 @@ def _reflected(c: Constraints, plane: Mirror) -> Constraints:
     )
 
 
-def half_program(program: StepProgram, plane: Mirror) -> StepProgram:
+def half_load_step(load_step: LoadStep, plane: Mirror) -> LoadStep:
     """The step with the forces on the half."""
     weight = np.where(plane.side < 0, 1.0, np.where(plane.side == 0, 0.5, 0.0))[:, None]
-    return replace(program, force=Ramp(weight * program.force.start, weight * program.force.end))
+    return replace(load_step, force=Ramp(weight * load_step.force.start, weight * load_step.force.end))
 
 
 def half_elements(e: Elements, plane: Mirror) -> Elements:
@@ -138,7 +138,7 @@ def half_elements(e: Elements, plane: Mirror) -> Elements:
     weight = plane.hinge_weight[e.source]
     keep = weight > 0.0
     w = weight[keep]
-    held = keep[len(e.source) - e.held :]
+    prescribed = keep[len(e.source) - e.prescribed :]
 
     def some(ramp: Ramp, factor: Array | float = 1.0) -> Ramp:
         return Ramp(factor * ramp.start[keep], factor * ramp.end[keep])
@@ -148,6 +148,6 @@ def half_elements(e: Elements, plane: Mirror) -> Elements:
         bar_stiffness=(plane.edge_weight * e.bar_stiffness)[bars], hinges=np.ascontiguousarray(e.hinges[keep]),
         source=e.source[keep], hinge_stiffness=w * e.hinge_stiffness[keep], lock=w * e.lock[keep],
         rest=some(e.rest), couple=some(e.couple, w), bending=int(keep[: e.bending].sum()),
-        spring=int(keep[e.bending : e.bending + e.spring].sum()), held=int(held.sum()),
-        penalty=(weight[len(e.source) - e.held :] * e.penalty)[held],
+        spring=int(keep[e.bending : e.bending + e.spring].sum()), prescribed=int(prescribed.sum()),
+        penalty=(weight[len(e.source) - e.prescribed :] * e.penalty)[prescribed],
     )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 import meshes
 from bh import Model, Sheet, State, trace
 from bh.formulations.registry import formulation as registered
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Point, extrapolate, point
@@ -136,7 +136,7 @@ def load(model: Model, most: float) -> Solved:
 def _load(model: Model, most: float) -> Solved:
     began = time.perf_counter()
     solver = registered(model.formulation)
-    system = solver.system(model, program(model)[0], None)
+    system = solver.system(model, load_steps(model)[0], None)
 
     def mean_fold(at: Point) -> float:
         return float(solver.observe(model, system, at.q, at.lam).fold_angle("crease").mean())

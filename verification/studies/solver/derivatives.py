@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import meshes
 from bh import LoadControl, Model, Newton, Sheet, trace
 from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.mechanics.shared import kinematics
 from verification.framework.checks import CaseResult, Check, Context
 
@@ -98,7 +98,7 @@ def system_errors(seed: int = 5) -> dict[str, float]:
     rng = np.random.default_rng(seed)
     worst: dict[str, float] = {}
     start = None
-    for step, item in enumerate(program(model)):
+    for step, item in enumerate(load_steps(model)):
         system = formulation(model.formulation).system(model, item, start)
         q = system.start() + np.concatenate(
             (0.05 * rng.normal(size=system.primal), 0.1 * rng.normal(size=system.size - system.primal))

@@ -10,7 +10,7 @@ import numpy as np
 import meshes
 from bh import ArcLength, Model, Sheet
 from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.solvers.arc_length import Cylindrical, Generalised
 from bh.solvers.increments import point
 from bh.solvers.linear import linear_response
@@ -61,7 +61,7 @@ def euler_buckling(result: CaseResult) -> Found:
         squeeze = 3.0 * exact * length / (E * width * t)
         model = model.displace("edge:end", "x", -squeeze)
         form = formulation(model.formulation)
-        system = form.system(model, program(model)[0], None)
+        system = form.system(model, load_steps(model)[0], None)
         in_plane = linear_response(system, system.start()).dq  # the strip stays flat, and strains are 1e-4
         low, high, force = 0.0, 1.0, math.nan
         for _ in range(30):
