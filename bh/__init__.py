@@ -13,6 +13,7 @@ from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
 if TYPE_CHECKING:
     from bh.errors import InputError, ModelError, PathFileError, SceneError
     from bh.formulations.observables import Until, depth
+    from bh.formulations.registry import remarks
     from bh.formulations.state import Energy, State
     from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pinch, Tether
     from bh.model.model import CreaseLaw, Model, Sheet
@@ -38,7 +39,7 @@ _HOME = {
     "Path": "bh.paths.path", "PathFileError": "bh.errors", "Pinch": "bh.model.actuations",
     "RigidBody": "bh.model.supports", "SceneError": "bh.errors",
     "Sheet": "bh.model.model", "State": "bh.formulations.state", "Until": "bh.formulations.observables", "depth": "bh.formulations.observables",
-    "Support": "bh.model.supports", "load_scene": "bh.scene.load", "trace": "bh.solving.follow",
+    "Support": "bh.model.supports", "load_scene": "bh.scene.load", "remarks": "bh.formulations.registry", "trace": "bh.solving.follow",
 }  # fmt: skip
 
 _SUBMODULES = {
@@ -82,6 +83,7 @@ __all__ = [
     "Until",
     "depth",
     "load_scene",
+    "remarks",
     "trace",
 ]  # fmt: skip
 

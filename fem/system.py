@@ -21,9 +21,9 @@ from fem.components import lay_out
 from fem.connectors import connectors
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
-from fem.observables import ShellState
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
 from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, unit
+from fem.state import ShellState
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]

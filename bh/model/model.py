@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +18,6 @@ from bh.model.supports import Constraint, RigidBody, Support
 from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
-
-if TYPE_CHECKING:
-    from bh.formulations.remarks import Remark
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,13 +201,6 @@ class Model:
             if letters:
                 model = model.support([node], letters)
         return model
-
-    @property
-    def remarks(self) -> tuple[Remark, ...]:
-        """What the mesh does to the answer with this formulation; empty where there is nothing to say."""
-        from bh.formulations.remarks import remarks
-
-        return remarks(self)
 
     def support(
         self,

@@ -13,7 +13,7 @@ import bh
 import meshes
 from bh.errors import InputError
 from bh.model.model import Model, Sheet
-from fem.observables import ShellState
+from fem.state import ShellState
 
 MYLAR = Sheet(E=4000.0, nu=0.38, t=0.127)
 PATTERN = meshes.annulus_sector(100.0, 10.0, math.pi / 4)

@@ -99,7 +99,7 @@ class BarsAndHingesSystem(SupportedSheet):
     @cached_property
     def hinge_lengths(self) -> Array:
         ends = self.reference[self.elements.hinges[:, 1:3]]
-        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     # ------------------------------------------------------------------------------- the System protocol
 

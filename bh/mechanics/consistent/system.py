@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,6 +29,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ROUNDING = 8.0 * np.finfo(float).eps
+
+
+class Solver(Protocol):
+    """A factorised matrix."""
+
+    def solve(self, b: Array) -> Array:
+        """x with A x = b, both (n,)."""
+        ...
 
 
 class ElementForces(NamedTuple):
@@ -114,8 +122,9 @@ class ConsistentSystem(SupportedSheet):
         return np.asarray(-self._rotation_factor.solve(r)) if np.abs(r).max(initial=0.0) > 0.0 else r
 
     @cached_property
-    def _rotation_factor(self) -> Any:
-        return sp.linalg.splu(self.rotation_stiffness())
+    def _rotation_factor(self) -> Solver:
+        factor: Solver = sp.linalg.splu(self.rotation_stiffness())
+        return factor
 
     def rotation_stiffness(self) -> sp.csc_matrix:
         """Hessian of the energy in the rotations alone, which does not depend on anything."""
