@@ -13,8 +13,9 @@ from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
     from bh.errors import InputError, ModelError, PathFileError, SceneError
-    from bh.formulations.registry import Formulation
-    from bh.formulations.remarks import Remark, remarks
+    from bh.formulations.protocols import Formulation, SheetSystem
+    from bh.formulations.registry import remarks
+    from bh.formulations.remarks import Remark
     from bh.formulations.state import Energy, State
     from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
     from bh.model.model import Model
@@ -37,8 +38,9 @@ if TYPE_CHECKING:
 # where a name is; `tests/test_architecture.py` holds it against the imports above
 _NAMES = {
     "bh.errors": "InputError ModelError PathFileError SceneError",
-    "bh.formulations.registry": "Formulation",
-    "bh.formulations.remarks": "Remark remarks",
+    "bh.formulations.protocols": "Formulation SheetSystem",
+    "bh.formulations.registry": "remarks",
+    "bh.formulations.remarks": "Remark",
     "bh.formulations.state": "Energy State",
     "bh.model.actuations": "Displace Fold Force Indenter Moment Tether",
     "bh.model.model": "Model",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.formulations.remarks import Remark
 from bh.formulations.state import State
 from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep
@@ -20,8 +21,9 @@ from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
 from bh.solvers.trace import Strategy, Walk, walk
 from fem.loads import EdgeMoments
-from fem.observables import ShellState, observe
+from fem.observables import observe
 from fem.shell import ShellElements, shell_elements
+from fem.state import ShellState
 from fem.system import ShellSystem
 from meshes import SheetMesh
 from meshes.curved import LinearMesh, lift
@@ -53,6 +55,10 @@ class Shell:
                 f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
             )
         return ShellSystem(model, load_step, start, _elements(model.mesh, model.sheet, self.degree), moments)
+
+    def remarks(self, model: Model) -> tuple[Remark, ...]:
+        """None: the shell asks nothing of the pattern of its mesh."""
+        return ()
 
     def observe(
         self,

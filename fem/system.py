@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,16 @@ from bh.model.model import Model
 from bh.model.ramp import Ramp
 from bh.model.supports import TURNED, UNBALANCED
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
-from bh.solvers.system import Evaluation, grows_ahead
+from bh.solvers.system import Evaluation, Tangent, grows_ahead
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
 from fem.connectors import connectors
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
-from fem.observables import ShellState
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
 from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, unit
+from fem.state import ShellState
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -243,8 +243,12 @@ class ShellSystem:
     def element_tangents(self, here: Here, forces: Array) -> Array:
         return self.elements.tangent(here.x, forces.reshape(here.forces.shape), here.B, self.frames)
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         here = self.at(q, lam)
+        return Tangent(self._matrix(here, forces), partial(self._predicted_forces, here.B))
+
+    def _matrix(self, here: Here, forces: Array) -> Matrix:
         K = self.element_tangents(here, forces)
         if (self.constraints.frame_of >= 0).any():
             turn_blocks(K, self.mesh.triangles, self.constraints.frame_of, self.constraints.frames)
@@ -261,11 +265,11 @@ class ShellSystem:
         ground = self._ground(Z, data)
         return FreeBodyMatrix(pattern.matrix(data), Z, *ground)
 
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
-        assert self._here is not None  # the tangent was made there
+    def _predicted_forces(self, B: Array, forces: Array, dq: Array) -> Array:
+        """Element forces after an increment dq (size,) from where measures had the derivatives B, linear in dq."""
         change = np.zeros(len(self.components.number))
         change[self.components.free] = dq
-        measure = np.einsum("tkj,tj->tk", self._here.B, self.components.gather(change))
+        measure = np.einsum("tkj,tj->tk", B, self.components.gather(change))
         return forces + self.elements.forces(*np.hsplit(measure, 2)).ravel()
 
     def control_rate(self, q: Array, lam: float) -> Array:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from bh.analysis.sensitivities import (
     OFFSETS,
     STEP,
-    Data,
     Observable,
     Situation,
     data_of,
@@ -24,6 +23,7 @@ from bh.analysis.sensitivities import (
     differences,
 )
 from bh.errors import ModelError
+from bh.formulations.protocols import Data
 from bh.loading.builder import load_steps
 from bh.paths.path import Path
 from bh.runtime.threads import one_blas_thread
@@ -65,7 +65,7 @@ def of_nodes(path: Path, observables: Sequence[Observable], index: int = -1) -> 
             raise ModelError("a pinched zone depends on all nodes of its crease; take bh.sensitivities.of")
         slopes = [(observable.value(at), observable.slope(at)) for observable in observables]
         weights = [derivatives_to_data(at, slope, value) for value, slope in slopes]
-        support = at.design.support()
+        support = at.derivatives.support()
         colour = colours(mesh.topology.hinges, mesh.triangles, len(mesh.points))
         ends = mesh.points[mesh.topology.edges]
         h = STEP * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
@@ -85,7 +85,7 @@ def _rates(at: Situation, moving: NDArray[np.bool_], axis: int, h: float) -> Dat
         points = at.model.mesh.points.copy()
         points[moving, axis] += offset * h
         around.append(data_of(at, replace(at.model, mesh=replace(at.model.mesh, points=points))))
-    return differences(around, h)[0]
+    return differences(around, h, at.derivatives.unfollowed)[0]
 
 
 def _add(out: Array, weight: Data, rates: Data, support: dict[str, Ints], moving: NDArray[np.bool_]) -> None:

@@ -8,8 +8,8 @@ supports), the design p behind them and an observable J, the adjoint a of the fa
 one solve for each observable and any number of design parameters. Here q are the places of the free nodes, with the
 edge rotations or moments that go with them: they stay while the stress-free sheet changes under them.
 
-K, a and both partial derivatives are exact (`bh.mechanics.bars_and_hinges.derivatives`, `consistent_design`). dd/dp comes from the
-function that makes the model: central differences of sixth order of the element data. No solution and no residual is
+K, a and both partial derivatives are exact (`bh.formulations.protocols.Derivatives`). dd/dp comes from the function that
+makes the model: central differences of sixth order of the element data. No solution and no residual is
 differenced, only smooth closed formulas such as a length or E t^3 L^2 / (6 A). Their error is measured as the distance
 to differences of fourth order and reported (`Sensitivity.error`). Of a stiffness the derivative of K along the sheet's
 response is differenced as well. Where a pinch goes on from angles that the step before came to, the adjoint of that
@@ -18,7 +18,7 @@ step's end follows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
-from bh.formulations.registry import formulation
+from bh.formulations.protocols import Data, Derivatives, Differentiable, SheetSystem
+from bh.formulations.registry import able, formulation
 from bh.formulations.state import State
 from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges
@@ -36,11 +37,10 @@ from bh.model.supports import directions, select
 from bh.paths.path import Path
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.factor import Factor, IndefiniteError
-from bh.solvers.matrices import FreeBodyMatrix
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import MultiplierMatrix
 
 Array = NDArray[np.float64]
-Data = dict[str, Array]
 Build = Callable[[Array], Model]
 STEP = 1e-3  # of a parameter
 OFFSETS = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
@@ -66,10 +66,11 @@ class Situation:
     def __init__(self, path: Path, index: int) -> None:
         self.path, self.model = path, path.model
         self.system, record = path.solved(index)
-        if not hasattr(self.system, "design"):
-            raise ModelError(
-                f"formulation '{path.model.formulation}' has no sensitivities; use bars-and-hinges or consistent"
-            )
+        form = formulation(path.model.formulation)
+        if not isinstance(form, Differentiable):
+            others = " or ".join(able(lambda other: isinstance(other, Differentiable)))
+            raise ModelError(f"formulation '{path.model.formulation}' has no sensitivities; use {others}")
+        self.formulation: Differentiable[SheetSystem] = form
         if record.step > 0 and record.lam != 1.0:
             raise ModelError(
                 f"the state at lambda {record.lam:.4g} of step {record.step + 1} depends on the step before; "
@@ -79,15 +80,15 @@ class Situation:
             raise ModelError(
                 "a step that ends where an observable has a value has no sensitivities; give it its end"
             )
-        if self.system.rigid_contact is not None:
+        if load_steps(path.model)[record.step].bodies:
             raise ModelError("sheets that bars press on have no sensitivities; leave the bars out")
         self.step, self.q, self.lam = record.step, record.q, record.lam
         self.state: State = path[index]
         before = [i for i, other in enumerate(path.records) if other.step < record.step]
         self._before = before[-1] if before else None
         self.start: State | None = None if self._before is None else path[self._before]
-        self.moving = int(self.system.moving)
-        self.matrix = self.system.tangent(self.q, self.lam, self.system.evaluate(self.q, self.lam).forces)
+        forces = self.system.evaluate(self.q, self.lam).forces
+        self.matrix: Matrix = self.system.tangent(self.q, self.lam, forces).matrix
         try:
             self._factor: Factor = self.matrix.factorise_any()[0]
         except IndefiniteError:
@@ -107,9 +108,14 @@ class Situation:
         return Situation(self.path, self._before)
 
     @cached_property
-    def design(self) -> Any:
+    def derivatives(self) -> Derivatives:
         """Exact derivatives of the system at this state."""
-        return self.system.design(self.q, self.lam)
+        return self.formulation.derivatives(self.system, self.q, self.lam)
+
+    @property
+    def moving(self) -> int:
+        """Number of displacements that the unknowns begin with."""
+        return self.derivatives.moving
 
     def solve(self, load: Array, value: float = 0.0) -> Array:
         """Response (size,) of the unknowns to a load, the slope of an observable of that value.
@@ -184,8 +190,8 @@ class Energy:
 
     def slope(self, at: Situation) -> Slope:
         kinds = KINDS if self.kind == "total" else (self.kind,)
-        points, other = at.design.energy_gradient(kinds)
-        return Slope(points, other, at.design.energy_to_data(kinds))
+        points, other = at.derivatives.energy_gradient(kinds)
+        return Slope(points, other, at.derivatives.energy_to_data(kinds))
 
 
 @dataclass(frozen=True)
@@ -208,7 +214,7 @@ class FoldAngle:
 
     def slope(self, at: Situation) -> Slope:
         hinges = self._hinges(at)
-        return Slope(*at.design.angle_gradient(hinges, np.full(len(hinges), -1.0 / len(hinges))))
+        return Slope(*at.derivatives.angle_gradient(hinges, np.full(len(hinges), -1.0 / len(hinges))))
 
 
 @dataclass(frozen=True)
@@ -279,12 +285,13 @@ class Stiffness:
         ends = at.model.mesh.points[at.model.mesh.topology.edges]
         short = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
         step = ALONG * short / float(np.abs(v).max())
-        moved = [at.system.design(at.q + k * step * w, at.lam).second_variation(v, other) for k in OFFSETS]
+        beside = (at.formulation.derivatives(at.system, at.q + k * step * w, at.lam) for k in OFFSETS)
+        moved = [there.second_variation(v, other) for there in beside]
         scale = stiffness**2
         points, rest = (
             scale / step * np.tensordot(SIXTH, np.array([m[part] for m in moved]), 1) for part in range(2)
         )
-        data = {key: scale * value for key, value in at.design.second_to_data(v, other).items()}
+        data = {key: scale * value for key, value in at.derivatives.second_to_data(v, other).items()}
         return Slope(points, rest, data)
 
 
@@ -354,11 +361,11 @@ def _gradient(at: Situation, slope: Slope, value: float, around: _Around) -> tup
     # what a pinch imposes follows from the angles that its step began with
     pinch = load_steps(at.model)[at.step].pinch
     weights = np.where(np.isnan(pinch.base) & ~np.isnan(pinch.toward), 1.0 - pinch.part, 0.0)
-    weights = weights * at.design.imposed(by_data)
+    weights = weights * at.derivatives.imposed(by_data)
     follows = np.flatnonzero(weights)
     if len(follows) == 0:
         return gradient, error
-    earlier = Slope(*at.previous.design.angle_gradient(follows, weights[follows]))
+    earlier = Slope(*at.previous.derivatives.angle_gradient(follows, weights[follows]))
     more = _gradient(at.previous, earlier, float(np.abs(weights).sum()), around)
     return gradient + more[0], error + more[1]
 
@@ -367,9 +374,9 @@ def derivatives_to_data(at: Situation, slope: Slope, value: float) -> Data:
     """Derivatives of an observable to element data at equilibrium: its own, and by way of the state (the adjoint)."""
     adjoint = at.solve(at.load(slope.points, slope.other), value)
     v, w = at.system.vectors(adjoint), adjoint[at.moving :]
-    by_data = {key: -part for key, part in at.design.residual_to_data(v, w).items()}
+    by_data = {key: -part for key, part in at.derivatives.residual_to_data(v, w).items()}
     # nodes that supports hold move with them
-    by_data["places"] = slope.points - at.design.second_variation(v, w)[0]
+    by_data["places"] = slope.points - at.derivatives.second_variation(v, w)[0]
     for key, part in slope.data.items():
         by_data[key] = by_data[key] + part if key in by_data else part
     return by_data
@@ -395,7 +402,7 @@ class _Around:
         """For each parameter derivatives of the element data of a situation, and their measured errors."""
         if at.step not in self._known:
             self._known[at.step] = [
-                differences([data_of(at, model) for model in row], h)
+                differences([data_of(at, model) for model in row], h, at.derivatives.unfollowed)
                 for row, h in zip(self.models, self.steps, strict=True)
             ]
         return self._known[at.step]
@@ -403,7 +410,7 @@ class _Around:
 
 def data_of(at: Situation, model: Model) -> Data:
     """Element data of another model where a situation is."""
-    system = formulation(model.formulation).system(model, load_steps(model)[at.step], at.start)
+    system = at.formulation.system(model, load_steps(model)[at.step], at.start)
     if system.size != at.system.size:
         raise ModelError("the unknowns change with the design; keep supports and creases fixed")
     here, there = at.system.constraints, system.constraints
@@ -411,20 +418,31 @@ def data_of(at: Situation, model: Model) -> Data:
         here.frames, there.frames, rtol=0.0, atol=1e-12
     ):
         raise ModelError("the directions of oblique supports change with the design; keep them fixed")
-    data: Data = system.design(at.q, at.lam).data()
-    return data
+    return at.formulation.derivatives(system, at.q, at.lam).data()
 
 
-def differences(around: list[Data], h: float) -> tuple[Data, Data]:
+def differences(around: list[Data], h: float, unfollowed: Mapping[str, str]) -> tuple[Data, Data]:
+    """Derivatives of element data by a parameter, from six samples.
+
+    Args:
+        around: data of the models at the parameter plus h times `OFFSETS`, in that order.
+        h: step of the parameter.
+        unfollowed: names of data that must not change, and what to say if they do (`Derivatives.unfollowed`).
+
+    Returns:
+        the derivatives, of sixth order, and their distances from those of fourth order.
+
+    Raises:
+        ModelError: data change by which no derivative is known.
+    """
     rates, errors = {}, {}
     for key in around[0]:
         samples = np.array([data[key] for data in around])
         rates[key] = np.tensordot(SIXTH, samples, 1) / h
         errors[key] = np.abs(np.tensordot(SIXTH - FOURTH, samples, 1)) / h
-    if "ghost" in rates and np.abs(rates["ghost"]).max(initial=0.0) > 0.0:
-        raise ModelError(
-            "sensitivities to geometry do not know clamped edges; hold their nodes, or keep the geometry"
-        )
+    for key, why in unfollowed.items():
+        if np.abs(rates[key]).max(initial=0.0) > 0.0:
+            raise ModelError(why)
     return rates, errors
 
 

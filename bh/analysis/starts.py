@@ -59,11 +59,7 @@ def relax(model: Model, points: ArrayLike, newton: Newton | None = None) -> Rela
     with one_blas_thread():
         # the least-squares displacement of the unknowns, which are components in orthonormal axes
         start = system.positions(np.zeros(system.size), 1.0)
-        q = system.loads(x - start) if hasattr(system, "loads") else None
-        if q is None:
-            raise ModelError(
-                f"formulation '{model.formulation}' cannot start from positions; use another one"
-            )
+        q = system.loads(x - start)
         found = (newton or Newton()).solve(system, q, 1.0)
     state = form.observe(model, system, found.q, 1.0, 0, found.stable)
     moved = np.linalg.norm(state.points - x, axis=1)

@@ -28,7 +28,7 @@ def warm_up() -> None:
     wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
     system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0))._system(0)
     now = system.evaluate(system.start(), 0.0)
-    matrix = system.tangent(system.start(), 0.0, now.forces)
+    matrix = system.tangent(system.start(), 0.0, now.forces).matrix
     matrix @ matrix.factorise().solve(now.residual)
 
 

@@ -4,67 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.formulations.registry import Formulation, formulation
+from bh.formulations.protocols import Formulation, SheetSystem
+from bh.formulations.registry import checked_system, formulation, remarks
 from bh.formulations.state import State
 from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd, open_ends
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
 from bh.paths.provenance import provenance_of
+from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
-from bh.solvers.increments import ARC, LOAD, CriticalPoint
+from bh.solvers.increments import ARC, CriticalPoint
 from meshes.mesh import count
 
 if TYPE_CHECKING:
-    from bh.formulations.symmetry_reduction import Half
+    from bh.formulations.symmetry_reduction import Half, Halves
     from bh.loading.symmetry import Plane
     from bh.solving.accuracy import Accuracy
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class StepOutcome:
-    """How one step ended: "reached", or why not, with one line of reason."""
-
-    outcome: str
-    reason: str = ""
-    iterations: int = 0  # of the increment that failed
-
-
-@dataclass(frozen=True, eq=False)
-class Record:
-    """One accepted state in the solver's terms; see `bh.solvers.increments.Increment`.
-
-    `negative` counts the negative modes of the tangent, `mode` says how to go on from here, `jumped` that the state
-    lies on another branch than the one before, `critical` holds the limit and bifurcation points passed before it.
-    """
-
-    step: int
-    lam: float
-    q: Array
-    iterations: int
-    imbalance: float
-    wall_time_s: float
-    next_increment: float
-    negative: int | None = None
-    mode: str = LOAD
-    note: str = ""
-    cuts: tuple[str, ...] = ()
-    jumped: bool = False
-    critical: tuple[CriticalPoint, ...] = ()
-
-    @property
-    def stable(self) -> bool | None:
-        """True if no mode is negative, None where that was not looked at."""
-        return None if self.negative is None else self.negative == 0
 
 
 class Path:
@@ -84,14 +49,14 @@ class Path:
         self.records: list[Record] = []
         self.steps: list[StepOutcome] = []
         self.accuracy: Accuracy | None = None
-        self._formulation: Formulation = formulation(model.formulation)
+        self._formulation: Formulation[SheetSystem] = formulation(model.formulation)
         self._load_steps: tuple[LoadStep, ...] = load_steps(model)
-        self._halves = None
+        self._halves: Halves | None = None
         if symmetry is not None:
             from bh.formulations.symmetry_reduction import Halves
 
             self._halves = Halves(self._formulation, model, self._load_steps, symmetry)
-        self._systems: dict[int, Any] = {}
+        self._systems: dict[int, SheetSystem] = {}
         self._states: dict[int, State] = {}
 
     # ------------------------------------------------------------------------------- reading
@@ -119,7 +84,9 @@ class Path:
         """Of a sheet solved by halves, count the negative modes of the last state, symmetric or not, when asked."""
         if self._halves is not None and self.records and self.records[-1].negative is None:
             last = self.records[-1]
-            self.records[-1] = replace(last, negative=self._halves.negative(self._system(last.step), last))
+            self.records[-1] = replace(
+                last, negative=self._halves.negative(self._system(last.step), last.q, last.lam)
+            )
             self._states.pop(len(self.records) - 1, None)
 
     @property
@@ -145,7 +112,7 @@ class Path:
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
-        return found + [f"{remark.code}: {remark}" for remark in self.model.remarks]
+        return found + [f"{remark.code}: {remark}" for remark in remarks(self.model)]
 
     @property
     def iterations(self) -> int:
@@ -196,7 +163,7 @@ class Path:
     def __iter__(self) -> Iterator[State]:
         return (self[i] for i in range(len(self)))
 
-    def solved(self, index: int = -1) -> tuple[Any, Record]:
+    def solved(self, index: int = -1) -> tuple[SheetSystem, Record]:
         """The system of the step that a state belongs to, and its record: what analyses of a state begin with."""
         record = self.records[range(len(self))[index]]
         return self._system(record.step), record
@@ -234,7 +201,7 @@ class Path:
             meta = source.meta()
             path = cls(rebuild(meta["model"], source.arrays()), meta["provenance"])
             for row in source.states():
-                path.records.append(_record(row))
+                path.records.append(Record.of_row(row))
             ends = source.steps()
             path.steps = [StepOutcome(*ends[step]) for step in sorted(ends)]
         return path
@@ -250,14 +217,13 @@ class Path:
             record.note, record.cuts, record.q, self[index].points, critical,
         )  # fmt: skip
 
-    def _system(self, step: int) -> Any:
+    def _system(self, step: int) -> SheetSystem:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
             if any(each.until is not None for each in self.model.steps[:step]):
                 self._load_steps = load_steps(self.model, self._ended(step))
-            self._systems[step] = self._formulation.system(
-                self.model, self._load_steps[step], self._start(step)
-            )
+            made = self._formulation.system(self.model, self._load_steps[step], self._start(step))
+            self._systems[step] = checked_system(made, self.model.formulation)
         return self._systems[step]
 
     def _half(self, step: int) -> Half | None:
@@ -280,14 +246,6 @@ class Path:
                 state = self[index]
                 found[step] = StepEnd(state.lam, state.points, state.dihedral_angles)
         return found
-
-
-def _record(row: StateRow) -> Record:
-    return Record(
-        row.step, row.lam, row.q, row.iterations, row.imbalance, row.wall_time_s, row.next_increment,
-        negative=row.negative, mode=row.mode, note=row.note, cuts=row.cuts, jumped=row.jumped,
-        critical=tuple(CriticalPoint(c.kind, c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical),
-    )  # fmt: skip
 
 
 def new_file(path: Path, file: FilePath) -> PathFile:

@@ -164,7 +164,8 @@ class LoadControl:
             return ()
         before = here.negative
         if before is None:  # where a step begins nobody has looked yet
-            before = count_negative(system.tangent(here.q, here.lam, here.forces)) if found.negative else 0
+            matrix = system.tangent(here.q, here.lam, here.forces).matrix if found.negative else None
+            before = 0 if matrix is None else count_negative(matrix)
         if before == found.negative:
             return ()
         there = point(system, found.q, lam, evaluation=found.evaluation)
@@ -189,12 +190,13 @@ class LoadControl:
 
         def guess() -> tuple[Array, Array]:
             here = points[-1]
+            tangent = system.tangent(here.q, here.lam, here.forces)
             try:
-                factor, _ = system.tangent(here.q, here.lam, here.forces).factorise_any()
+                factor, _ = tangent.matrix.factorise_any()
             except IndefiniteError:
                 return here.q, here.forces
             change = -(lam - here.lam) * factor.solve(system.control_rate(here.q, here.lam))
-            return here.q + change, system.predicted_forces(here.forces, change)
+            return here.q + change, tangent.predicted_forces(here.forces, change)
 
         return guess
 

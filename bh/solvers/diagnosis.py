@@ -36,7 +36,7 @@ def diagnose(system: System, failure: Increment) -> Increment:
 def free_motion(system: System, failure: Increment) -> str:
     """The motion of the last state that nothing resists, in words, or an empty string."""
     here = failure.point
-    matrix = system.tangent(here.q, here.lam, here.forces)
+    matrix = system.tangent(here.q, here.lam, here.forces).matrix
     try:
         stiffness, mode = lowest_mode(matrix, system.size, system.primal)
     except IndefiniteError:

@@ -37,7 +37,7 @@ def linear_response(system: LinearSystem, q: Array, lam: float = 0.0) -> LinearR
     """Linear response of `system` at (q, lam); raises `IndefiniteError` where the state is not stable."""
     now = system.evaluate(q, lam)
     rate = system.control_rate(q, lam)
-    dq = -system.tangent(q, lam, now.forces).factorise().solve(rate)
+    dq = -system.tangent(q, lam, now.forces).matrix.factorise().solve(rate)
     # potential to second order: 1/2 dq K dq + dq . rate + 1/2 c, with K dq = -rate
     energy = 0.5 * (float(rate @ dq) + system.control_stiffness(q, lam))
     return LinearResponse(dq, energy)

@@ -23,7 +23,7 @@ def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -
     Returns the stable state and a note; if none of lower energy is found, the saddle itself and an empty note.
     """
     tangent = system.tangent(saddle.q, lam, saddle.evaluation.forces)
-    _, mode = lowest_mode(tangent, len(saddle.q), system.primal)
+    _, mode = lowest_mode(tangent.matrix, len(saddle.q), system.primal)
     mode /= max(float(np.abs(mode).max()), 1e-300)
     size = float(np.ptp(saddle.q[: system.primal])) or 1.0
     spent = 0
@@ -88,7 +88,7 @@ def _bisect(
         if state.reason:
             return None
         middle = point(system, state.q, state.lam, a.mode, state.evaluation), 0.5 * (low[1] + high[1])
-        count = count_negative(system.tangent(state.q, state.lam, state.evaluation.forces))
+        count = count_negative(system.tangent(state.q, state.lam, state.evaluation.forces).matrix)
         if count == before:
             low = middle
         else:
@@ -102,7 +102,7 @@ def _critical_point(
     p = system.primal
     lam, q = 0.5 * (left.lam + right.lam), 0.5 * (left.q + right.q)
     forces = 0.5 * (left.forces + right.forces)
-    mode = nearest_mode(system.tangent(q, lam, forces), system.size, p)
+    mode = nearest_mode(system.tangent(q, lam, forces).matrix, system.size, p)
     # at a limit point the path itself runs along the mode, and the mode does work on the change of the load
     chord = (b.q - a.q)[:p]
     along = abs(float(mode[:p] @ chord)) > 0.1 * float(np.linalg.norm(chord))

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.formulations.protocols import Mirrored, Refinable
 from bh.formulations.registry import formulation, names
 from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane
@@ -208,10 +209,11 @@ def candidates(halves: bool = False) -> dict[str, Refinement]:
     Raises:
         ModelError: there is none.
     """
-    found = {name: getattr(formulation(name), "refinement", None) for name in names()}
-    known = {name: item for name, item in found.items() if isinstance(item, Refinement)}
-    if halves:
-        known = {name: item for name, item in known.items() if hasattr(formulation(name), "half")}
+    known = {}
+    for name in names():
+        found = formulation(name)
+        if isinstance(found, Refinable) and found.refinement and (not halves or isinstance(found, Mirrored)):
+            known[name] = found.refinement
     if not known:
         raise ModelError(
             "no formulation is installed that says how its meshes are refined; install the project with pip"

@@ -12,7 +12,8 @@ from bh.errors import ModelError, PathFileError
 from bh.formulations.observables import measure
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
-from bh.paths.path import Path, Record, StepOutcome, new_file
+from bh.paths.path import Path, new_file
+from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import PathFile
 from bh.runtime.progress import ProgressMeter, meter
 from bh.runtime.threads import one_blas_thread
@@ -129,7 +130,7 @@ def _run_step(
     began = time.perf_counter()
 
     def accept(record: Record) -> None:
-        record = record if half is None else half.whole(record)
+        record = record if half is None else record.of_whole(half)
         path.records.append(record)
         if target is not None:
             target.add(path._row(len(path.records) - 1, record))
@@ -148,7 +149,7 @@ def _run_step(
             )
             began = time.perf_counter()
     else:
-        recent = [record if half is None else half.part(record) for record in _recent(done)]
+        recent = [record if half is None else record.of_half(half) for record in _recent(done)]
         history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in recent]
         increment = done[-1].next_increment
         if (

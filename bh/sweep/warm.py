@@ -15,7 +15,8 @@ import numpy as np
 
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
-from bh.paths.path import Path, Record, StepOutcome
+from bh.paths.path import Path
+from bh.paths.record import Record, StepOutcome
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solving.follow import trace

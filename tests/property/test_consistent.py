@@ -243,11 +243,11 @@ def test_locks_belong_to_their_derivatives(angle: float) -> None:
     )  # the law of the lock is steep beside the step of the differences
     assert "touch" in system.contact(q, 0.4)
     assert system.obstacle(q, 0.4)[0] == "contact"
-    system.tangent(q, 0.4, now.forces)
+    tangent = system.tangent(q, 0.4, now.forces)
     v = np.random.default_rng(6).normal(size=system.size)
     wrong = []
     for step in (2e-5, 1e-5):
-        ahead = system.predicted_forces(now.forces, step * v)
+        ahead = tangent.predicted_forces(now.forces, step * v)
         wrong.append(float(np.abs(ahead - system.evaluate(q + step * v, 0.4).forces).max()))
     assert wrong[0] / wrong[1] == pytest.approx(4.0, rel=0.1)
 
@@ -399,7 +399,7 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
         system = formulation(model.formulation).system(model, load_steps(model)[0], None)
         assert system._pattern.banded is banded
         q = solved(name).records[0].q
-        A = dense(system.tangent(q, 0.0, system.evaluate(q, 0.0).forces), system.size)
+        A = dense(system.tangent(q, 0.0, system.evaluate(q, 0.0).forces).matrix, system.size)
         assert np.abs(A - A.T).max() <= 1e-14 * np.abs(A).max()
         responses.append((A, linear_response(system, q).dq))
     for x, y in zip(*responses, strict=True):

@@ -166,7 +166,7 @@ def test_derivatives(name: str, seed: int) -> None:
 def test_tangent_is_symmetric(name: str) -> None:
     for system, q, lam in systems(name):
         q = disturbed(system, q, 3)
-        matrix = system.tangent(q, lam, system.evaluate(q, lam).forces)
+        matrix = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
         A = dense(matrix, system.size)
         # what is stored is the augmented matrix; taking the penalty out again leaves its rounding errors
         stored = dense(matrix.augmented, system.primal) if isinstance(matrix, MultiplierMatrix) else A
@@ -242,7 +242,7 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
         force_storage(monkeypatch, banded)
         system = formulation(model.formulation).system(model, load_steps(model)[0], None)
         q = one.records[0].q
-        A = system.tangent(q, 0.0, system.evaluate(q, 0.0).forces)
+        A = system.tangent(q, 0.0, system.evaluate(q, 0.0).forces).matrix
         b = np.random.default_rng(0).normal(size=system.size)
         b[system.primal :] = 0.0
         responses.append((dense(A, system.size), linear_response(system, q).dq[: system.primal], A @ b))
@@ -262,7 +262,7 @@ def test_order_is_a_permutation(banded: bool, monkeypatch: pytest.MonkeyPatch) -
     order = system._pattern.order
     assert np.array_equal(np.sort(order), np.arange(system.primal))
     assert not np.array_equal(order, np.arange(system.primal))
-    A = dense(system.tangent(q, lam, system.evaluate(q, lam).forces), system.size)
+    A = dense(system.tangent(q, lam, system.evaluate(q, lam).forces).matrix, system.size)
     # column by column by differences: entries stand where the unknowns are
     h = 1e-5
     for i in (0, 1, 7, system.primal - 1):
@@ -286,7 +286,7 @@ def test_free_body_solves_the_singular_system(
     system = path._system(0)
     loaded = np.abs(system.force.end).max() > 0.0
     for record in (path.records[0], path.records[-1]):
-        matrix = system.tangent(record.q, record.lam, system.evaluate(record.q, record.lam).forces)
+        matrix = system.tangent(record.q, record.lam, system.evaluate(record.q, record.lam).forces).matrix
         if isinstance(matrix, MultiplierMatrix):
             matrix = matrix.augmented
         assert isinstance(matrix, FreeBodyMatrix)
@@ -310,7 +310,7 @@ def test_free_body_solves_the_singular_system(
 def test_unbalanced_part_of_a_load_is_left_out() -> None:
     """What a free body cannot carry does not move it."""
     system, q, lam = systems("free, spring crease")[0]
-    matrix = system.tangent(q, lam, system.evaluate(q, lam).forces)
+    matrix = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
     push = np.tile([0.3, -1.0, 2.0], len(system.mesh.points))
     assert np.abs(matrix.factorise().solve(push)).max() < 1e-9
 
@@ -324,7 +324,7 @@ def test_multipliers_solve_the_saddle(name: str) -> None:
     for system, q, lam in systems(name):
         if system.size == system.primal:
             continue
-        matrix = system.tangent(q, lam, system.evaluate(q, lam).forces)
+        matrix = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
         assert isinstance(matrix, MultiplierMatrix)
         n, A = system.primal, dense(matrix, system.size)
         assert A[n:, n:] == pytest.approx(-np.diag(matrix.compliance), abs=0.0)
@@ -350,7 +350,7 @@ def test_linear_response_is_exact_enough(name: str) -> None:
     for index in (0, len(path) - 1):
         record = path.records[index]
         system = path._system(record.step)
-        matrix = system.tangent(record.q, record.lam, system.evaluate(record.q, record.lam).forces)
+        matrix = system.tangent(record.q, record.lam, system.evaluate(record.q, record.lam).forces).matrix
         rate = system.control_rate(record.q, record.lam)
         n, A = system.primal, dense(matrix, system.size)
         expected = np.linalg.lstsq(A, -rate, rcond=1e-13)[0]
@@ -367,7 +367,7 @@ def test_multipliers_without_a_gap(force: tuple[float, float, float]) -> None:
     model = clamped(sector()).step(Fold("crease", to=math.pi), Force("corner:outer-end", each=force))
     system = formulation(model.formulation).system(model, load_steps(model)[0], None)
     q = system.start()
-    A = dense(system.tangent(q, 0.0, system.evaluate(q, 0.0).forces), system.size)
+    A = dense(system.tangent(q, 0.0, system.evaluate(q, 0.0).forces).matrix, system.size)
     rate = system.control_rate(q, 0.0)
     assert np.abs(rate[system.primal :]).max() == 0.0
     expected = np.linalg.solve(A, -rate)

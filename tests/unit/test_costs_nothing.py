@@ -50,7 +50,7 @@ def test_no_folding_arrays_without_creases() -> None:
         assert system.size == system.primal == len(system.displacements.free)
         evaluation = system.evaluate(system.start(), 0.5)
         assert len(evaluation.forces) == len(e.bars) + e.bending
-        assert isinstance(system.tangent(system.start(), 0.5, evaluation.forces), BandMatrix)
+        assert isinstance(system.tangent(system.start(), 0.5, evaluation.forces).matrix, BandMatrix)
         assert system.rigid_contact is None
 
 

@@ -109,7 +109,7 @@ def test_derivatives(formulation: str) -> None:
     system, q, lam = shaken(formulation, 3)
     assert np.abs(system.rigid_contact.contact_forces(system.positions(q, lam), lam)["bar"]).max() > 1.0
     now, h = system.evaluate(q, lam), 1e-6
-    matrix = system.tangent(q, lam, now.forces)
+    matrix = system.tangent(q, lam, now.forces).matrix
     rng = np.random.default_rng(5)
     for _ in range(4):
         v = rng.normal(size=system.size)

@@ -21,7 +21,7 @@ from bh.paths.path import Path
 from bh.solvers.continuation import LoadControl
 from fem.kirchhoff_love import Shell, follow
 from fem.loads import EdgeMoments
-from fem.observables import ShellState
+from fem.state import ShellState
 from verification.theory.shell_benchmarks import clamped_sheet, rectangle
 
 MYLAR = Sheet(E=4000.0, nu=0.38, t=0.127)

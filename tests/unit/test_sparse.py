@@ -53,9 +53,9 @@ def tangents(request: pytest.FixtureRequest) -> dict[str, SparseMatrix]:
         pressed = forces.copy()
         pressed[: len(system.elements.bars)] -= 2.0  # N in every bar
         made = {
-            "flat": system.tangent(system.start(), 0.0, 0.0 * forces),
-            "folded": system.tangent(q, 1.0, forces),
-            "pressed": system.tangent(q, 1.0, pressed),
+            "flat": system.tangent(system.start(), 0.0, 0.0 * forces).matrix,
+            "folded": system.tangent(q, 1.0, forces).matrix,
+            "pressed": system.tangent(q, 1.0, pressed).matrix,
         }
     finally:
         patch.undo()

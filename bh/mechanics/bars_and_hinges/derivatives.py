@@ -11,6 +11,8 @@ positions, are written out below, and those of the energies and of the second va
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,13 +30,15 @@ Array = NDArray[np.float64]
 Data = dict[str, Array]
 
 
-class BarHingeDesign:
+class BarHingeDerivatives:
     """Derivatives of one system at one state. `other` are the unknowns after the displacements: moments, N mm."""
+
+    unfollowed: Mapping[str, str] = MappingProxyType({})
 
     def __init__(self, system: BarsAndHingesSystem, q: Array, lam: float) -> None:
         if system.elements.green:
             raise ModelError("given element stiffness with Green's strain has no sensitivities; use l - L")
-        self.system, self.q, self.lam = system, q, lam
+        self.system, self.moving, self.q, self.lam = system, system.moving, q, lam
         e = system.elements
         self.x = system.positions(q, lam)
         _, _, _, self.forces, self.turn = system.internal_forces(self.x, q, lam)
@@ -84,12 +88,12 @@ class BarHingeDesign:
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the other unknowns, along v (n, 3) and w."""
         system, e = self.system, self.system.elements
-        f = system._tangent_times(self.x, v, self.forces)
+        f = system.tangent_times(self.x, v, self.forces)
         turned = self._rate(v)
         if e.prescribed:
             prescribed = slice(len(e.hinges) - e.prescribed, None)
             np.add.at(f, e.hinges[prescribed], w[:, None, None] * self.g[prescribed])
-            return f, turned[prescribed] - system._compliance * w
+            return f, turned[prescribed] - system.compliance * w
         return f, np.zeros(0)
 
     def support(self) -> dict[str, Ints]:

@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.formulations.remarks import Remark
 from bh.formulations.state import Energy, State
 from bh.loading.load_step import LoadStep
+from bh.mechanics.bars_and_hinges import remarks
+from bh.mechanics.bars_and_hinges.derivatives import BarHingeDerivatives
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.model.model import Model
-from meshes.topology import Ints
 
 if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
@@ -29,6 +32,7 @@ class BarsAndHinges:
     """Formulation "bars-and-hinges"; Poisson's ratio of the sheet is taken as 0, as in the source (3.3.2)."""
 
     name = "bars-and-hinges"
+    takes_nu = False
 
     def system(self, model: Model, load_step: LoadStep, start: State | None) -> BarsAndHingesSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
@@ -67,6 +71,18 @@ class BarsAndHinges:
             out[half.primal :] = plane.hinge_weight[kept] * at[kept]
         return out
 
+    def derivatives(self, system: BarsAndHingesSystem, q: Array, lam: float) -> BarHingeDerivatives:
+        """Derivatives of a system by its element data at unknowns q (size,).
+
+        Raises:
+            ModelError: bars measure Green's strain, of which there are none.
+        """
+        return BarHingeDerivatives(system, q, lam)
+
+    def remarks(self, model: Model) -> tuple[Remark, ...]:
+        """What to know of the mesh and the loads of a model; empty where there is nothing to say."""
+        return remarks.remarks(model)
+
     def observe(
         self,
         model: Model,
@@ -88,9 +104,9 @@ class BarsAndHinges:
         by_hinge = 0.5 * e.hinge_stiffness * turn**2
         by_lock = lock_terms(phi, e.lock)[:, 0].sum()
         density = {
-            "stretching": to_triangles(model, stretch, np.arange(len(e.bars))),
-            "bending": to_triangles(model, by_hinge[bend], mesh.topology.hinge_edges[e.source[bend]]),
-            "folding": to_triangles(model, by_hinge[spring], mesh.topology.hinge_edges[e.source[spring]]),
+            "stretching": to_triangles(mesh, stretch, np.arange(len(e.bars))),
+            "bending": to_triangles(mesh, by_hinge[bend], mesh.topology.hinge_edges[e.source[bend]]),
+            "folding": to_triangles(mesh, by_hinge[spring], mesh.topology.hinge_edges[e.source[spring]]),
         }
         angles = np.empty(len(e.hinges))
         angles[e.source] = phi
@@ -109,16 +125,3 @@ class BarsAndHinges:
             crease_moments=moments, stable=stable,
             contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
         )  # fmt: skip
-
-
-def to_triangles(model: Model, energy: Array, edges: Ints) -> Array:
-    """Energy of edges shared by area among their triangles, as a density (t,), N mm / mm^2."""
-    mesh = model.mesh
-    sides = mesh.topology.edge_triangles[edges]
-    areas = np.where(sides >= 0, mesh.areas[np.maximum(sides, 0)], 0.0)
-    share = energy / areas.sum(axis=1)
-    density = np.zeros(len(mesh.triangles))
-    for side in range(2):
-        inside = sides[:, side] >= 0
-        np.add.at(density, sides[inside, side], share[inside])
-    return density

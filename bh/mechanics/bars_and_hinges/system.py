@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
-from bh.mechanics.bars_and_hinges.derivatives import BarHingeDesign
 from bh.mechanics.bars_and_hinges.elements import sheet_elements
 from bh.mechanics.shared.assembly import (
     Pattern,
@@ -26,7 +25,7 @@ from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.model.model import Model
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
-from bh.solvers.system import Evaluation
+from bh.solvers.system import Evaluation, Tangent
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
@@ -35,6 +34,20 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 COMPLIANCE = 1e-9  # of a prescribed crease, in parts of 1 / gamma
 ROUNDING = 8.0 * np.finfo(float).eps
+
+
+class Linearised(NamedTuple):
+    """Elements linearised at a state, which predicts their forces beside it.
+
+    Attributes:
+        directions: (b, 3) derivatives of the elongations of bars by the positions of their second ends.
+        turns: (h, 12) derivatives of the dihedral angles by the positions of the four nodes, rad / mm.
+        stiffness: (h,) of hinges with their locks there, N mm / rad.
+    """
+
+    directions: Array
+    turns: Array
+    stiffness: Array
 
 
 class BarsAndHingesSystem(SupportedSheet):
@@ -68,9 +81,6 @@ class BarsAndHingesSystem(SupportedSheet):
         self.size = self.primal + self.elements.prescribed
         self._bar_scale = model.sheet.E * model.sheet.t
         self._moments_start = moments
-        self._d_bar = np.empty((len(self.elements.bars), 3))
-        self._g_hinge = np.empty((len(self.elements.hinges), 12))
-        self._k_hinge = np.empty(len(self.elements.hinges))  # with the locks, as of the last tangent
 
     # ------------------------------------------------------------------------------- unknowns and positions
 
@@ -89,7 +99,7 @@ class BarsAndHingesSystem(SupportedSheet):
     @cached_property
     def hinge_lengths(self) -> Array:
         ends = self.reference[self.elements.hinges[:, 1:3]]
-        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     # ------------------------------------------------------------------------------- the System protocol
 
@@ -106,8 +116,8 @@ class BarsAndHingesSystem(SupportedSheet):
         gap = penalty = 0.0
         if self.elements.prescribed:
             missed = turn[-self.elements.prescribed :]
-            residual[self.primal :] = missed - self._compliance * q[self.primal :]
-            energy -= 0.5 * float(self._compliance @ q[self.primal :] ** 2)
+            residual[self.primal :] = missed - self.compliance * q[self.primal :]
+            energy -= 0.5 * float(self.compliance @ q[self.primal :] ** 2)
             penalty = 0.5 * float(self.elements.penalty @ missed**2)
             # a prescribed angle is to be met to 1e-12 rad: what is left of it, times the bars' stiffness, is a moment
             gap = 1e4 * max(float(np.abs(residual[self.primal :]).max()) - ROUNDING, 0.0)
@@ -157,15 +167,17 @@ class BarsAndHingesSystem(SupportedSheet):
             couple[-self.elements.prescribed :] = q[self.primal :]
         return couple
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, pattern = self.elements, self._pattern
         bars = len(e.bars)
         x = self.positions(q, lam)
         data = np.zeros(pattern.size)
+        linear = Linearised(np.empty((bars, 3)), np.empty((len(e.hinges), 12)), np.empty(len(e.hinges)))
         tangent_values(
             x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0],
             e.hinges, self._augmented_stiffness, e.lock, forces[bars:], pattern.slots[1],
-            self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge, self._k_hinge,
+            self.constraints.frame_of, self.constraints.frames, data, *linear,
         )  # fmt: skip
         matrix: Matrix
         if self.rigid_contact is not None:
@@ -178,17 +190,18 @@ class BarsAndHingesSystem(SupportedSheet):
             matrix = FreeBodyMatrix(pattern.matrix(data), Z, *ground, self.displacements.weight)
         else:
             matrix = pattern.matrix(data)
-        if not e.prescribed:
-            return matrix
-        return MultiplierMatrix(matrix, self._constraint_rows(), e.penalty, self._compliance)
+        if e.prescribed:
+            matrix = MultiplierMatrix(matrix, self._constraint_rows(linear.turns), e.penalty, self.compliance)
+        return Tangent(matrix, partial(self._predicted_forces, linear))
 
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
+    def _predicted_forces(self, linear: Linearised, forces: Array, dq: Array) -> Array:
+        """Element forces after an increment dq (size,) from where elements were linearised with `forces`."""
         e = self.elements
         bars = len(e.bars)
         out = np.empty_like(forces)
         predicted_forces(
-            e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, self._k_hinge, forces[bars:],
-            self._g_hinge, self.displacements.vectors(dq[: self.primal]), out[:bars], out[bars:],
+            e.bars, e.bar_stiffness, forces[:bars], linear.directions, e.hinges, linear.stiffness, forces[bars:],
+            linear.turns, self.displacements.vectors(dq[: self.primal]), out[:bars], out[bars:],
         )  # fmt: skip
         if e.prescribed:
             out[-e.prescribed :] = forces[-e.prescribed :] + dq[self.primal :]
@@ -204,7 +217,7 @@ class BarsAndHingesSystem(SupportedSheet):
         np.add.at(out, e.hinges, (moment_rate[:, None] * g).reshape(-1, 4, 3))
         moving = self.displacements.prescribed_motion
         if moving.any():
-            out += self._tangent_times(x, moving, forces)
+            out += self.tangent_times(x, moving, forces)
         if self.rigid_contact is not None:
             self.rigid_contact.force_rates(x, moving, lam, 1.0, out)
         rate = np.empty(self.size)
@@ -234,18 +247,14 @@ class BarsAndHingesSystem(SupportedSheet):
         moving = self.displacements.prescribed_motion
         if moving.any():
             _, _, _, forces, _ = self.internal_forces(x, q, lam)
-            out = self._tangent_times(x, moving, forces)
+            out = self.tangent_times(x, moving, forces)
             g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
             turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
             total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
             total += 2.0 * float((e.couple.rate - e.hinge_stiffness * e.rest.rate) @ turn)
         return total if self.rigid_contact is None else total + self.rigid_contact.control_stiffness(x, lam)
 
-    def design(self, q: Array, lam: float) -> BarHingeDesign:
-        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
-        return BarHingeDesign(self, q, lam)
-
-    def _tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
+    def tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
         """Tangent of all elements times v (n, 3), in global axes and with no support left out."""
         e, bars = self.elements, len(self.elements.bars)
         out = np.zeros_like(x)
@@ -268,8 +277,8 @@ class BarsAndHingesSystem(SupportedSheet):
         return build_pattern(number, groups, self.reference)
 
     @cached_property
-    def _compliance(self) -> Array:
-        """Compliance of prescribed creases, rad / (N mm): far below rounding of the angles at ordinary moments.
+    def compliance(self) -> Array:
+        """Compliance of held creases, rad / (N mm): far below rounding of the angles at ordinary moments.
 
         Where panels are rigid, a straight crease can carry moments that balance each other at no cost; it picks the
         smallest ones.
@@ -285,13 +294,14 @@ class BarsAndHingesSystem(SupportedSheet):
     def _held_columns(self) -> Ints:
         return self.displacements.number[self.elements.hinges[-self.elements.prescribed :]].reshape(-1, 12)
 
-    def _constraint_rows(self) -> ConstraintRows:
-        g = self._g_hinge[-self.elements.prescribed :]
+    def _constraint_rows(self, turns: Array) -> ConstraintRows:
+        """Gradients of the held angles, in local axes, from those of all hinges (h, 12)."""
+        g = turns[-self.elements.prescribed :]
         if len(self.displacements.turned):
             index = self.constraints.frame_of[self.elements.hinges[-self.elements.prescribed :]]
             axes = np.where((index >= 0)[..., None, None], self.constraints.frames[index], np.eye(3))
             g = np.einsum("hpij,hpj->hpi", axes, g.reshape(-1, 4, 3)).reshape(-1, 12)
-        return ConstraintRows(g.copy(), self._held_columns, self.primal)
+        return ConstraintRows(g, self._held_columns, self.primal)
 
     def _ground(self, Z: Array, data: Array) -> tuple[Ints, Array]:
         """Add a stiffness against the rigid motions of one triangle; returns its unknowns and its matrix."""

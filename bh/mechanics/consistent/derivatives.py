@@ -1,4 +1,4 @@
-"""How the consistent formulation depends on the design: the counterpart of `bar_hinge_design`.
+"""How the consistent formulation depends on the design: the counterpart of `bars_and_hinges.derivatives`.
 
 Triangles have gamma_k = (l_k^2 - L_k^2) / 2 and the energy 1/2 gamma.K.gamma, patches angles theta (phi - rest less the
 rotations) and 1/2 theta.B.theta, spring creases 1/2 k turn^2. With velocities v of the nodes and w of the rotations,
@@ -8,6 +8,8 @@ rotations) and 1/2 theta.B.theta, spring creases 1/2 k turn^2. With velocities v
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,13 +26,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Data = dict[str, Array]
+CLAMPED = "sensitivities to geometry do not know clamped edges; hold their nodes, or keep the geometry"
 
 
-class ConsistentDesign:
+class ConsistentDerivatives:
     """Derivatives of one system at one state. `other` are the unknowns after the displacements: rotations, rad."""
 
+    unfollowed: Mapping[str, str] = MappingProxyType({"ghost": CLAMPED})
+
     def __init__(self, system: ConsistentSystem, q: Array, lam: float) -> None:
-        self.system, self.q, self.lam = system, q, lam
+        self.system, self.moving, self.q, self.lam = system, system.moving, q, lam
         e = system.elements
         self.alpha = q[system.moving :]
         self.x = system.positions(q, lam)
@@ -105,7 +110,7 @@ class ConsistentDesign:
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the rotations, along v (n, 3) and w."""
         system, e, x = self.system, self.system.elements, self.x
-        rates, _ = system._force_rates(x, v, w, closing=bool(self.L.any()), controlled=False)
+        rates, _ = system.force_rates(x, v, w, closing=bool(self.L.any()), controlled=False)
         dN, dM, dS, _ = system.split(rates)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         kernels.stretching_force_rates(x, v, e.triangles, self.N, dN, f)

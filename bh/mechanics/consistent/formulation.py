@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.formulations.remarks import Remark
 from bh.formulations.state import Energy, State
 from bh.loading.load_step import LoadStep
-from bh.mechanics.bars_and_hinges.formulation import to_triangles
+from bh.mechanics.consistent import remarks
+from bh.mechanics.consistent.derivatives import ConsistentDerivatives
 from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.system import ConsistentSystem
+from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.model.model import Model
 from bh.model.refinement import Refinement
@@ -53,6 +56,14 @@ class Consistent:
     ) -> Array:
         """Unknowns of the half from those of the whole sheet."""
         return _unknowns(half, whole.positions(q, lam), lam)
+
+    def derivatives(self, system: ConsistentSystem, q: Array, lam: float) -> ConsistentDerivatives:
+        """Derivatives of a system by its element data at unknowns q (size,)."""
+        return ConsistentDerivatives(system, q, lam)
+
+    def remarks(self, model: Model) -> tuple[Remark, ...]:
+        """What to know of the mesh and the loads of a model; empty where there is nothing to say."""
+        return remarks.remarks(model)
 
     def observe(
         self,
@@ -95,7 +106,7 @@ class Consistent:
             energy_density={
                 "stretching": stretching / mesh.areas,
                 "bending": bending / mesh.areas,
-                "folding": to_triangles(model, folding, topology.hinge_edges[e.springs]),
+                "folding": to_triangles(mesh, folding, topology.hinge_edges[e.springs]),
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable,

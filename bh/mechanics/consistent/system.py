@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
 from bh.mechanics.consistent import kernels, setup
-from bh.mechanics.consistent.derivatives import ConsistentDesign
 from bh.mechanics.consistent.elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent.sparsity import rotation_pattern
 from bh.mechanics.shared import penetration as closings
@@ -22,7 +21,7 @@ from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.mechanics.shared.sparsity import Pattern
 from bh.model.model import Model
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
-from bh.solvers.system import Evaluation
+from bh.solvers.system import Evaluation, Tangent
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
@@ -30,6 +29,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ROUNDING = 8.0 * np.finfo(float).eps
+
+
+class Solver(Protocol):
+    """A factorised matrix."""
+
+    def solve(self, b: Array) -> Array:
+        """x with A x = b, both (n,)."""
+        ...
 
 
 class ElementForces(NamedTuple):
@@ -93,8 +100,6 @@ class ConsistentSystem(SupportedSheet):
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
-        self._tangent_at = mesh.points
-        self._closing = False
         self._frame_of = np.append(self.constraints.frame_of, -1)
 
     # ------------------------------------------------------------------------------- unknowns and positions
@@ -117,8 +122,9 @@ class ConsistentSystem(SupportedSheet):
         return np.asarray(-self._rotation_factor.solve(r)) if np.abs(r).max(initial=0.0) > 0.0 else r
 
     @cached_property
-    def _rotation_factor(self) -> Any:
-        return sp.linalg.splu(self.rotation_stiffness())
+    def _rotation_factor(self) -> Solver:
+        factor: Solver = sp.linalg.splu(self.rotation_stiffness())
+        return factor
 
     def rotation_stiffness(self) -> sp.csc_matrix:
         """Hessian of the energy in the rotations alone, which does not depend on anything."""
@@ -222,7 +228,8 @@ class ConsistentSystem(SupportedSheet):
         spring = (e.spring_stiffness / height.min()).max(initial=0.0)
         return float(stretch), float(max(bend, spring))
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, joined, pattern = self.elements, self.elements.patches, self._pattern
         x = self.positions(q, lam)
         N, M, S, L = self.split(forces)
@@ -240,10 +247,14 @@ class ConsistentSystem(SupportedSheet):
             self.rigid_contact.tangent(x, lam, *axes, pattern.slots[0], data)
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
-        self._closing = bool(closing)
-        self._tangent_at = x
-        if not self.constraints.rigid_body:
-            return pattern.matrix(data)
+        matrix: Matrix = pattern.matrix(data)
+        if self.constraints.rigid_body:
+            matrix = self._free_body(x, data)
+        return Tangent(matrix, partial(self._predicted_forces, x, bool(closing)))
+
+    def _free_body(self, x: Array, data: Array) -> FreeBodyMatrix:
+        """The matrix of `data` where rigid motions are left free at positions x; grounds one triangle in `data`."""
+        pattern = self._pattern
         rigid = self.displacements.rigid(x)
         Z = np.vstack((rigid, np.zeros((self.size - self.moving, rigid.shape[1]))))
         block = self.displacements.grounding(rigid, self._scale)
@@ -265,12 +276,12 @@ class ConsistentSystem(SupportedSheet):
         ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
         return rotation_pattern(self.mesh, self.elements, self.displacements, ground)
 
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
-        v = self.vectors(dq)
-        rates, _ = self._force_rates(self._tangent_at, v, dq[self.moving :], self._closing, controlled=False)
+    def _predicted_forces(self, x: Array, closing: bool, forces: Array, dq: Array) -> Array:
+        """Element forces after an increment dq (size,) from positions x with `forces`, linear in dq."""
+        rates, _ = self.force_rates(x, self.vectors(dq), dq[self.moving :], closing, controlled=False)
         return forces + rates
 
-    def _force_rates(
+    def force_rates(
         self, x: Array, v: Array, w: Array, closing: bool, controlled: bool
     ) -> tuple[Array, Array]:
         """Rates of the element forces and of the springs' turns for velocities v (n, 3) and w (rotations,) at x.
@@ -312,7 +323,7 @@ class ConsistentSystem(SupportedSheet):
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         v = self.displacements.prescribed_motion
-        rates, turns = self._force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
+        rates, turns = self.force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
         kernels.stretching_force_rates(x, v, e.triangles, N, dN, f)
@@ -356,7 +367,3 @@ class ConsistentSystem(SupportedSheet):
             else self.rigid_contact.control_stiffness(self.positions(q, lam), lam)
         )
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more
-
-    def design(self, q: Array, lam: float) -> ConsistentDesign:
-        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
-        return ConsistentDesign(self, q, lam)

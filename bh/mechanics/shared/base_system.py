@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.formulations.state import State
-from bh.loading.load_step import LoadStep
+from bh.loading.load_step import LoadStep, crease_hinges
 from bh.mechanics.shared import penetration as closing
 from bh.mechanics.shared.contact import RigidContact
 from bh.mechanics.shared.displacements import Displacements
-from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.mechanics.shared.motions import describe_motion
+from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.model.laws import PRESCRIBED
 from bh.model.model import Model
-from bh.model.supports import TURNED
+from bh.model.supports import MOTIONS, TURNED, rigid_motions
 from bh.solvers.system import System, grows_ahead
+from meshes import SheetMesh
 
 if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
@@ -106,3 +106,28 @@ class SupportedSheet:
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))
+
+
+def describe_motion(mesh: SheetMesh, x: Array, motion: Array) -> str:
+    """What moves in `motion` (n, 3) at positions x (n, 3): the whole sheet, a crease, or a few nodes.
+
+    A clause such as "crease 'a' turns" to be followed by how.
+    """
+    size = float(np.linalg.norm(motion))
+    if size == 0.0:
+        return "nothing moves"
+    rigid = rigid_motions(x)
+    rigid /= np.linalg.norm(rigid, axis=0)
+    share, *_ = np.linalg.lstsq(rigid, motion.ravel() / size, rcond=None)
+    if float(np.linalg.norm(rigid @ share)) > 0.99:
+        named = " and ".join(MOTIONS[k] for k in np.flatnonzero(np.abs(share) > 0.3 * np.abs(share).max()))
+        return f"the whole sheet moves ({named})"
+    hinges = mesh.topology.hinges
+    turn = np.einsum("hk,hk->h", dihedral_gradients(x, hinges), motion[hinges].reshape(-1, 12))
+    total = float(turn @ turn)
+    for crease in mesh.creases:
+        if float((turn[crease_hinges(mesh, crease)] ** 2).sum()) > 0.5 * total:
+            return f"crease '{crease}' turns"
+    node = int(np.argmax(np.linalg.norm(motion, axis=1)))
+    at = ", ".join(f"{c:.4g}" for c in x[node])
+    return f"node {node} at ({at}) moves with its neighbours"

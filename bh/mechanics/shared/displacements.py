@@ -115,7 +115,7 @@ class Displacements:
     @cached_property
     def ground_numbers(self) -> Ints:
         """(9,) unknowns of that triangle, -1 where prescribed."""
-        return self.number[self.mesh.triangles[self.ground_triangle]].ravel()
+        return np.asarray(self.number[self.mesh.triangles[self.ground_triangle]].ravel())
 
     def grounding(self, Z: Array, stiffness: float) -> Array:
         """(9, 9) stiffness (N/mm) of that triangle against the rigid motions Z and nothing else."""

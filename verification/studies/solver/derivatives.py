@@ -126,10 +126,10 @@ def differences(system, q: Array, lam: float, rng: np.random.Generator) -> dict[
         return float(np.abs(exact - fd).max() / max(np.abs(exact).max(), 1e-300))
 
     now = system.evaluate(q, lam)
-    tangent = system.tangent(q, lam, now.forces)
+    matrix = system.tangent(q, lam, now.forces).matrix
     return {
         "residual": relative(now.residual @ v, along(lambda a, b: system.evaluate(a, b).energy)),
-        "tangent": relative(tangent @ v, along(lambda a, b: system.evaluate(a, b).residual)),
+        "tangent": relative(matrix @ v, along(lambda a, b: system.evaluate(a, b).residual)),
         "control rate": relative(
             system.control_rate(q, lam), along(lambda a, b: system.evaluate(a, b).residual, "lambda")
         ),
@@ -141,11 +141,11 @@ def differences(system, q: Array, lam: float, rng: np.random.Generator) -> dict[
 def prediction_ratio(system, q: Array, lam: float) -> float:  # type: ignore[no-untyped-def]
     """Error of the predicted element forces for an increment over that for half of it: 4 if they are first order."""
     now = system.evaluate(q, lam)
-    system.tangent(q, lam, now.forces)
+    tangent = system.tangent(q, lam, now.forces)
     v = np.random.default_rng(4).normal(size=system.size)
     errors = []
     for step in (2e-3, 1e-3):
-        ahead = system.predicted_forces(now.forces, step * v)
+        ahead = tangent.predicted_forces(now.forces, step * v)
         errors.append(float(np.abs(ahead - system.evaluate(q + step * v, lam).forces).max()))
     return errors[0] / errors[1]
 

@@ -67,7 +67,7 @@ def euler_buckling(result: CaseResult) -> Found:
         for _ in range(30):
             lam = 0.5 * (low + high)
             q = lam * in_plane
-            _, negative = system.tangent(q, lam, system.evaluate(q, lam).forces).factorise_any()
+            _, negative = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix.factorise_any()
             state = form.observe(model, system, q, lam)
             force = -float(state.reaction("edge:end")[0])
             low, high = (lam, high) if negative == 0 else (low, lam)

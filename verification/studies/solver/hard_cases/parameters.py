@@ -62,7 +62,7 @@ def condition_number(path: Path) -> float:
     form = formulation(model.formulation)
     system = form.system(model, load_steps(model)[-1], None)
     q, lam = path.records[-1].q, path.records[-1].lam
-    tangent = system.tangent(q, lam, system.evaluate(q, lam).forces)
+    tangent = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
     n = len(q)
     # a fixed start keeps the figure the same from run to run
     options: dict[str, Any] = {"k": 1, "return_eigenvectors": False, "v0": np.ones(n), "tol": 1e-4}
