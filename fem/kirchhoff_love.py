@@ -19,6 +19,7 @@ from bh.model.sheet import Sheet
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
+from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
 from fem.loads import EdgeMoments
 from fem.observables import observe
@@ -120,7 +121,7 @@ def _follow(
             states.append(shell.observe(model, system, begin.q, 0.0))
         for increment in walk(Walk(system, strategy, (begin,))):
             increments.append(increment)
-            if increment.outcome != "reached":
+            if increment.outcome != Outcome.REACHED:
                 return states, increments
             at = increment.point
             states.append(shell.observe(model, system, at.q, at.lam, step, increment.stable))

@@ -12,7 +12,7 @@ from bh.model.model import Model
 from bh.model.sheet import Sheet
 from bh.paths.path import Path
 from bh.solvers.linear import linear_response
-from bh.solving.follow import trace
+from bh.solving.trace import trace
 
 
 def warm_up() -> None:

@@ -20,7 +20,7 @@ from bh.model.pinch import Pinch
 from bh.model.sheet import Sheet
 from bh.model.step import Actuation
 from bh.paths.path import Path
-from bh.solving.follow import trace
+from bh.solving.trace import trace
 from meshes import SheetMesh, parallel_creases, structured
 
 Array = NDArray[np.float64]
@@ -163,7 +163,7 @@ def simulate(
         DesignError: the path ended early.
     """
     path = trace(model(k0, lengths, pinched, setting))
-    if path.outcome != "reached":
+    if not path.reached:
         raise DesignError(f"the strip cannot be folded and pinched: {path.outcome} ({path.reason})")
     start, end = frames(path[-1])
     t, r = relative(start, end)

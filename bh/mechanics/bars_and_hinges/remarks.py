@@ -90,7 +90,7 @@ def _twisted(model: Model) -> Remark | None:
 
 
 def _pinched(model: Model) -> Remark | None:
-    if not any(isinstance(item, Pinch) for step in model.steps for item in step):
+    if not any(isinstance(item, Pinch) for step in model.steps for item in step.actuations):
         return None
     return Remark(
         "pinch",
