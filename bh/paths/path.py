@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,10 @@ from numpy.typing import NDArray
 from bh.formulations.protocols import Formulation, SheetSystem
 from bh.formulations.registry import checked_system, formulation, remarks
 from bh.formulations.state import State
-from bh.formulations.symmetry_reduction import Half, Halves
 from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd, open_ends
-from bh.loading.symmetry import Plane
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
-from bh.paths.estimate import Accuracy
 from bh.paths.provenance import provenance_of
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
@@ -28,6 +25,11 @@ from bh.runtime import viewer
 from bh.solvers.increments import ARC, CriticalPoint
 from bh.solvers.outcome import Outcome
 from meshes.mesh import count
+
+if TYPE_CHECKING:
+    from bh.formulations.symmetry_reduction import Half, Halves
+    from bh.loading.symmetry import Plane
+    from bh.paths.estimate import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -53,6 +55,8 @@ class Path:
         self._load_steps: tuple[LoadStep, ...] = load_steps(model)
         self._halves: Halves | None = None
         if symmetry is not None:
+            from bh.formulations.symmetry_reduction import Halves
+
             self._halves = Halves(self._formulation, model, self._load_steps, symmetry)
         self._systems: dict[int, SheetSystem] = {}
         self._states: dict[int, State] = {}

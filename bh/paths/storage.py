@@ -22,7 +22,9 @@ from bh.errors import InputError, PathFileError
 from bh.model.serialise import AnyArray
 
 Array = NDArray[np.float64]
-FORMAT = 2  # of the tables; raised with every change
+FORMAT = (
+    3  # of the tables and of the model in them; raised with every change. Format 2 is that of version 0.1
+)
 SCHEMA = """
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE arrays (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL, data BLOB NOT NULL);
@@ -138,7 +140,8 @@ class PathFile:
         if found != FORMAT:
             db.close()
             raise PathFileError(
-                f"'{file}' was written by another version (format {found}, this one reads {FORMAT}); run it again"
+                f"'{file}' was written by another version (format {found}, this one reads {FORMAT}); make it anew from its "
+                "scene: bh run SCENE, or bh.trace(model, file=...)"
             )
         return cls(file, db)
 

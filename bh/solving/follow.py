@@ -6,11 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 from bh.errors import ModelError, PathFileError
 from bh.formulations.observables import measure
-from bh.formulations.symmetry_reduction import Half
-from bh.loading.symmetry import Plane
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
 from bh.paths.path import Path, new_file
@@ -22,6 +21,10 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.increments import LOAD, Point, point
 from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
+
+if TYPE_CHECKING:
+    from bh.formulations.symmetry_reduction import Half
+    from bh.loading.symmetry import Plane
 
 
 def follow(
