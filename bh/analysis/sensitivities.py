@@ -65,6 +65,15 @@ class Situation:
     """A solved state with its factorised tangent: what observables are read from."""
 
     def __init__(self, path: Path, index: int) -> None:
+        """Factorise the tangent of a state.
+
+        Args:
+            path: solved.
+            index: of the state, at the end of a step (in the first step any).
+
+        Raises:
+            ModelError: the state or its formulation has no sensitivities; one line says why.
+        """
         self.path, self.model = path, path.model
         self.system, record = path.solved(index)
         form = formulation(path.model.formulation)
@@ -147,9 +156,13 @@ class Situation:
 class Observable(Protocol):
     """A number that is read from a state."""
 
-    def value(self, at: Situation) -> float: ...
+    def value(self, at: Situation) -> float:
+        """The number itself."""
+        ...
 
-    def slope(self, at: Situation) -> Slope: ...
+    def slope(self, at: Situation) -> Slope:
+        """Its derivatives."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -170,9 +183,11 @@ class Position:
         return forces
 
     def value(self, at: Situation) -> float:
+        """Mean coordinate along the direction, mm."""
         return float(np.vdot(self.forces(at), at.state.points))
 
     def slope(self, at: Situation) -> Slope:
+        """Unit force along the direction."""
         return Slope(self.forces(at), np.zeros(len(at.q) - at.moving), {})
 
 
@@ -183,13 +198,20 @@ class Energy:
     kind: str = "total"
 
     def __post_init__(self) -> None:
+        """See that the kind is known.
+
+        Raises:
+            ModelError: it is not.
+        """
         if self.kind not in ("total", *KINDS):
             raise ModelError(f"energy '{self.kind}' is not known; use total, {', '.join(KINDS)}")
 
     def value(self, at: Situation) -> float:
+        """Energy of the kind, N mm."""
         return float(getattr(at.state.energy, self.kind))
 
     def slope(self, at: Situation) -> Slope:
+        """Forces and moments of the kind, and what its data do to it."""
         kinds = KINDS if self.kind == "total" else (self.kind,)
         points, other = at.derivatives.energy_gradient(kinds)
         return Slope(points, other, at.derivatives.energy_to_data(kinds))
@@ -211,9 +233,11 @@ class FoldAngle:
         return hinges[[self.edge]]
 
     def value(self, at: Situation) -> float:
+        """Mean fold angle, rad; mountain positive."""
         return float(np.pi - at.state.dihedral_angles[self._hinges(at)].mean())
 
     def slope(self, at: Situation) -> Slope:
+        """Gradients of the angle, rad / mm."""
         hinges = self._hinges(at)
         return Slope(*at.derivatives.angle_gradient(hinges, np.full(len(hinges), -1.0 / len(hinges))))
 
@@ -225,9 +249,15 @@ class OfPoints:
     function: Callable[[Array], tuple[float, Array]]
 
     def value(self, at: Situation) -> float:
+        """What the function gives."""
         return float(self.function(at.state.points)[0])
 
     def slope(self, at: Situation) -> Slope:
+        """The gradient that the function gives.
+
+        Raises:
+            ModelError: it is not of the shape of the points.
+        """
         gradient = np.asarray(self.function(at.state.points)[1], dtype=float)
         if gradient.shape != at.state.points.shape:
             raise ModelError(
@@ -247,9 +277,11 @@ class OfNodes:
     function: Callable[[Any], Any]
 
     def value(self, at: Situation) -> float:
+        """What the function gives."""
         return float(np.real(self.function(at.state.points[list(self.nodes)])))
 
     def slope(self, at: Situation) -> Slope:
+        """The gradient of the function by a complex step, exact to rounding."""
         places = at.state.points[list(self.nodes)]
         points = np.zeros_like(at.state.points)
         for i, node in enumerate(self.nodes):
@@ -277,6 +309,7 @@ class Stiffness:
         return 1.0 / float(load @ w), w
 
     def value(self, at: Situation) -> float:
+        """Stiffness, N / mm."""
         return self._response(at)[0]
 
     def slope(self, at: Situation) -> Slope:

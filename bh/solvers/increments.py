@@ -74,10 +74,12 @@ class Increment:
 
     @property
     def negative(self) -> int | None:
+        """Number of negative modes of the state, None where that was not looked at."""
         return self.point.negative
 
     @property
     def stable(self) -> bool | None:
+        """True if no mode is negative, None where that was not looked at."""
         return None if self.negative is None else self.negative == 0
 
 

@@ -35,6 +35,13 @@ class RigidContact:
     """The indenters and tethers of one step on a mesh; positions x are (n, 3), mm."""
 
     def __init__(self, mesh: SheetMesh, items: tuple[Indenter | Tether, ...], start: Array) -> None:
+        """Points of the sheet that can touch, and the springs of tethers.
+
+        Args:
+            mesh: the stress-free sheet.
+            items: indenters and tethers of the step.
+            start: (n, 3) positions that tethers hold to, mm.
+        """
         self.triangles = mesh.triangles
         self.indenters = tuple(item for item in items if isinstance(item, Indenter))
         topology = mesh.topology
