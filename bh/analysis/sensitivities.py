@@ -8,8 +8,8 @@ supports), the design p behind them and an observable J, the adjoint a of the fa
 one solve for each observable and any number of design parameters. Here q are the places of the free nodes, with the
 edge rotations or moments that go with them: they stay while the stress-free sheet changes under them.
 
-K, a and both partial derivatives are exact (`bh.formulations.protocols.Derivatives`). dd/dp comes from the function that
-makes the model: central differences of sixth order of the element data. No solution and no residual is
+K, a and both partial derivatives are exact (`bh.formulations.protocols.Derivatives`). dd/dp comes from the function
+that makes the model: central differences of sixth order of the element data. No solution and no residual is
 differenced, only smooth closed formulas such as a length or E t^3 L^2 / (6 A). Their error is measured as the distance
 to differences of fourth order and reported (`Sensitivity.error`). Of a stiffness the derivative of K along the sheet's
 response is differenced as well. Where a pinch goes on from angles that the step before came to, the adjoint of that
@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -274,7 +274,7 @@ class OfNodes:
     """
 
     nodes: Sequence[int]
-    function: Callable[[Any], Any]
+    function: Callable[[NDArray[np.float64 | np.complex128]], complex]
 
     def value(self, at: Situation) -> float:
         """What the function gives."""
@@ -358,6 +358,7 @@ def of(
         path: solved, of `build(design)`.
         build: makes the model of a design (k,): geometry by a parametrised pattern and a mesh of fixed topology, sheet,
             creases, rest angles, forces, whatever a model has. It must be smooth near the design.
+        design: (k,) parameters of the solved path.
         observables: `Position`, `Energy`, `FoldAngle`, `Stiffness`, `OfPoints` or any `Observable`.
         index: of the state, at the end of a step (in the first step any).
         steps: (k,) of the differences, by default a thousandth of each parameter (0.001 where it is zero).

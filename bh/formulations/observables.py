@@ -41,6 +41,11 @@ class Until:
     tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
+        """See that the observable is known.
+
+        Raises:
+            ModelError: it is not, or a value, tolerance or place cannot be.
+        """
         if callable(self.observable):
             object.__setattr__(self, "observable", _importable(self.observable))
         if self.observable not in OBSERVABLES and ":" not in self.observable:
@@ -130,11 +135,11 @@ def _moved(state: State, of: str) -> Array:
 
 
 OBSERVABLES: dict[str, Observable] = {
-    "depth": lambda state, of: depth_of(state)[0],
-    "energy": lambda state, of: state.energy.total,
-    "stretching": lambda state, of: state.energy.stretching,
-    "bending": lambda state, of: state.energy.bending,
-    "folding": lambda state, of: state.energy.folding,
+    "depth": lambda state, _: depth_of(state)[0],
+    "energy": lambda state, _: state.energy.total,
+    "stretching": lambda state, _: state.energy.stretching,
+    "bending": lambda state, _: state.energy.bending,
+    "folding": lambda state, _: state.energy.folding,
     "fold_angle": lambda state, of: float(state.fold_angle(str(of)).mean()),
     "largest_fold": lambda state, of: float(np.abs(state.fold_angle(str(of))).max()),
     "dihedral": lambda state, of: float(state.dihedral(str(of)).mean()),
@@ -153,7 +158,7 @@ NEEDS = {
 
 
 def _importable(function: Callable[[State], float]) -> str:
-    """ "module:function" of a function, which must be found again in another process."""
+    """Name "module:function" of a function, which must be found again in another process."""
     module, name = getattr(function, "__module__", ""), getattr(function, "__qualname__", "")
     if getattr(import_module(module), name, None) is not function:
         raise ModelError(

@@ -74,7 +74,7 @@ class Path:
 
     @property
     def outcome(self) -> str:
-        """ "reached" if every step was; else the outcome of the first step that was not."""
+        """Whether all is solved: "reached" if every step was; else the outcome of the first step that was not."""
         for step in self.steps:
             if step.outcome != "reached":
                 return step.outcome

@@ -24,8 +24,13 @@ class IndefiniteError(ArithmeticError):
 
 
 class Descent(NamedTuple):
-    """A direction (n,), and the rate of change of the merit along its primal part (N mm, negative) once the multipliers
-    have been changed as it says."""
+    """A direction in which the merit falls.
+
+    Attributes:
+        direction: (n,) of the unknowns.
+        slope: rate of change of the merit along its primal part (N mm, negative) once the multipliers have been changed
+            as it says.
+    """
 
     direction: Array
     slope: float
@@ -35,7 +40,7 @@ class Factor(Protocol):
     """A factorised matrix (n, n)."""
 
     def solve(self, b: Array) -> Array:
-        """x with A x = b, b (n,) or (n, k)."""
+        """Solution x of A x = b, b (n,) or (n, k)."""
         ...
 
     def descend(self, residual: Array) -> Descent:

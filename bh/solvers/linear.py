@@ -17,7 +17,7 @@ class LinearSystem(System, Protocol):
     """A system that also knows its second derivative with respect to lambda."""
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q (n,), N mm."""
+        """Second derivative of the energy by lambda at fixed q (n,), N mm."""
         ...
 
 

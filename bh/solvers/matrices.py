@@ -80,7 +80,7 @@ class BandFactor(Factor):
     order: Ints
 
     def solve(self, b: Array) -> Array:
-        """x with A x = b, b (n,) or (n, k)."""
+        """Solution x of A x = b, b (n,) or (n, k)."""
         x, info = lapack.dpbtrs(self.ab, b[self.order], lower=1)
         if info != 0:
             raise ArithmeticError(f"LAPACK dpbtrs refused argument {-info}")
@@ -123,7 +123,7 @@ class BandLDLFactor(Factor):
     order: Ints
 
     def solve(self, b: Array) -> Array:
-        """x with A x = b, b (n,) or (n, k)."""
+        """Solution x of A x = b, b (n,) or (n, k)."""
         unit = {"uplo": "L", "diag": "U"}
         x, _ = lapack.dtbtrs(self.ab, b[self.order], trans="N", **unit)
         pivots = self.ab[0] if x.ndim == 1 else self.ab[0][:, None]
@@ -220,7 +220,7 @@ class FreeBodyFactor(Factor):
     weighted: Array  # W Z, which is Z itself without weights
 
     def solve(self, b: Array) -> Array:
-        """x with A x = b for the part of b (n,) that is in equilibrium, of least displacement."""
+        """Solution x of A x = b for the part of b (n,) that is in equilibrium, of least displacement."""
         x = self.factor.solve(b - self.weighted @ (self.Z.T @ b))
         return x - self.Z @ (self.weighted.T @ x)
 

@@ -90,7 +90,7 @@ class MultiplierMatrix:
     compliance: Array  # (c,) of the constraints, tiny: it decides between multipliers that do the same
 
     def factorise(self, shift: float = 0.0) -> MultiplierFactor | DenseSchurFactor:
-        """Factor of the saddle, with A + shift * diag(|A|); raises `IndefiniteError` where K is indefinite on G x = 0."""
+        """Factor of the saddle, with A + shift * diag(|A|); raises `IndefiniteError` where K is so on G x = 0."""
         try:
             return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma, self.compliance)
         except IndefiniteError:
@@ -138,7 +138,7 @@ class MultiplierFactor(Factor):
     tolerance: float = 1e-3
 
     def solve(self, b: Array) -> Array:
-        """x (n + c,) with the saddle times x = b (n + c,)."""
+        """Solution x (n + c,) of the saddle times x = b (n + c,)."""
         # second row times gamma G^T added to the first: A x + (1 - gamma c) G^T y = b_1 + gamma G^T b_2
         G, n = self.G, self.G.n
         # constraints that say the same (a straight crease between rigid panels) leave a rounding error that no
@@ -211,7 +211,7 @@ class DenseSchurFactor(Factor):
         )
 
     def solve(self, b: Array) -> Array:
-        """x (n + c,) with the saddle times x = b (n + c,)."""
+        """Solution x (n + c,) of the saddle times x = b (n + c,)."""
         n = self.G.n
         x = self.factor.solve(b[:n] + self.G.transpose_times(self.gamma * b[n:]))
         y = np.linalg.solve(self.schur, self.G.times(x) - b[n:])

@@ -243,7 +243,7 @@ class BarsAndHingesSystem(SupportedSheet):
         return rate
 
     def power(self, q: Array, lam: float) -> float:
-        """d energy / d lambda at fixed q (size,), N mm."""
+        """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
         e = self.elements
         x = self.positions(q, lam)
         _, _, f, _, turn = self.internal_forces(x, q, lam)
@@ -256,7 +256,7 @@ class BarsAndHingesSystem(SupportedSheet):
         return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         e = self.elements
         x = self.positions(q, lam)
         total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)

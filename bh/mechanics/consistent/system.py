@@ -35,7 +35,7 @@ class Solver(Protocol):
     """A factorised matrix."""
 
     def solve(self, b: Array) -> Array:
-        """x with A x = b, both (n,)."""
+        """Solution x of A x = b, both (n,)."""
         ...
 
 
@@ -361,7 +361,7 @@ class ConsistentSystem(SupportedSheet):
         return np.concatenate((self.displacements.components(f - self.force.rate), r))
 
     def power(self, q: Array, lam: float) -> float:
-        """d energy / d lambda at fixed q (size,), N mm."""
+        """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         _, M, S, _ = self.split(now.forces)
@@ -374,7 +374,7 @@ class ConsistentSystem(SupportedSheet):
         return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         v = self.displacements.prescribed_motion
         more = (
             0.0
