@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
-from bh.model.actuations import Ramp
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from fem.shell import edge_tangents
 from fem.spaces import tables
 from meshes.curved import ElementMesh

@@ -13,11 +13,13 @@ from bh.formulations.remarks import Remark
 from bh.formulations.state import State
 from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
 from bh.model.refinement import Refinement
+from bh.model.sheet import Sheet
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
+from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
 from fem.loads import EdgeMoments
 from fem.observables import observe
@@ -119,7 +121,7 @@ def _follow(
             states.append(shell.observe(model, system, begin.q, 0.0))
         for increment in walk(Walk(system, strategy, (begin,))):
             increments.append(increment)
-            if increment.outcome != "reached":
+            if increment.outcome != Outcome.REACHED:
                 return states, increments
             at = increment.point
             states.append(shell.observe(model, system, at.q, at.lam, step, increment.stable))

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.formulations.state import Energy
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from fem.shell import ShellElements
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients
 from fem.state import ShellState

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
-from bh.model.actuations import Ramp
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from bh.model.supports import TURNED, UNBALANCED
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.solvers.outcome import Outcome
 from bh.solvers.system import Evaluation, Tangent, grows_ahead
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
@@ -317,10 +318,10 @@ class ShellSystem:
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         return ""  # the shell knows no contact: its sides may pass through each other
 
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+    def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
         if not self.constraints.rigid_body or not (self.load.start.any() or self.load.end.any()):
-            return "", ""
-        return ("mechanism", TURNED) if grows_ahead(self, q, lam, self._unbalanced) else ("", "")
+            return None
+        return (Outcome.MECHANISM, TURNED) if grows_ahead(self, q, lam, self._unbalanced) else None
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         c = self.components

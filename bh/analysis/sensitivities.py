@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
-from bh.formulations.observables import until_of
 from bh.formulations.protocols import Data, Derivatives, Differentiable, SheetSystem
 from bh.formulations.registry import able, formulation
 from bh.formulations.state import State
@@ -86,7 +85,7 @@ class Situation:
                 f"the state at lambda {record.lam:.4g} of step {record.step + 1} depends on the step before; "
                 "take its end"
             )
-        if any(until_of(step) is not None for step in path.model.steps[: record.step + 1]):
+        if any(step.until is not None for step in path.model.steps[: record.step + 1]):
             raise ModelError(
                 "a step that ends where an observable has a value has no sensitivities; give it its end"
             )

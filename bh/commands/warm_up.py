@@ -8,10 +8,11 @@ import meshes
 from bh.analysis.contact import candidates
 from bh.analysis.triangles import intersecting
 from bh.formulations.registry import names
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from bh.paths.path import Path
 from bh.solvers.linear import linear_response
-from bh.solving.follow import trace
+from bh.solving.trace import trace
 
 
 def warm_up() -> None:

@@ -46,4 +46,4 @@ def folds(model: Model) -> bool:
 
 def loaded(model: Model) -> bool:
     """True if a step has forces or prescribed displacements."""
-    return any(isinstance(item, Force | Displace) for step in model.steps for item in step)
+    return any(isinstance(item, Force | Displace) for step in model.steps for item in step.actuations)

@@ -1,4 +1,4 @@
-"""What a step is made of for a formulation: ramps a hinge and a node, and what creases are called."""
+"""What a step is for a formulation: ramps of every hinge and node; and what creases are called in messages."""
 
 from __future__ import annotations
 
@@ -8,12 +8,38 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model.actuations import Array, Indenter, Ramp, Tether
 from bh.model.laws import PRESCRIBED, SHEET
-from bh.model.pinch import Pinched
+from bh.model.ramp import Ramp
+from bh.model.step import Body
 from bh.model.supports import Constraints
 from meshes import SheetMesh
 from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Pinched:
+    """Prescribed creases whose angles at the end of a step follow from those at its start.
+
+    Attributes:
+        toward: (m,) angle in the middle of the pinch, rad; nan where there is none.
+        base: (m,) angle that the pinch goes from, rad; nan where it is the one that the step begins with.
+        part: (m,) how far the edge goes from there to `toward`, and `ends` (m, 2) at its lower and its higher node.
+        present: (m,) what the steps before make of the angle at the start, rad, for the size of increments only.
+    """
+
+    toward: Array
+    base: Array
+    part: Array
+    ends: Array
+    present: Array
+
+    @classmethod
+    def none(cls, hinges: int) -> Pinched:
+        """No pinch on that many hinges."""
+        empty = np.full(hinges, np.nan)
+        return cls(empty, empty.copy(), np.zeros(hinges), np.zeros((hinges, 2)), np.full(hinges, np.pi))
 
 
 @dataclass(frozen=True)
@@ -44,7 +70,7 @@ class LoadStep:
     moment: Ramp
     force: Ramp
     constraints: Constraints
-    bodies: tuple[Indenter | Tether, ...] = ()
+    bodies: tuple[Body, ...] = ()
 
     def prescribed_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""

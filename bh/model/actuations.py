@@ -1,7 +1,7 @@
 """Actuations: what drives a sheet while the control parameter lambda runs from 0 to 1 in a step.
 
-All of them are data, and know what they ask of the hinges and nodes of a sheet (`apply`); `bh.loading.builder` makes load
-steps of it.
+All of them are data, and know what they ask of the hinges and nodes of a sheet (`apply`); `bh.loading.builder` makes
+load steps of it. The pinch has a module of its own, `bh.model.pinch`.
 """
 
 from __future__ import annotations
@@ -9,50 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.model.pinch import PROFILES, Profile, pinch
+from bh.model.step import Actuation, Body, StepBuilder
 from bh.model.supports import AXES, select
-
-if TYPE_CHECKING:
-    from bh.loading.builder import StepBuilder
 
 Array = NDArray[np.float64]
 Angles = float | Sequence[float]
-
-
-@dataclass(frozen=True)
-class Ramp:
-    """A value that goes linearly from `start` to `end`; both arrays of one shape."""
-
-    start: Array
-    end: Array
-
-    def at(self, lam: float) -> Array:
-        return (1.0 - lam) * self.start + lam * self.end
-
-    @property
-    def rate(self) -> Array:
-        return self.end - self.start
-
-
-class Actuation:
-    """What acts in a step. An actuation of your own derives from it and is a frozen dataclass of plain values
-    (docs/extending.md).
-    """
-
-    late: ClassVar[bool] = False  # applied after the others of its step, from where they lead
-
-    def prepare(self, builder: StepBuilder) -> None:
-        """Before the first step: springs that must be there from the start."""
-
-    def apply(self, builder: StepBuilder) -> None:
-        """What is asked for at the end of the step."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -150,87 +116,6 @@ class Fold(Actuation):
 
 
 @dataclass(frozen=True)
-class Pinch(Actuation):
-    """Close a crease that is folded already over a part of its length (source 5.3.2).
-
-    Along the pinched zone the dihedral angle goes from what it is to the pinched one by a profile (`bh.model.pinch`).
-    Outside of the zone, and in later steps, the crease stays what it was; `Fold` with the stiffness of its spring opens
-    a pinch again. In one step with the fold, the zone goes to where the fold would have brought it.
-
-    Attributes:
-        crease: its name, or "all" for every crease that is drawn as mountain or valley.
-        at: where the middle of the zone is, in parts of the crease's length from its start, 0 to 1.
-        to: dihedral angle in the middle, rad in (0, 2 pi).
-        by: fold angle in the middle instead, mountain or valley as drawn, rad in (0, pi). If neither is given it is
-            pi - pi / 14, the source's pinch.
-        length: of the zone along the crease, mm; a fifth of the crease if not given.
-        how: "imposed" holds the angles of the zone exactly. "rest" only sets the rest angles of the crease's spring,
-            which the sheet resists: with the source's L* of 0.5 and 2 mm such a pinch stops far above its angle.
-            "couple" lets closing couples act over the zone, spread by the profile, which grow until the angle is
-            reached somewhere in it (`Model.pinch`; alone, or without such an `Until`, they grow to their end).
-        profile: "cosine", or "grip" for the pinched angle all over the zone.
-        couple: with "couple" the largest one a length in the middle, N mm / mm; more than the pinch needs.
-    """
-
-    crease: str
-    at: float = 0.5
-    to: float | None = None
-    by: float | None = None
-    length: float | None = None
-    how: Literal["imposed", "rest", "couple"] = "imposed"
-    profile: Profile = "cosine"
-    couple: float | None = None
-
-    def __post_init__(self) -> None:
-        what = f"pinch of crease '{self.crease}'"
-        if self.to is not None and self.by is not None:
-            raise ModelError(f"{what} has to and by; give one of them")
-        for key, low, high in (("to", 0.0, 2.0 * math.pi), ("by", 0.0, math.pi)):
-            value = getattr(self, key)
-            if value is not None and not low < value < high:
-                hint = "; angles are radians, not degrees" if abs(value) > 7.0 else ""
-                raise ModelError(
-                    f"{what}: {key} = {value} rad closes it beyond what it can; stay inside ({low:g}, {high:.4g}){hint}"
-                )
-        if not 0.0 <= self.at <= 1.0:
-            raise ModelError(
-                f"{what}: at = {self.at} is outside the crease; give a part of its length, 0 to 1"
-            )
-        if self.length is not None and not (math.isfinite(self.length) and self.length > 0.0):
-            raise ModelError(f"{what}: length = {self.length} cannot be; give a positive length in mm")
-        for key, known in (("how", ("imposed", "rest", "couple")), ("profile", tuple(PROFILES))):
-            if getattr(self, key) not in known:
-                raise ModelError(
-                    f"{what}: {key} = '{getattr(self, key)}' is not known; use {' or '.join(known)}"
-                )
-
-        if (self.how == "couple") != (self.couple is not None):
-            raise ModelError(
-                f"{what}: couple goes with how = 'couple', and only with it; give both or neither"
-            )
-        if self.couple is not None and not (math.isfinite(self.couple) and self.couple > 0.0):
-            raise ModelError(f"{what}: couple = {self.couple} cannot be; give a positive number in N mm / mm")
-
-    def target(self, sense: Array) -> Array:
-        """(k,) dihedral angles in the middle, rad, for edges drawn as mountain (+1) or valley (-1)."""
-        if self.to is not None:
-            return np.full(len(sense), float(self.to))
-        return np.asarray(math.pi - sense * self.fold)
-
-    @property
-    def fold(self) -> float:
-        """Size of the fold angle in the middle, rad."""
-        if self.to is not None:
-            return abs(math.pi - self.to)
-        return math.pi - math.pi / 14.0 if self.by is None else self.by
-
-    late: ClassVar[bool] = True
-
-    def apply(self, builder: StepBuilder) -> None:
-        pinch(builder, self)
-
-
-@dataclass(frozen=True)
 class Moment(Actuation):
     """A dead couple a length on a crease, N mm / mm; positive folds the crease the way that it is drawn."""
 
@@ -299,7 +184,7 @@ class Displace(Actuation):
 
 
 @dataclass(frozen=True)
-class Indenter(Actuation):
+class Indenter(Body):
     """A rigid body that presses on the sheet, without friction, in the step that names it.
 
     Its section is a rectangle with rounded edges, its axis as long as it needs to be. Indenters take the place of the
@@ -339,9 +224,6 @@ class Indenter(Actuation):
                 f"indenter '{self.name}': its radius {self.radius:g} mm is more than half of its section"
             )
 
-    def apply(self, builder: StepBuilder) -> None:
-        builder.attach(self)
-
     @property
     def half(self) -> tuple[float, float]:
         """Half the width and height between the centres of the rounded edges, mm."""
@@ -360,7 +242,7 @@ class Indenter(Actuation):
 
 
 @dataclass(frozen=True)
-class Tether(Actuation):
+class Tether(Body):
     """Soft springs that hold nodes where the step begins; they share the `total` stiffness along x, y and z, N/mm."""
 
     at: str | Sequence[int]
@@ -370,9 +252,6 @@ class Tether(Actuation):
         _vector(f"tether at '{self.at}'", self.total)
         if min(self.total) < 0.0:
             raise ModelError(f"tether at '{self.at}': {self.total} cannot be; stiffness is not negative")
-
-    def apply(self, builder: StepBuilder) -> None:
-        builder.attach(self)
 
 
 def _finite(what: str, values: Sequence[float]) -> None:

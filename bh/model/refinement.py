@@ -124,7 +124,7 @@ def pattern_of(model: Model) -> CreasePattern:
         if isinstance(support, Support):
             _check_place(support.at, f"supports[{number}]")
     for number, step in enumerate(model.steps):
-        for item in step:
+        for item in step.actuations:
             where = f"steps[{number}].{type(item).__name__.lower()}"
             _check_actuation(model, item, where)
     return pattern

@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import PathFileError
-from bh.formulations.observables import Until
-from bh.model.actuations import Actuation, Displace, Fold, Force, Indenter, Moment, Pinch, Tether
-from bh.model.model import CreaseLaw, ElementStiffness, Model, Sheet
+from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
+from bh.model.model import Model
+from bh.model.pinch import Pinch
 from bh.model.plugins import named
+from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
+from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support
+from bh.model.until import Until
 from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
@@ -29,13 +32,8 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "displace": Displace,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
-STEP_ITEMS: dict[str, type[Actuation | Until]] = {
-    **ACTUATIONS,
-    "indenter": Indenter,
-    "tether": Tether,
-    "until": Until,
-}
-FORMAT = 1
+STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether}
+FORMAT = 2  # raised with every change of the description
 
 
 def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
@@ -64,7 +62,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         },
         "supports": [_support(s) for s in model.supports],
         "creases": {name: _plain(law) for name, law in model.creases.items()},
-        "steps": [[_tagged(item, STEP_ITEMS) for item in step] for step in model.steps],
+        "steps": [_step(step) for step in model.steps],
     }
     return data, arrays
 
@@ -94,7 +92,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             mesh=mesh,
             sheet=Sheet(**data["sheet"]),
             supports=tuple(_constraint(s) for s in data["supports"]),
-            steps=tuple(tuple(_untagged(item, STEP_ITEMS) for item in step) for step in data["steps"]),
+            steps=tuple(_stored_step(step) for step in data["steps"]),
             creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
             formulation=data["formulation"],
             stiffness=ElementStiffness(arrays["stiffness/bars"], arrays["stiffness/hinges"], data["green"])
@@ -138,6 +136,18 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
         return kinds[data["kind"]](**rest)
     lists = {key: tuple(value) if isinstance(value, list) else value for key, value in rest.items()}
     return named(data["kind"])(**lists)
+
+
+def _step(step: Step) -> dict[str, Any]:
+    return {
+        "actuations": [_tagged(item, STEP_ITEMS) for item in step.actuations],
+        "until": None if step.until is None else _plain(step.until),
+    }
+
+
+def _stored_step(data: Mapping[str, Any]) -> Step:
+    until = None if data["until"] is None else Until(**data["until"])
+    return Step(tuple(_untagged(item, STEP_ITEMS) for item in data["actuations"]), until)
 
 
 def _support(item: Constraint) -> Any:

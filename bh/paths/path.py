@@ -6,29 +6,28 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.formulations.observables import until_of
 from bh.formulations.protocols import Formulation, SheetSystem
 from bh.formulations.registry import checked_system, formulation, remarks
 from bh.formulations.state import State
+from bh.formulations.symmetry_reduction import Half, Halves
 from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd, open_ends
+from bh.loading.symmetry import Plane
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
+from bh.paths.estimate import Accuracy
 from bh.paths.provenance import provenance_of
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
+from bh.runtime import viewer
 from bh.solvers.increments import ARC, CriticalPoint
+from bh.solvers.outcome import Outcome
 from meshes.mesh import count
-
-if TYPE_CHECKING:
-    from bh.formulations.symmetry_reduction import Half, Halves
-    from bh.loading.symmetry import Plane
-    from bh.solving.accuracy import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -43,7 +42,7 @@ class Path:
     """
 
     def __init__(
-        self, model: Model, provenance: dict[str, Any] | None = None, symmetry: Plane | None = None
+        self, model: Model, provenance: dict[str, object] | None = None, symmetry: Plane | None = None
     ) -> None:
         """An empty path of a model.
 
@@ -64,8 +63,6 @@ class Path:
         self._load_steps: tuple[LoadStep, ...] = load_steps(model)
         self._halves: Halves | None = None
         if symmetry is not None:
-            from bh.formulations.symmetry_reduction import Halves
-
             self._halves = Halves(self._formulation, model, self._load_steps, symmetry)
         self._systems: dict[int, SheetSystem] = {}
         self._states: dict[int, State] = {}
@@ -73,17 +70,22 @@ class Path:
     # ------------------------------------------------------------------------------- reading
 
     @property
-    def outcome(self) -> str:
-        """Whether all is solved: "reached" if every step was; else the outcome of the first step that was not."""
+    def outcome(self) -> Outcome:
+        """Outcome.REACHED if every step was; else the outcome of the first step that was not."""
         for step in self.steps:
-            if step.outcome != "reached":
+            if not step.reached:
                 return step.outcome
-        return "reached" if len(self.steps) == len(self.model.steps) else "unfinished"
+        return Outcome.REACHED if len(self.steps) == len(self.model.steps) else Outcome.UNFINISHED
+
+    @property
+    def reached(self) -> bool:
+        """Was every step reached?"""
+        return self.outcome is Outcome.REACHED
 
     @property
     def reason(self) -> str:
         """Why the path ended early, or an empty string."""
-        return next((step.reason for step in self.steps if step.outcome != "reached"), "")
+        return next((step.reason for step in self.steps if not step.reached), "")
 
     @property
     def stable(self) -> bool | None:
@@ -147,7 +149,7 @@ class Path:
 
     def __repr__(self) -> str:
         """One line: "Path(reached, 6 states, 16 iterations, 1 of 1 step)"."""
-        reached = sum(step.outcome == "reached" for step in self.steps)
+        reached = sum(step.reached for step in self.steps)
         return (
             f"Path({self.outcome}, {count(len(self), 'state')}, {count(self.iterations, 'iteration')}, "
             f"{reached} of {count(len(self.model.steps), 'step')})"
@@ -185,9 +187,7 @@ class Path:
 
     def plot(self, **options: Any) -> Any:
         """Show the last state as a picture; options of `bh.plotting.show`."""
-        from bh.plotting.pictures import show
-
-        return show(self[-1], **options)
+        return viewer.show(self, **options)
 
     # ------------------------------------------------------------------------------- files
 
@@ -218,7 +218,9 @@ class Path:
             for row in source.states():
                 path.records.append(Record.of_row(row))
             ends = source.steps()
-            path.steps = [StepOutcome(*ends[step]) for step in sorted(ends)]
+            path.steps = [
+                StepOutcome(Outcome(end), reason, lost) for _, (end, reason, lost) in sorted(ends.items())
+            ]
         return path
 
     def _row(self, index: int, record: Record) -> StateRow:
@@ -235,7 +237,7 @@ class Path:
     def _system(self, step: int) -> SheetSystem:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
-            if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
+            if any(each.until is not None for each in self.model.steps[:step]):
                 self._load_steps = load_steps(self.model, self._ended(step))
             made = self._formulation.system(self.model, self._load_steps[step], self._start(step))
             self._systems[step] = checked_system(made, self.model.formulation)
@@ -257,7 +259,7 @@ class Path:
         last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
         found = {}
         for step, index in last.items():
-            if until_of(self.model.steps[step]) is not None and self.records[index].lam < 1.0:
+            if self.model.steps[step].until is not None and self.records[index].lam < 1.0:
                 state = self[index]
                 found[step] = StepEnd(state.lam, state.points, state.dihedral_angles)
         return found

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.formulations.symmetry_reduction import Half
 from bh.paths.storage import StateRow
-from bh.solvers.increments import LOAD, CriticalPoint
-
-if TYPE_CHECKING:
-    from bh.formulations.symmetry_reduction import Half
+from bh.solvers.increments import LOAD, CriticalPoint, Mode
+from bh.solvers.outcome import Critical, Outcome
 
 Array = NDArray[np.float64]
 
@@ -21,9 +19,14 @@ Array = NDArray[np.float64]
 class StepOutcome:
     """How one step ended: "reached", or why not, with one line of reason."""
 
-    outcome: str
+    outcome: Outcome
     reason: str = ""
     iterations: int = 0  # of the increment that failed
+
+    @property
+    def reached(self) -> bool:
+        """Was the end of the step reached?"""
+        return self.outcome is Outcome.REACHED
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +45,7 @@ class Record:
     wall_time_s: float
     next_increment: float
     negative: int | None = None
-    mode: str = LOAD
+    mode: Mode = LOAD
     note: str = ""
     cuts: tuple[str, ...] = ()
     jumped: bool = False
@@ -53,8 +56,10 @@ class Record:
         """The record that a path file has stored as a row."""
         return cls(
             row.step, row.lam, row.q, row.iterations, row.imbalance, row.wall_time_s, row.next_increment,
-            negative=row.negative, mode=row.mode, note=row.note, cuts=row.cuts, jumped=row.jumped,
-            critical=tuple(CriticalPoint(c.kind, c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical),
+            negative=row.negative, mode=Mode(row.mode), note=row.note, cuts=row.cuts, jumped=row.jumped,
+            critical=tuple(
+                CriticalPoint(Critical(c.kind), c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical
+            ),
         )  # fmt: skip
 
     def of_whole(self, half: Half) -> Record:

@@ -14,16 +14,18 @@ from typing import Any
 import numpy as np
 
 from bh.errors import InputError, SceneError
-from bh.formulations.observables import Until
 from bh.formulations.registry import formulation, names
 from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
-from bh.model.actuations import Actuation, Displace, Force
-from bh.model.model import CreaseLaw, Model, Sheet
+from bh.model.actuations import Displace, Force
+from bh.model.model import Model
 from bh.model.plugins import made
 from bh.model.refinement import Goal, pattern_of
 from bh.model.serialise import ACTUATIONS as MAKERS
+from bh.model.sheet import CreaseLaw, Sheet
+from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support, directions, select
+from bh.model.until import Until
 from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
 from bh.scene.reading import (
     as_table,
@@ -366,19 +368,20 @@ def _crease(item: Any, at: str) -> CreaseLaw:
         return CreaseLaw(table.Lstar, table.stiffness, table.rest)
 
 
-def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
+def _step(item: Any, at: str) -> Step:
     step = as_table(item, at)
     check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTUATIONS, "until"))
     if not set(step) - {"until"}:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
-    found: list[Actuation | Until] = []
+    found: list[Actuation] = []
+    until = None
     for key, value in step.items():
         if key == "until":
-            found.append(_until(value, f"{at}.until"))
+            until = _until(value, f"{at}.until")
             continue
         for where, each in one_or_more(value, f"{at}.{key}"):
             found.append(_actuation(key, each, where))
-    return tuple(found)
+    return Step(tuple(found), until)
 
 
 def _until(item: Any, at: str) -> Until:
@@ -421,8 +424,8 @@ def _check(model: Model) -> None:
         if isinstance(support, Support):
             with within(f"supports[{i}].at"):
                 select(mesh, support.at)
-    for i, actuations in enumerate(model.steps):
-        for item in actuations:
+    for i, asked in enumerate(model.steps):
+        for item in asked.actuations:
             key = type(item).__name__.lower()
             crease = getattr(item, "crease", "all")
             if crease != "all":

@@ -54,7 +54,8 @@ def report(scene: Scene) -> list[str]:
     if not model.supports:
         lines.append("supports: none; rigid motions are taken out, nothing is held")
     for i, step in enumerate(model.steps):
-        lines.append(f"step {i + 1}: " + ", ".join(_words(item) for item in step))
+        items = (*step.actuations, step.until) if step.until else step.actuations
+        lines.append(f"step {i + 1}: " + ", ".join(_words(item) for item in items))
     return lines + [f"remark ({remark.code}): {remark}" for remark in remarks(model)]
 
 

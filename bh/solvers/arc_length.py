@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.hyperplane import correct
-from bh.solvers.increments import ARC, DISPLACEMENT, CriticalPoint, Increment, Point, point
+from bh.solvers.increments import ARC, DISPLACEMENT, CriticalPoint, Increment, Mode, Point, point
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.newton import Newton
+from bh.solvers.outcome import Outcome
 from bh.solvers.stability import locate
 from bh.solvers.system import Evaluation, System, Tangent
 
@@ -30,7 +31,7 @@ class Control(Protocol):
     """What is prescribed in place of lambda: a hyperplane, and how far an increment goes."""
 
     @property
-    def mode(self) -> str:
+    def mode(self) -> Mode:
         """How states found so are marked in the path."""
         ...
 
@@ -160,7 +161,7 @@ class ArcLength:
                 yield item
         except IndefiniteError:
             reason = "the tangent is singular, or has too many constraints to count its modes"
-            yield Increment(last, "stalled", 0, math.nan, 0.0, note=reason)
+            yield Increment(last, Outcome.STALLED, 0, math.nan, 0.0, note=reason)
 
     def _follow(
         self, system: System, history: Sequence[Point], increment: float | None, origin: Point | None
@@ -184,12 +185,12 @@ class ArcLength:
             if there is None or found.evaluation is None:
                 length *= 0.4
                 if length < shortest:
-                    yield Increment(here, "stalled", iterations, math.nan, length, note=found.reason)
+                    yield Increment(here, Outcome.STALLED, iterations, math.nan, length, note=found.reason)
                     return
                 continue
             if there.lam < self.lowest:
                 note = f"the path runs back below lambda {self.lowest:g}"
-                yield Increment(here, "limit-point", iterations, math.nan, length, note=note)
+                yield Increment(here, Outcome.LIMIT_POINT, iterations, math.nan, length, note=note)
                 return
             before = path.negative
             direction = there.q - here.q
@@ -201,13 +202,19 @@ class ArcLength:
             here = replace(there, negative=path.negative)
             imbalance = found.evaluation.imbalance
             yield Increment(
-                here, "reached", iterations, imbalance, length, note=self.control.mode, critical=critical
+                here,
+                Outcome.REACHED,
+                iterations,
+                imbalance,
+                length,
+                note=self.control.mode,
+                critical=critical,
             )
             iterations = 0
             if here.lam >= 1.0:
                 return
         yield Increment(
-            here, "stalled", 0, math.nan, 0.0, note=f"{self.most} increments of {self.control.mode}"
+            here, Outcome.STALLED, 0, math.nan, 0.0, note=f"{self.most} increments of {self.control.mode}"
         )
 
     def _direction(self, system: System, here: Point) -> _Direction:

@@ -11,6 +11,7 @@ from bh.solvers.hyperplane import correct
 from bh.solvers.increments import CriticalPoint, Point, point
 from bh.solvers.modes import count_negative, lowest_mode, nearest_mode
 from bh.solvers.newton import Newton, Solution
+from bh.solvers.outcome import Critical
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
@@ -118,5 +119,5 @@ def _critical_point(
     along = abs(float(mode[:p] @ chord)) > 0.1 * float(np.linalg.norm(chord))
     work = mode * system.control_rate(q, lam)
     loaded = abs(float(work.sum())) > 1e-3 * float(np.abs(work).sum())
-    kind = "limit" if along and loaded else "bifurcation"
+    kind = Critical.LIMIT if along and loaded else Critical.BIFURCATION
     return CriticalPoint(kind, lam, q, mode, negative, 0.5 * abs(right.lam - left.lam))

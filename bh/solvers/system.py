@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.factor import IndefiniteError, Matrix
+from bh.solvers.outcome import Outcome
 
 Array = NDArray[np.float64]
 
@@ -126,8 +127,8 @@ class System(Protocol):
         """What passed through itself between two states, which no increment may, or an empty string."""
         ...
 
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        """Outcome and reason where the state itself tells why a path ends (contact, ...), else empty strings."""
+    def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        """Outcome and reason where the state itself tells why a path ends (contact, ...), else None."""
         ...
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:

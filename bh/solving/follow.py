@@ -1,4 +1,4 @@
-"""`trace`: follow the equilibrium of a model through its steps, to a file that a killed run goes on from."""
+"""Follow the equilibrium of a model through its steps, to a file that a killed run goes on from."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
 
 from bh.errors import ModelError, PathFileError
-from bh.formulations.observables import until_of
+from bh.formulations.observables import measure
+from bh.formulations.symmetry_reduction import Half
+from bh.loading.symmetry import Plane
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
 from bh.paths.path import Path, new_file
@@ -19,15 +20,11 @@ from bh.runtime.progress import ProgressMeter, meter
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.automatic import Automatic
 from bh.solvers.increments import LOAD, Point, point
+from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
 
-if TYPE_CHECKING:
-    from bh.formulations.symmetry_reduction import Half
-    from bh.loading.symmetry import Plane
-    from bh.model.refinement import Goal
 
-
-def trace(
+def follow(
     model: Model,
     *,
     symmetry: Plane | None = None,
@@ -35,42 +32,17 @@ def trace(
     strategy: Strategy | None = None,
     file: str | FilePath | None = None,
     resume: bool = False,
-    accuracy: float | Goal | None = None,
     after: Path | None = None,
 ) -> Path:
-    """Follow the equilibrium of `model` through all its steps.
-
-    Args:
-        symmetry: "x", "y" or a normal [x, y, 0]: solve one half of a mirror-symmetric model (`bh.loading.symmetry`).
-            States are of the whole sheet; what leaves the symmetry is only looked for in the last state (`path.stable`).
-        progress: True for a bar in the terminal, or an object that is told about every increment.
-        strategy: how increments are chosen; the default suits all scenes.
-        file: write every accepted state to this file before the next increment begins.
-        resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
-        accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
-            chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
-            see `bh.solving.accuracy` and `path.accuracy`. The file is written when that is done.
-        after: a solved path of the same model with fewer steps, whose states this one begins with.
+    """Follow the equilibrium of a model on its own mesh through all its steps; arguments as of `bh.trace`.
 
     Returns:
-        the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
-        its reason and keeps everything up to there.
+        the path up to where it got.
 
     Raises:
-        ModelError: the model has no steps, or cannot be solved as described.
+        ModelError: the model cannot be solved as described.
         PathFileError: the file cannot be written, or is of another model.
     """
-    if not isinstance(model, Model):
-        what = "give scene.model" if hasattr(model, "model") else "give a bh.Model"
-        raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
-    if not model.steps:
-        raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
-    if accuracy is not None:
-        if resume or after is not None:
-            raise ModelError(
-                "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
-            )
-        return _to_accuracy(model, accuracy, symmetry, progress, strategy, file)
     strategy = strategy or Automatic()
     path, target = _opened(model, symmetry, file, resume, after)
     report = meter(progress)
@@ -81,29 +53,12 @@ def trace(
             path.steps.append(end)
             if target is not None:
                 target.finish_step(step, *astuple(end))
-            if end.outcome != "reached":
+            if not end.reached:
                 break
     finally:
         report.close(path.outcome)
         if target is not None:
             target.close()
-    return path
-
-
-def _to_accuracy(
-    model: Model,
-    accuracy: float | Goal,
-    symmetry: Plane | None,
-    progress: bool | ProgressMeter,
-    strategy: Strategy | None,
-    file: str | FilePath | None,
-) -> Path:
-    from bh.solving.accuracy import Goal, solve
-
-    goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)
-    if file is not None:
-        path.save(file)
     return path
 
 
@@ -159,7 +114,7 @@ def _run_step(
     goal, tolerance = _goal(path, step, half)
     for item in walk(Walk(system, strategy, tuple(history), increment, origin, goal, tolerance)):
         now = time.perf_counter()
-        if item.outcome != "reached":
+        if not item.reached:
             return StepOutcome(item.outcome, item.note, item.iterations)
         at = item.point
         accept(
@@ -171,19 +126,19 @@ def _run_step(
         )  # fmt: skip
         report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
         began = time.perf_counter()
-    return StepOutcome("reached")
+    return StepOutcome(Outcome.REACHED)
 
 
 def _goal(path: Path, step: int, half: Half | None) -> tuple[Callable[[Point], float] | None, float]:
     """What is zero where the step ends early, and to which tolerance; None if nothing ends it early."""
-    until = until_of(path.model.steps[step])
+    until = path.model.steps[step].until
     if until is None:
         return None, 0.0
 
     def missed(at: Point) -> float:
         q = at.q if half is None else half.unknowns(at.q, at.lam)
         state = path._formulation.observe(path.model, path._system(step), q, at.lam, step)
-        return until.measure(state) - until.value
+        return measure(until, state) - until.value
 
     return missed, until.tolerance
 
@@ -199,7 +154,7 @@ def _recent(done: list[Record]) -> list[Record]:
 
 def _continued(after: Path, model: Model, symmetry: Plane | None) -> Path:
     """A path of `model` that begins with all that `after` has."""
-    if after.outcome != "reached":
+    if not after.reached:
         raise ModelError(f"the path to go on from ended early ({after.outcome}); solve it first")
     if fingerprint(replace(model, steps=model.steps[: len(after.steps)])) != after.provenance["input"]:
         raise ModelError(
@@ -220,7 +175,7 @@ def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path,
     path = _with_model(path, model, symmetry)
     target = PathFile.open(file)
     target.forget_failed_steps()
-    path.steps = [step for step in path.steps if step.outcome == "reached"]
+    path.steps = [step for step in path.steps if step.reached]
     return path, target
 
 

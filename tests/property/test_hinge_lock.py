@@ -20,7 +20,8 @@ from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.shared.hinge_lock import ZONE, lock_terms, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.model.model import ElementStiffness
+from bh.model.sheet import ElementStiffness
+from bh.model.step import Step
 from bh.scene.load import parse_scene
 from verification.studies.solver.derivatives import differences
 
@@ -111,7 +112,7 @@ def closing(force: float = 0.5, **how: float) -> Model:
 def mirrored(model: Model) -> Model:
     """The same with all forces turned to the other side of the sheet."""
     steps = tuple(
-        tuple(replace(f, total=(f.total[0], f.total[1], -f.total[2])) for f in step)  # type: ignore[union-attr]
+        Step(tuple(replace(f, total=(f.total[0], f.total[1], -f.total[2])) for f in step.actuations))  # type: ignore
         for step in model.steps
     )
     return replace(model, steps=steps)

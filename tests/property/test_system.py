@@ -18,7 +18,7 @@ from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.shared import sparsity as patterns
-from bh.model.model import ElementStiffness
+from bh.model.sheet import ElementStiffness
 from bh.solvers.linear import linear_response
 from bh.solvers.matrices import FreeBodyMatrix
 from bh.solvers.saddle import MultiplierMatrix

@@ -15,7 +15,7 @@ from bh.errors import ModelError
 from bh.formulations.registry import formulation, takes_nu
 from bh.loading.builder import load_steps
 from bh.mechanics.consistent.patches import bending_matrices, stretching_matrices, triangle_frames
-from bh.model.model import ElementStiffness
+from bh.model.sheet import ElementStiffness
 from meshes.structured import Kind
 from verification.studies.solver import plates
 from verification.studies.solver.patch_tests import (

@@ -107,13 +107,13 @@ def test_actuation_in_every_formulation(mine: ModuleType, formulation: str, tmp_
     assert tip == pytest.approx(exact, rel=0.25 if bars else 0.05)
     weight = path[-1].reactions[:, 2].sum()
     assert weight == pytest.approx(load * 320.0, rel=1e-6)
-    assert bh.Path.load(tmp_path / "path.bh").model.steps == ((mine.Weight(1390.0),),)
+    assert bh.Path.load(tmp_path / "path.bh").model.steps == (bh.Step((mine.Weight(1390.0),)),)
 
 
 def test_actuation_in_a_scene(mine: ModuleType, tmp_path: FilePath) -> None:
     text = SCENE.replace('at = "rigid-body"', 'at = "crease:crease"')
     text = text.replace('fold = { crease = "crease", by = 0.5 }', '"mine:Weight" = { density = 1390.0 }')
-    assert scene(tmp_path, text).model.steps == ((mine.Weight(1390.0),),)
+    assert scene(tmp_path, text).model.steps == (bh.Step((mine.Weight(1390.0),)),)
 
 
 @pytest.mark.usefixtures("mine")

@@ -12,7 +12,8 @@ import pytest
 import bh
 import meshes
 from bh.errors import InputError
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from fem.state import ShellState
 
 MYLAR = Sheet(E=4000.0, nu=0.38, t=0.127)

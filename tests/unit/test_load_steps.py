@@ -13,8 +13,8 @@ import meshes
 from bh import CreaseLaw, Displace, Fold, Force, Model, ModelError, Moment, Sheet
 from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges
-from bh.model.actuations import Ramp
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
+from bh.model.ramp import Ramp
 
 STEEL = Sheet(E=4000.0, t=0.2)
 K = 4000.0 * 0.2**3 / 12.0  # bending stiffness, N mm

@@ -9,7 +9,8 @@ import pytest
 import skfem
 
 from bh.loading.builder import load_steps
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from bh.solvers.linear import linear_response
 from fem.kirchhoff_love import Shell
 from fem.plate import Deflection, Plate, hhj, morley

@@ -310,8 +310,8 @@ def test_bad_input() -> None:
         of(oblique, turning, [0.3], [Energy()])
 
     def until(q: Array) -> bh.Model:
-        step = bh.Fold("crease", to=1.0), bh.Until("fold_angle", 1.0, "crease")
-        return supported("bars-and-hinges", q[0], q[1], q[2]).step(*step)
+        target = bh.Until("fold_angle", 1.0, "crease")
+        return supported("bars-and-hinges", q[0], q[1], q[2]).fold("crease", to=1.0, until=target)
 
     ended = bh.trace(until(p))
     assert ended.outcome == "reached"

@@ -15,7 +15,8 @@ import meshes
 from bh.errors import InputError, ModelError
 from bh.loading.builder import load_steps
 from bh.model.actuations import Displace, Fold, Moment
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from bh.paths.path import Path
 from bh.solvers.continuation import LoadControl
 from fem.kirchhoff_love import Shell, follow

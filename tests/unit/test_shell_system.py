@@ -11,7 +11,8 @@ import pytest
 import bh
 import meshes
 from bh.loading.builder import load_steps
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from fem import system as system_module
 from fem.assembly import build_pattern
 from fem.kirchhoff_love import LinearShell, Shell

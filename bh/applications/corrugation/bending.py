@@ -16,7 +16,8 @@ from bh.formulations.observables import crease_nodes, depth_of
 from bh.model.actuations import Displace, Indenter, Tether
 from bh.paths.path import Path
 from bh.solvers.continuation import LoadControl
-from bh.solving.follow import trace
+from bh.solvers.outcome import Outcome
+from bh.solving.trace import trace
 
 if TYPE_CHECKING:
     from bh.applications.corrugation.folded import Folded
@@ -75,7 +76,7 @@ class BendingTest:
         displacement: (k,) of the bar from the trigger load on, mm; load: (k,) on it, N.
         stiffness: slope of the regression over the second stage, N/mm; r2: its coefficient of determination.
         window: displacements where that begins and ends, mm; peak: first peak of the load, N.
-        outcome: "reached" if the bar went all the way; else why not, and the curve ends there.
+        outcome: Outcome.REACHED if the bar went all the way; else why not, and the curve ends there.
     """
 
     azimuth: float
@@ -92,7 +93,7 @@ class BendingTest:
     @property
     def converged(self) -> bool:
         """All states converged, to the end or at least beyond the stage that the stiffness is of."""
-        return self.outcome == "reached" or bool(self.displacement[-1] > self.window[1])
+        return self.outcome == Outcome.REACHED or bool(self.displacement[-1] > self.window[1])
 
 
 def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> BendingTest:
@@ -134,7 +135,7 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
         # flat sheets lie in z = 0, as the supports do
         down = start.model.step(*items, Displace(taped, "z", 0.0))
         start = trace(down, after=start, strategy=LoadControl(work_mismatch=math.inf))
-        if start.outcome != "reached":
+        if not start.reached:
             raise ModelError(f"the corrugation cannot be taped down ({start.outcome}: {start.reason})")
         points = start[-1].points
     slope, height = lid(folded, points, along, across, 0.5 * rig.bar)

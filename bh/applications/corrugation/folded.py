@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations.protocols import NodalUnknowns
-from bh.model.model import Sheet
+from bh.model.sheet import Sheet
 from bh.paths.path import Path
 from meshes import SheetMesh
 

@@ -15,9 +15,9 @@ from bh.mechanics.bars_and_hinges.stiffness import (
 )
 from bh.mechanics.shared.hinge_lock import ZONE, lock_terms, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.model.actuations import Ramp
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from bh.formulations.remarks import Remark, folds, loaded, one_row
-from bh.model.actuations import Pinch
 from bh.model.model import Model
+from bh.model.pinch import Pinch
 
 BEST = (5.0, 12.0)  # aspect ratios of cells
 
@@ -90,7 +90,7 @@ def _twisted(model: Model) -> Remark | None:
 
 
 def _pinched(model: Model) -> Remark | None:
-    if not any(isinstance(item, Pinch) for step in model.steps for item in step):
+    if not any(isinstance(item, Pinch) for step in model.steps for item in step.actuations):
         return None
     return Remark(
         "pinch",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,9 +21,9 @@ from bh.mechanics.consistent.patches import (
 )
 from bh.mechanics.shared.hinge_lock import ZONE, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.model.actuations import Ramp
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from bh.solvers.matrices import reverse_cuthill_mckee
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -108,7 +108,7 @@ def consistent_elements(
     part = None if plane is None else plane.triangle_weight
     joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part)
     if plane is not None:
-        from bh.mechanics.consistent.half import half_consistent, half_patches
+        from bh.mechanics.consistent.half import half_patches
 
         joined = half_patches(joined, spring, plane)
     rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
@@ -146,7 +146,7 @@ def consistent_elements(
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
         lock=lock_stiffness(model, load_step), rotations=rotations,
     )  # fmt: skip
-    return whole if plane is None else half_consistent(whole, plane)
+    return whole if plane is None else _half(whole, plane)
 
 
 def lock_stiffness(model: Model, load_step: LoadStep) -> Array:
@@ -246,3 +246,21 @@ def _rows(joined: Patches, quad: Ints) -> tuple[Ints, Ints]:
     nodes = nodes[:, : max(int((nodes < past).sum(axis=1).max()), 1)]
     place = (used[:, :, None] == nodes[:, None, :]).argmax(axis=2)
     return np.where(nodes < past, nodes, -1), place.reshape(quad.shape)
+
+
+def _half(e: ConsistentElements, plane: Mirror) -> ConsistentElements:
+    """Triangles, springs and locks of the half; patches and rotations are those of the half already."""
+    weight = plane.triangle_weight
+    triangle = weight > 0.0
+    by = plane.hinge_weight[e.springs]
+    spring = by > 0.0
+    by = by[spring]
+    return replace(
+        e, members=e.members[triangle], triangles=np.ascontiguousarray(e.triangles[triangle]),
+        rest_square=e.rest_square[triangle], K=(weight[:, None, None] * e.K)[triangle],
+        B_triangle=(weight[:, None, None] * e.B_triangle)[triangle], springs=e.springs[spring],
+        hinges=np.ascontiguousarray(e.hinges[spring]), turns=e.turns[spring],
+        spring_stiffness=by * e.spring_stiffness[spring],
+        spring_rest=Ramp(e.spring_rest.start[spring], e.spring_rest.end[spring]),
+        couple=Ramp(by * e.couple.start[spring], by * e.couple.end[spring]), lock=plane.hinge_weight * e.lock,
+    )  # fmt: skip

@@ -16,6 +16,7 @@ from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.model.laws import PRESCRIBED
 from bh.model.model import Model
 from bh.model.supports import MOTIONS, TURNED, rigid_motions
+from bh.solvers.outcome import Outcome
 from bh.solvers.system import System, grows_ahead
 from meshes import SheetMesh
 
@@ -103,18 +104,18 @@ class SupportedSheet:
             self.mesh, self.angles(q, lam), reference, self.load_step.law != PRESCRIBED
         )
 
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        """Outcome and reason where panels have met, or where loads turn a free sheet; else empty strings."""
+    def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        """Outcome and reason where panels have met or loads turn a free sheet; None where nothing is in the way."""
         touching = self.contact(q, lam)
         if touching:
-            return "contact", touching
+            return Outcome.CONTACT, touching
         loaded = self.force.start.any() or self.force.end.any()
         turned = (
             self.constraints.rigid_body
             and loaded
             and grows_ahead(cast(System, self), q, lam, self._unbalanced)
         )
-        return ("mechanism", TURNED) if turned else ("", "")
+        return (Outcome.MECHANISM, TURNED) if turned else None
 
     def _unbalanced(self, q: Array, lam: float) -> float:
         return self.displacements.unbalanced(self.positions(q, lam), self.force.at(lam))

@@ -23,6 +23,7 @@ from bh.mechanics.shared.assembly import add_lower, rotate
 from bh.mechanics.shared.kinematics import OPTIONS
 from bh.mechanics.shared.sparsity import Slots
 from bh.model.actuations import Indenter, Tether
+from bh.model.step import Body
 from bh.model.supports import select
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -34,7 +35,7 @@ POINTS = 4  # on every edge
 class RigidContact:
     """The indenters and tethers of one step on a mesh; positions x are (n, 3), mm."""
 
-    def __init__(self, mesh: SheetMesh, items: tuple[Indenter | Tether, ...], start: Array) -> None:
+    def __init__(self, mesh: SheetMesh, items: tuple[Body, ...], start: Array) -> None:
         """Points of the sheet that can touch, and the springs of tethers.
 
         Args:

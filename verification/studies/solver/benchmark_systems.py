@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from bh.solvers.matrices import SparseMatrix
+from bh.solvers.outcome import Outcome
 from bh.solvers.system import Evaluation, Tangent
 
 Array = NDArray[np.float64]
@@ -24,8 +25,8 @@ class Silent:
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         return ""
 
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        return "", ""
+    def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        return None
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         return "the toy moves"

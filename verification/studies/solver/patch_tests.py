@@ -12,7 +12,7 @@ from bh import Displace, Model, Sheet, trace
 from bh.loading.builder import load_steps
 from bh.mechanics.consistent.formulation import Consistent
 from bh.mechanics.consistent.system import ConsistentSystem
-from bh.model.actuations import Ramp
+from bh.model.ramp import Ramp
 from bh.solvers.linear import linear_response
 from meshes import SheetMesh
 from meshes.structured import Kind

@@ -10,7 +10,7 @@ import numpy as np
 from bh import Model, trace
 from bh.loading.builder import load_steps
 from bh.mechanics.bars_and_hinges.elements import sheet_elements
-from bh.model.model import ElementStiffness
+from bh.model.sheet import ElementStiffness
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.ch3.cone import circle_radius
 from verification.studies.solver.campaign import FINE

@@ -14,6 +14,7 @@ from bh.loading.builder import load_steps
 from bh.solvers.arc_length import Cylindrical, Generalised
 from bh.solvers.increments import point
 from bh.solvers.linear import linear_response
+from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 from verification.studies.solver.hard_cases.common import Found, check
@@ -30,7 +31,7 @@ def trusses(result: CaseResult) -> Found:
             found = list(ArcLength(control=control).follow(toy, [start]))
             lam = np.array([item.point.lam for item in found])
             w = np.array([item.point.q[0] for item in found])
-            off = float(np.abs(toy.load(w) - lam).max()) if found[-1].outcome == "reached" else math.nan
+            off = float(np.abs(toy.load(w) - lam).max()) if found[-1].outcome == Outcome.REACHED else math.nan
             params: dict[str, Any] = {
                 "spring": "none" if spring is None else spring,
                 "control": "MGDCM" if generalised else "arc",
