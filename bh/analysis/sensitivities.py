@@ -8,8 +8,8 @@ supports), the design p behind them and an observable J, the adjoint a of the fa
 one solve for each observable and any number of design parameters. Here q are the places of the free nodes, with the
 edge rotations or moments that go with them: they stay while the stress-free sheet changes under them.
 
-K, a and both partial derivatives are exact (`bh.formulations.protocols.Derivatives`). dd/dp comes from the function that
-makes the model: central differences of sixth order of the element data. No solution and no residual is
+K, a and both partial derivatives are exact (`bh.formulations.protocols.Derivatives`). dd/dp comes from the function
+that makes the model: central differences of sixth order of the element data. No solution and no residual is
 differenced, only smooth closed formulas such as a length or E t^3 L^2 / (6 A). Their error is measured as the distance
 to differences of fourth order and reported (`Sensitivity.error`). Of a stiffness the derivative of K along the sheet's
 response is differenced as well. Where a pinch goes on from angles that the step before came to, the adjoint of that
@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,6 +64,15 @@ class Situation:
     """A solved state with its factorised tangent: what observables are read from."""
 
     def __init__(self, path: Path, index: int) -> None:
+        """Factorise the tangent of a state.
+
+        Args:
+            path: solved.
+            index: of the state, at the end of a step (in the first step any).
+
+        Raises:
+            ModelError: the state or its formulation has no sensitivities; one line says why.
+        """
         self.path, self.model = path, path.model
         self.system, record = path.solved(index)
         form = formulation(path.model.formulation)
@@ -146,9 +155,13 @@ class Situation:
 class Observable(Protocol):
     """A number that is read from a state."""
 
-    def value(self, at: Situation) -> float: ...
+    def value(self, at: Situation) -> float:
+        """The number itself."""
+        ...
 
-    def slope(self, at: Situation) -> Slope: ...
+    def slope(self, at: Situation) -> Slope:
+        """Its derivatives."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -169,9 +182,11 @@ class Position:
         return forces
 
     def value(self, at: Situation) -> float:
+        """Mean coordinate along the direction, mm."""
         return float(np.vdot(self.forces(at), at.state.points))
 
     def slope(self, at: Situation) -> Slope:
+        """Unit force along the direction."""
         return Slope(self.forces(at), np.zeros(len(at.q) - at.moving), {})
 
 
@@ -182,13 +197,20 @@ class Energy:
     kind: str = "total"
 
     def __post_init__(self) -> None:
+        """See that the kind is known.
+
+        Raises:
+            ModelError: it is not.
+        """
         if self.kind not in ("total", *KINDS):
             raise ModelError(f"energy '{self.kind}' is not known; use total, {', '.join(KINDS)}")
 
     def value(self, at: Situation) -> float:
+        """Energy of the kind, N mm."""
         return float(getattr(at.state.energy, self.kind))
 
     def slope(self, at: Situation) -> Slope:
+        """Forces and moments of the kind, and what its data do to it."""
         kinds = KINDS if self.kind == "total" else (self.kind,)
         points, other = at.derivatives.energy_gradient(kinds)
         return Slope(points, other, at.derivatives.energy_to_data(kinds))
@@ -210,9 +232,11 @@ class FoldAngle:
         return hinges[[self.edge]]
 
     def value(self, at: Situation) -> float:
+        """Mean fold angle, rad; mountain positive."""
         return float(np.pi - at.state.dihedral_angles[self._hinges(at)].mean())
 
     def slope(self, at: Situation) -> Slope:
+        """Gradients of the angle, rad / mm."""
         hinges = self._hinges(at)
         return Slope(*at.derivatives.angle_gradient(hinges, np.full(len(hinges), -1.0 / len(hinges))))
 
@@ -224,9 +248,15 @@ class OfPoints:
     function: Callable[[Array], tuple[float, Array]]
 
     def value(self, at: Situation) -> float:
+        """What the function gives."""
         return float(self.function(at.state.points)[0])
 
     def slope(self, at: Situation) -> Slope:
+        """The gradient that the function gives.
+
+        Raises:
+            ModelError: it is not of the shape of the points.
+        """
         gradient = np.asarray(self.function(at.state.points)[1], dtype=float)
         if gradient.shape != at.state.points.shape:
             raise ModelError(
@@ -243,12 +273,14 @@ class OfNodes:
     """
 
     nodes: Sequence[int]
-    function: Callable[[Any], Any]
+    function: Callable[[NDArray[np.float64 | np.complex128]], complex]
 
     def value(self, at: Situation) -> float:
+        """What the function gives."""
         return float(np.real(self.function(at.state.points[list(self.nodes)])))
 
     def slope(self, at: Situation) -> Slope:
+        """The gradient of the function by a complex step, exact to rounding."""
         places = at.state.points[list(self.nodes)]
         points = np.zeros_like(at.state.points)
         for i, node in enumerate(self.nodes):
@@ -276,6 +308,7 @@ class Stiffness:
         return 1.0 / float(load @ w), w
 
     def value(self, at: Situation) -> float:
+        """Stiffness, N / mm."""
         return self._response(at)[0]
 
     def slope(self, at: Situation) -> Slope:
@@ -324,6 +357,7 @@ def of(
         path: solved, of `build(design)`.
         build: makes the model of a design (k,): geometry by a parametrised pattern and a mesh of fixed topology, sheet,
             creases, rest angles, forces, whatever a model has. It must be smooth near the design.
+        design: (k,) parameters of the solved path.
         observables: `Position`, `Energy`, `FoldAngle`, `Stiffness`, `OfPoints` or any `Observable`.
         index: of the state, at the end of a step (in the first step any).
         steps: (k,) of the differences, by default a thousandth of each parameter (0.001 where it is zero).

@@ -86,11 +86,11 @@ def _moved(state: State, of: str) -> Array:
 
 
 OBSERVABLES: dict[str, Observable] = {
-    "depth": lambda state, of: depth_of(state)[0],
-    "energy": lambda state, of: state.energy.total,
-    "stretching": lambda state, of: state.energy.stretching,
-    "bending": lambda state, of: state.energy.bending,
-    "folding": lambda state, of: state.energy.folding,
+    "depth": lambda state, _: depth_of(state)[0],
+    "energy": lambda state, _: state.energy.total,
+    "stretching": lambda state, _: state.energy.stretching,
+    "bending": lambda state, _: state.energy.bending,
+    "folding": lambda state, _: state.energy.folding,
     "fold_angle": lambda state, of: float(state.fold_angle(str(of)).mean()),
     "largest_fold": lambda state, of: float(np.abs(state.fold_angle(str(of))).max()),
     "dihedral": lambda state, of: float(state.dihedral(str(of)).mean()),

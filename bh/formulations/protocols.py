@@ -60,7 +60,7 @@ class SheetSystem(System, Protocol):
         ...
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        """Second derivative of the energy by lambda at fixed q, N mm."""
         ...
 
 

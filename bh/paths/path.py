@@ -44,8 +44,18 @@ class Path:
     """
 
     def __init__(
-        self, model: Model, provenance: dict[str, Any] | None = None, symmetry: Plane | None = None
+        self, model: Model, provenance: dict[str, object] | None = None, symmetry: Plane | None = None
     ) -> None:
+        """An empty path of a model.
+
+        Args:
+            model: the model; its formulation is looked up here.
+            provenance: of a path that was stored; None makes it anew.
+            symmetry: plane of a model that is solved by one half (`bh.loading.symmetry`), or None.
+
+        Raises:
+            ModelError: the model cannot be solved as described.
+        """
         self.model = model
         self.provenance = provenance or provenance_of(model)
         self.records: list[Record] = []
@@ -133,6 +143,7 @@ class Path:
 
     @property
     def unknowns(self) -> int:
+        """Number of unknowns of the last state."""
         return len(self.records[-1].q) if self.records else 0
 
     @property
@@ -149,6 +160,7 @@ class Path:
         )
 
     def __len__(self) -> int:
+        """Number of states."""
         return len(self.records)
 
     @overload
@@ -157,6 +169,7 @@ class Path:
     def __getitem__(self, index: slice) -> list[State]: ...
 
     def __getitem__(self, index: int | slice) -> State | list[State]:
+        """The state of an index, or a list of those of a slice; read when it is first asked for."""
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         index = range(len(self))[index]
@@ -168,6 +181,7 @@ class Path:
         return self._states[index]
 
     def __iter__(self) -> Iterator[State]:
+        """States in order."""
         return (self[i] for i in range(len(self)))
 
     def solved(self, index: int = -1) -> tuple[SheetSystem, Record]:

@@ -60,7 +60,9 @@ class Record:
         return cls(
             row.step, row.lam, row.q, row.iterations, row.imbalance, row.wall_time_s, row.next_increment,
             negative=row.negative, mode=Mode(row.mode), note=row.note, cuts=row.cuts, jumped=row.jumped,
-            critical=tuple(CriticalPoint(Critical(c.kind), c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical),
+            critical=tuple(
+                CriticalPoint(Critical(c.kind), c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical
+            ),
         )  # fmt: skip
 
     def of_whole(self, half: Half) -> Record:

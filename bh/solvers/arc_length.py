@@ -51,9 +51,11 @@ class Cylindrical:
     mode = ARC
 
     def normal(self, system: System, tangent: Array) -> Array:
+        """(primal,) the tangent itself."""
         return tangent[: system.primal]
 
     def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        """Increment of lambda whose arc has the given length."""
         return length / measure
 
 
@@ -65,6 +67,7 @@ class Generalised(Cylindrical):
     """
 
     def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        """Increment of lambda for a given length; no larger one than the first."""
         return min(length, first * first_measure) / measure
 
 
@@ -80,6 +83,7 @@ class Displacement:
     mode = DISPLACEMENT
 
     def normal(self, system: System, tangent: Array) -> Array:
+        """(primal,) weights of the displacement that grows."""
         if self.along is not None:
             return self.along(system)
         normal = np.zeros(system.primal)
@@ -87,6 +91,7 @@ class Displacement:
         return normal
 
     def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        """Increment of lambda in which the displacement grows by the given length."""
         return length / measure
 
 

@@ -140,7 +140,8 @@ class LoadControl:
             points = [tried.point] if tried.note else [*points[-2:], tried.point]
             step = self._next(lam - here.lam, tried.solution.iterations, bool(cuts), largest)
             yield Increment(
-                tried.point, Outcome.REACHED, iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note), critical
+                tried.point, Outcome.REACHED, iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note),
+                critical,
             )  # fmt: skip
             cuts, iterations = [], 0
 

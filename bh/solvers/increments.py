@@ -94,6 +94,7 @@ class Increment:
 
     @property
     def stable(self) -> bool | None:
+        """True if no mode is negative, None where that was not looked at."""
         return None if self.negative is None else self.negative == 0
 
 

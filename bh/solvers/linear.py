@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 class LinearSystem(System, Protocol):
     """A system that also knows its second derivative with respect to lambda."""
 
-    def control_stiffness(self, q: Array, lam: float) -> float: ...
+    def control_stiffness(self, q: Array, lam: float) -> float:
+        """Second derivative of the energy by lambda at fixed q (n,), N mm."""
+        ...
 
 
 @dataclass(frozen=True)

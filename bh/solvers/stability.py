@@ -64,7 +64,7 @@ def locate(
     found: list[CriticalPoint] = []
     low, high, before = (a, 0.0), (b, 1.0), negative[0]
     while before != negative[1] and len(found) < 4:
-        pair = _bisect(system, a, b, low, high, before, negative[1], tolerance, width)
+        pair = _bisect(system, a, b, (low, high), (before, negative[1]), tolerance, width)
         if pair is None:
             break
         left, right, behind = pair
@@ -77,10 +77,20 @@ Place = tuple[Point, float]  # a state and where it is on the chord, from 0 to 1
 
 
 def _bisect(
-    system: System, a: Point, b: Point, low: Place, high: Place, before: int, behind: int,
-    tolerance: float, width: float,
-) -> tuple[Place, Place, int] | None:  # fmt: skip
-    """The last interval in which the count leaves `before`, and the count behind it; None if the path is lost."""
+    system: System,
+    a: Point,
+    b: Point,
+    places: tuple[Place, Place],
+    negative: tuple[int, int],
+    tolerance: float,
+    width: float,
+) -> tuple[Place, Place, int] | None:
+    """The last interval in which the count leaves the first of `negative`, which it has at the first of `places`.
+
+    Returns:
+        its ends and the count behind it; None if the path is lost.
+    """
+    (low, high), (before, behind) = places, negative
     normal = (b.q - a.q)[: system.primal]
     while high[1] - low[1] > width:
         p, q = low[0], high[0]

@@ -42,12 +42,12 @@ class Evaluation(NamedTuple):
         return self.energy + self.penalty
 
 
-def unchanged(forces: Array, dq: Array) -> Array:
+def unchanged(forces: Array, _dq: Array) -> Array:
     """The prediction of a system whose element forces are left alone: with it the iteration is plain Newton's.
 
     Args:
         forces: element forces, in the system's own order.
-        dq: (n,) increment of the unknowns, which is not looked at.
+        _dq: (n,) increment of the unknowns, which is not looked at.
 
     Returns:
         `forces` itself.
@@ -116,7 +116,7 @@ class System(Protocol):
         ...
 
     def power(self, q: Array, lam: float) -> float:
-        """d energy / d lambda at fixed q: the rate of work of the actuation, N mm."""
+        """Rate of work of the actuation, d energy / d lambda at fixed q, N mm."""
         ...
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:

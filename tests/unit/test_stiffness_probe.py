@@ -15,6 +15,7 @@ import bh
 import meshes
 from bh import Model, Path, Sheet, trace
 from bh.analysis.stiffness_probe import Probe, Stiffness, sphere
+from bh.formulations import registry
 from bh.loading.builder import load_steps
 from bh.solvers.linear import linear_response
 
@@ -106,7 +107,7 @@ def test_loaded_and_guided_are_solves_of_the_driver(formulation: str) -> None:
     node = int(mesh.nodes("crease:crease")[-1])
     at = Probe(path).at([node])
     n = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
-    form = bh.formulations.formulation(formulation)
+    form = registry.formulation(formulation)
 
     def energy(*actuations: Any) -> float:
         loaded = model.step(*actuations)

@@ -36,6 +36,16 @@ class BarHingeDerivatives:
     unfollowed: Mapping[str, str] = MappingProxyType({})
 
     def __init__(self, system: BarsAndHingesSystem, q: Array, lam: float) -> None:
+        """Linearise elements at a state.
+
+        Args:
+            system: of the step.
+            q: (size,) unknowns.
+            lam: control parameter.
+
+        Raises:
+            ModelError: bars measure Green's strain, whose derivatives are not known.
+        """
         if system.elements.green:
             raise ModelError("given element stiffness with Green's strain has no sensitivities; use l - L")
         self.system, self.moving, self.q, self.lam = system, system.moving, q, lam

@@ -59,6 +59,17 @@ class BarsAndHingesSystem(SupportedSheet):
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
     ) -> None:
+        """Elements, unknowns and supports of the step.
+
+        Args:
+            model: the whole sheet.
+            load_step: what is prescribed.
+            start: the state that the step begins at; None for the stress-free sheet.
+            plane: of the half, or None for the whole sheet.
+
+        Raises:
+            ModelError: an edge is clamped, which has no meaning without slopes, or supports leave nothing to move.
+        """
         mesh = model.mesh
         if len(load_step.constraints.clamped):
             raise ModelError(
@@ -86,6 +97,7 @@ class BarsAndHingesSystem(SupportedSheet):
 
     @cached_property
     def energy_scale(self) -> float:
+        """Stiffness of all hinges times one radian squared, N mm."""
         return 0.5 * float(self.elements.hinge_stiffness.sum())
 
     def start(self) -> Array:
@@ -98,12 +110,14 @@ class BarsAndHingesSystem(SupportedSheet):
 
     @cached_property
     def hinge_lengths(self) -> Array:
+        """(h,) stress-free lengths of the edges of the hinges, mm."""
         ends = self.reference[self.elements.hinges[:, 1:3]]
         return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     # ------------------------------------------------------------------------------- the System protocol
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
+        """Energy, residual (size,) and element forces at q (size,): forces of bars, N, then moments of hinges, N mm."""
         x = self.positions(q, lam)
         energy, size, f, forces, turn = self.internal_forces(x, q, lam)
         load = (1.0 - lam) * self.force.start + lam * self.force.end
@@ -208,6 +222,7 @@ class BarsAndHingesSystem(SupportedSheet):
         return out
 
     def control_rate(self, q: Array, lam: float) -> Array:
+        """(size,) d residual / d lambda at fixed q: N for displacements, rad for multipliers."""
         e = self.elements
         x = self.positions(q, lam)
         _, _, _, forces, _ = self.internal_forces(x, q, lam)
@@ -228,6 +243,7 @@ class BarsAndHingesSystem(SupportedSheet):
         return rate
 
     def power(self, q: Array, lam: float) -> float:
+        """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
         e = self.elements
         x = self.positions(q, lam)
         _, _, f, _, turn = self.internal_forces(x, q, lam)
@@ -240,7 +256,7 @@ class BarsAndHingesSystem(SupportedSheet):
         return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         e = self.elements
         x = self.positions(q, lam)
         total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)

@@ -35,6 +35,13 @@ class ConsistentDerivatives:
     unfollowed: Mapping[str, str] = MappingProxyType({"ghost": CLAMPED})
 
     def __init__(self, system: ConsistentSystem, q: Array, lam: float) -> None:
+        """Linearise elements at a state.
+
+        Args:
+            system: of the step.
+            q: (size,) unknowns.
+            lam: control parameter.
+        """
         self.system, self.moving, self.q, self.lam = system, system.moving, q, lam
         e = system.elements
         self.alpha = q[system.moving :]

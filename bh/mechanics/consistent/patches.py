@@ -93,6 +93,7 @@ def patches(
     """Patches of a mesh.
 
     Args:
+        mesh: the stress-free sheet.
         B: (t, 3, 3) bending matrices of the triangles.
         spring: (m,) hinges that are spring creases: they have two rotations and lie in no patch.
         clamped: (e,) edges that keep their slope.

@@ -35,7 +35,7 @@ class Solver(Protocol):
     """A factorised matrix."""
 
     def solve(self, b: Array) -> Array:
-        """x with A x = b, both (n,)."""
+        """Solution x of A x = b, both (n,)."""
         ...
 
 
@@ -75,6 +75,17 @@ class ConsistentSystem(SupportedSheet):
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
     ) -> None:
+        """Elements, unknowns and supports of the step.
+
+        Args:
+            model: the whole sheet.
+            load_step: what is prescribed.
+            start: the state that the step begins at; None for the stress-free sheet.
+            plane: of the half, or None for the whole sheet.
+
+        Raises:
+            ModelError: supports leave nothing to move, or a load that the formulation does not take.
+        """
         of_half = load_step
         if plane is not None:
             from bh.mechanics.shared.mirrored import half_load_step
@@ -106,6 +117,7 @@ class ConsistentSystem(SupportedSheet):
 
     @cached_property
     def energy_scale(self) -> float:
+        """Bending stiffness of all triangles and stiffness of all springs, times one radian squared, N mm."""
         e = self.elements
         return 0.5 * float(np.trace(e.B_triangle, axis1=1, axis2=2).sum() + e.spring_stiffness.sum())
 
@@ -182,6 +194,7 @@ class ConsistentSystem(SupportedSheet):
         return out
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
+        """Energy, residual (size,) and element forces (`split`) at q (size,)."""
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
@@ -343,10 +356,12 @@ class ConsistentSystem(SupportedSheet):
         return float(np.vdot(M[turning], e.rest.rate[turning])) + float(S @ e.spring_rest.rate)
 
     def control_rate(self, q: Array, lam: float) -> Array:
+        """(size,) d residual / d lambda at fixed q: N for displacements, N mm / rad for rotations."""
         f, r, _ = self._gradient_rates(q, lam)
         return np.concatenate((self.displacements.components(f - self.force.rate), r))
 
     def power(self, q: Array, lam: float) -> float:
+        """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         _, M, S, _ = self.split(now.forces)
@@ -359,7 +374,7 @@ class ConsistentSystem(SupportedSheet):
         return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         v = self.displacements.prescribed_motion
         more = (
             0.0

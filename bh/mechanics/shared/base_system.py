@@ -37,6 +37,17 @@ class SupportedSheet:
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
     ) -> None:
+        """Unknowns, loads and bodies that press of the step.
+
+        Args:
+            model: the whole sheet.
+            load_step: what is prescribed.
+            start: the state that the step begins at; None for the stress-free sheet.
+            plane: of the half, or None for the whole sheet.
+
+        Raises:
+            ModelError: supports leave nothing to move, or forces push a free sheet.
+        """
         self.mesh = model.mesh
         self.load_step = load_step
         self.force = load_step.force
@@ -57,6 +68,7 @@ class SupportedSheet:
 
     @property
     def rotation(self) -> float:
+        """Largest change of an imposed or rest angle in the step, rad."""
         return self.load_step.rotation
 
     def positions(self, q: Array, lam: float) -> Array:
@@ -78,9 +90,11 @@ class SupportedSheet:
         return dihedral_angles(self.positions(q, lam), self.mesh.topology.hinges)
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Why an increment between two states is not to be trusted, or an empty string."""
         return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Which panels passed through each other between two states, or an empty string."""
         return closing.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def contact(self, q: Array, lam: float) -> str:
@@ -91,6 +105,7 @@ class SupportedSheet:
         )
 
     def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        """Outcome and reason where panels have met or loads turn a free sheet; None where nothing is in the way."""
         touching = self.contact(q, lam)
         if touching:
             return Outcome.CONTACT, touching
@@ -106,6 +121,7 @@ class SupportedSheet:
         return self.displacements.unbalanced(self.positions(q, lam), self.force.at(lam))
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
+        """A motion (size,) of the unknowns in words."""
         return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))
 
 

@@ -7,8 +7,8 @@ negative inside), d its `gap` and k its stiffness (N/mm for every mm of edge of 
     k (d^2 / 6 - d g / 2 + g^2 / 2)   for g <= 0
 
 and nothing beyond: a smooth barrier with two continuous derivatives, whose force grows to k d / 2 where the surfaces
-meet. Only pressing is possible. Points are spread evenly over all edges of the mesh, so that the edge of an indenter may
-lie anywhere between nodes.
+meet. Only pressing is possible. Points are spread evenly over all edges of the mesh, so that the edge of an indenter
+may lie anywhere between nodes.
 """
 
 from __future__ import annotations
@@ -36,6 +36,13 @@ class RigidContact:
     """The indenters and tethers of one step on a mesh; positions x are (n, 3), mm."""
 
     def __init__(self, mesh: SheetMesh, items: tuple[Body, ...], start: Array) -> None:
+        """Points of the sheet that can touch, and the springs of tethers.
+
+        Args:
+            mesh: the stress-free sheet.
+            items: indenters and tethers of the step.
+            start: (n, 3) positions that tethers hold to, mm.
+        """
         self.triangles = mesh.triangles
         self.indenters = tuple(item for item in items if isinstance(item, Indenter))
         topology = mesh.topology
@@ -104,7 +111,7 @@ class RigidContact:
         )  # fmt: skip
 
     def power(self, x: Array, lam: float) -> float:
-        """d energy / d lambda at fixed x, N mm: work of the moving indenters on the sheet."""
+        """Rate of energy with lambda at fixed x, N mm: work of the moving indenters on the sheet."""
         return float(
             sum(
                 force @ indenter.by
@@ -113,7 +120,7 @@ class RigidContact:
         )
 
     def control_stiffness(self, x: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed x, N mm."""
+        """Second derivative of the energy by lambda at fixed x, N mm."""
         ahead = 1e-6
         return (self.power(x, lam + ahead) - self.power(x, lam - ahead)) / (2.0 * ahead)
 

@@ -31,6 +31,16 @@ class Displacements:
     weight: Array | None = None  # (k,) how many nodes an unknown stands for, if not one each
 
     def __init__(self, mesh: SheetMesh, constraints: Constraints, start_points: Array) -> None:
+        """Number the unknowns.
+
+        Args:
+            mesh: the stress-free sheet.
+            constraints: of the step; a start that is not given is that of `start_points`.
+            start_points: (n, 3) positions that the step begins with, mm.
+
+        Raises:
+            ModelError: supports hold every node.
+        """
         self.mesh = mesh
         self.reference = mesh.points
         self.turned = np.flatnonzero(constraints.frame_of >= 0)
@@ -82,6 +92,7 @@ class Displacements:
         return self.to_global(np.where(self.constraints.fixed, local, 0.0))
 
     def to_global(self, local: Array) -> Array:
+        """(n, 3) vectors in global axes, from their components along the axes of the supports."""
         if len(self.turned) == 0:
             return local
         out = local.copy()
@@ -89,6 +100,7 @@ class Displacements:
         return out
 
     def to_local(self, vectors: Array) -> Array:
+        """(n, 3) components along the axes of the supports, from vectors in global axes."""
         if len(self.turned) == 0:
             return vectors
         out = vectors.copy()

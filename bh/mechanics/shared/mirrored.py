@@ -29,6 +29,14 @@ class MirroredDisplacements(Displacements):
     """Displacements of a sheet whose images move alike: the unknowns are those of the kept half."""
 
     def __init__(self, mesh: SheetMesh, constraints: Constraints, start_points: Array, plane: Mirror) -> None:
+        """Number the unknowns of the kept half.
+
+        Args:
+            mesh: the whole sheet.
+            constraints: of the whole sheet.
+            start_points: (n, 3) positions of the whole sheet that the step begins with, mm.
+            plane: the mirror.
+        """
         super().__init__(mesh, _reflected(constraints, plane), start_points)
         self.plane = plane
         kept = (plane.side <= 0)[:, None] & ~self.constraints.fixed
@@ -57,18 +65,21 @@ class MirroredDisplacements(Displacements):
         )
 
     def positions(self, u: Array, lam: float) -> Array:
+        """(n, 3) positions of all nodes, images too, mm, for unknowns u (k,)."""
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
         local.ravel()[self.free] = u
         local.ravel()[self._images] = u[self._of]
         return np.asarray(self.reference + self.to_global(local))
 
     def vectors(self, u: Array) -> Array:
+        """(n, 3) changes of positions for changes u (k,) of the unknowns, in the axes of each side."""
         local = np.zeros_like(self.reference)
         local.ravel()[self.free] = u
         local.ravel()[self._images] = u[self._of]
         return self.to_global(local)
 
     def components(self, vectors: Array) -> Array:
+        """(k,) sums of the components of nodal vectors (n, 3) over images, along the unknowns."""
         local = self.to_local(vectors).ravel()
         images = np.bincount(self._of, weights=local[self._images], minlength=len(self.free))
         return np.asarray(local[self.free] + images)
