@@ -53,7 +53,15 @@ RULES: dict[str, tuple[str, ...]] = {
     "reports": ("meshes", "verification", "bh.plotting"),
 }
 # none of these knows a formulation by name
-DRIVERS = ("bh.model", "bh.loading", "bh.formulations", "bh.solvers", "bh.paths", "bh.solving", "bh.scene.load")
+DRIVERS = (
+    "bh.model",
+    "bh.loading",
+    "bh.formulations",
+    "bh.solvers",
+    "bh.paths",
+    "bh.solving",
+    "bh.scene.load",
+)
 
 
 # ------------------------------------------------------------------------------------------ the sources as data

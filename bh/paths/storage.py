@@ -79,6 +79,7 @@ class PathFile:
     """An open path file; every `add` is one transaction."""
 
     def __init__(self, file: FilePath, connection: sqlite3.Connection) -> None:
+        """Of an open connection; see `create` and `open`."""
         self.file, self._db = file, connection
 
     @classmethod
@@ -189,9 +190,11 @@ class PathFile:
             self._db.execute("DELETE FROM steps WHERE outcome != 'reached'")
 
     def meta(self) -> dict[str, Any]:
+        """Model and provenance as plain data."""
         return {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
 
     def arrays(self) -> dict[str, AnyArray]:
+        """Arrays of the model by name."""
         rows = self._db.execute("SELECT name, dtype, shape, data FROM arrays")
         return {
             name: np.frombuffer(data, dtype).reshape(json.loads(shape)).copy()
@@ -199,6 +202,7 @@ class PathFile:
         }
 
     def states(self) -> Iterator[StateRow]:
+        """All accepted states, in order."""
         critical = self._critical()
         rows = self._db.execute(
             "SELECT id, step, lambda, iterations, imbalance, negative, mode, jumped, wall_time_s, next_increment,"
@@ -246,6 +250,7 @@ class PathFile:
         return {step: (outcome, reason, iterations) for step, outcome, reason, iterations in rows}
 
     def close(self) -> None:
+        """Close the file; nothing is lost if it is not done."""
         with suppress(sqlite3.Error):  # takes the empty journal away; it is in nobody's way if that fails
             self._db.execute("PRAGMA journal_mode = DELETE")
         self._db.close()
