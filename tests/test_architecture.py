@@ -187,7 +187,7 @@ def test_imports(part: str) -> None:
         ("bh.solvers.newton", "from bh.model.model import Model", "bh.model.model"),
         ("bh.model.model", "from bh.loading.builder import load_steps", "bh.loading.builder"),
         ("bh.model.model", "from bh import trace", "bh"),
-        ("bh.loading.builder", "if TYPE_CHECKING:\n    from bh.formulations.state import State", "bh.formulations.state"),
+        ("bh.loading.builder", "if TYPE_CHECKING:\n    import bh.formulations.state", "bh.formulations.state"),
         ("bh.formulations.state", "from bh.mechanics.shared import kinematics", "bh.mechanics.shared.kinematics"),
         ("bh.mechanics.own", "from bh.paths.path import Path", "bh.paths.path"),
         ("bh.scene.load", "from bh.paths.path import Path", "bh.paths.path"),
@@ -296,7 +296,7 @@ def test_outcome_strings_can_fail(line: str) -> None:
     assert outcome_comparisons(ast.parse(line)) == [1]
 
 
-# ------------------------------------------------------------------------------------------ 5, 6, 7: what is loaded when
+# ------------------------------------------------------------------------------------- 5, 6, 7: what is loaded when
 
 
 def loaded_after(code: str) -> set[str]:
@@ -407,7 +407,7 @@ def test_no_any_in_the_seam() -> None:
         f for part in ("formulations", "mechanics", "loading") for f in (ROOT / "bh" / part).rglob("*.py")
     ]
     assert words(r"\bAny\b", seam) == 0
-    assert words(r"\bdef\b", [Path(__file__)]) > 40  # the count can count
+    assert words(r"\bdef\b", [Path(__file__)]) > 20  # the count can count
 
 
 @pytest.mark.xfail(strict=True, reason="487 when the rule was written")

@@ -1,4 +1,4 @@
-"""Compile (or load from the cache) every kernel, so that a user's first run does not wait: `python -m bh.commands.warm_up`."""
+"""Compile (or load from the cache) every kernel, so that a first run does not wait: `python -m bh.commands.warm_up`."""
 
 from __future__ import annotations
 

@@ -141,8 +141,8 @@ class PathFile:
         if found != FORMAT:
             db.close()
             raise PathFileError(
-                f"'{file}' was written by another version (format {found}, this one reads {FORMAT}); make it anew from its "
-                "scene: bh run SCENE, or bh.trace(model, file=...)"
+                f"'{file}' was written by another version (format {found}, this one reads {FORMAT}); make it anew "
+                "from its scene: bh run SCENE, or bh.trace(model, file=...)"
             )
         return cls(file, db)
 

@@ -788,7 +788,7 @@ def test_a_file_of_version_0_1_is_refused_in_one_line(tmp_path: FilePath) -> Non
         CREATE TABLE arrays (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL, data BLOB NOT NULL);
         CREATE TABLE states (id INTEGER PRIMARY KEY, step INTEGER NOT NULL, lambda REAL NOT NULL);
         CREATE TABLE steps (step INTEGER PRIMARY KEY, outcome TEXT NOT NULL, reason TEXT NOT NULL);
-        INSERT INTO meta VALUES ('model', '{"format": 1, "steps": [[{"kind": "fold", "crease": "crease", "to": 1.2}]]}');
+        INSERT INTO meta VALUES ('model', '{"format": 1, "steps": [[{"kind": "fold", "crease": "a", "to": 1.2}]]}');
         INSERT INTO states VALUES (1, 0, 0.0);
         PRAGMA user_version = 2;
         """
@@ -796,7 +796,9 @@ def test_a_file_of_version_0_1_is_refused_in_one_line(tmp_path: FilePath) -> Non
     db.close()
     before = file.read_bytes()
     for use in (lambda: Path.load(file), lambda: trace(MODELS["held"], file=file, resume=True)):
-        with pytest.raises(PathFileError, match=r"format 2, this one reads 3\); make it anew from its scene") as told:
+        with pytest.raises(
+            PathFileError, match=r"format 2, this one reads 3\); make it anew from its scene"
+        ) as told:
             use()
         assert "\n" not in str(told.value)
         assert "old.bh" in str(told.value)
