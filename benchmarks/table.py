@@ -136,11 +136,11 @@ def folds() -> list[str]:
             f"| {name} | {path.unknowns} | {path.iterations} | {most} ({few}) | {took:.1f} | {ms:g} ({quick}) |"
         )
     path = bh.trace(appendix_b("a"))
-    system, record = path._system(0), path.records[-1]
+    system, record = path.system(0), path.records[-1]
 
     def iteration() -> None:
         now = system.evaluate(record.q, 0.95)  # a residual as in the middle of an increment
-        system.tangent(record.q, 0.95, now.forces).factorise().solve(now.residual)
+        system.tangent(record.q, 0.95, now.forces).matrix.factorise().solve(now.residual)
 
     with one_blas_thread():
         took = 1e3 * least(iteration)

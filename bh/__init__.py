@@ -8,67 +8,142 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from bh.runtime import viewer as _viewer
 from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
     from bh.errors import InputError, ModelError, PathFileError, SceneError
-    from bh.formulations.observables import Until, depth
+    from bh.formulations.protocols import Formulation, SheetSystem
+    from bh.formulations.registry import remarks
+    from bh.formulations.remarks import Remark
     from bh.formulations.state import Energy, State
-    from bh.model.actuations import Bar, Displace, Fold, Force, Moment, Pinch, Tether
-    from bh.model.model import CreaseLaw, Model, Sheet
-    from bh.model.refinement import Goal
-    from bh.model.supports import RigidBody, Support
+    from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
+    from bh.model.model import Model
+    from bh.model.pinch import Pinch
+    from bh.model.refinement import Goal, Refinement
+    from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
+    from bh.model.step import Actuation, Body, Step, StepBuilder, Zone
+    from bh.model.supports import Constraint, RigidBody, Support
+    from bh.model.until import Until, depth
+    from bh.paths.estimate import Accuracy
     from bh.paths.path import Path
     from bh.scene.load import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
     from bh.solvers.automatic import Automatic
     from bh.solvers.continuation import LoadControl
     from bh.solvers.newton import Newton
-    from bh.solving.accuracy import Accuracy
-    from bh.solving.follow import trace
+    from bh.solvers.outcome import Outcome
+    from bh.solving.trace import trace
 
-_HOME = {
-    "Accuracy": "bh.solving.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
-    "Bar": "bh.model.actuations", "CreaseLaw": "bh.model.model", "Tether": "bh.model.actuations",
-    "Displace": "bh.model.actuations", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.formulations.state",
-    "Fold": "bh.model.actuations",
-    "Force": "bh.model.actuations", "Goal": "bh.model.refinement", "InputError": "bh.errors",
-    "LoadControl": "bh.solvers.continuation",
-    "Model": "bh.model.model", "ModelError": "bh.errors", "Moment": "bh.model.actuations", "Newton": "bh.solvers.newton",
-    "Path": "bh.paths.path", "PathFileError": "bh.errors", "Pinch": "bh.model.actuations",
-    "RigidBody": "bh.model.supports", "SceneError": "bh.errors",
-    "Sheet": "bh.model.model", "State": "bh.formulations.state", "Until": "bh.formulations.observables", "depth": "bh.formulations.observables",
-    "Support": "bh.model.supports", "load_scene": "bh.scene.load", "trace": "bh.solving.follow",
-}  # fmt: skip
-
-_SUBMODULES = {
-    "contact": "bh.analysis.contact", "corrugation": "bh.applications.corrugation",
-    "creases": "bh.analysis.creases", "interactive": "bh.plotting.interactive",
+# where a name is; `tests/test_architecture.py` holds it against the imports above
+_NAMES = {
+    "bh.errors": "InputError ModelError PathFileError SceneError",
+    "bh.formulations.protocols": "Formulation SheetSystem",
+    "bh.formulations.registry": "remarks",
+    "bh.formulations.remarks": "Remark",
+    "bh.formulations.state": "Energy State",
+    "bh.model.actuations": "Displace Fold Force Indenter Moment Tether",
+    "bh.model.model": "Model",
+    "bh.model.pinch": "Pinch",
+    "bh.model.refinement": "Goal Refinement",
+    "bh.model.sheet": "CreaseLaw ElementStiffness Sheet",
+    "bh.model.step": "Actuation Body Step StepBuilder Zone",
+    "bh.model.supports": "Constraint RigidBody Support",
+    "bh.model.until": "Until depth",
+    "bh.paths.estimate": "Accuracy",
+    "bh.paths.path": "Path",
+    "bh.scene.load": "load_scene",
+    "bh.solvers.arc_length": "ArcLength DisplacementControl",
+    "bh.solvers.automatic": "Automatic",
+    "bh.solvers.continuation": "LoadControl",
+    "bh.solvers.newton": "Newton",
+    "bh.solvers.outcome": "Outcome",
+    "bh.solving.trace": "trace",
+}
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
+_MODULES = {
+    "contact": "bh.analysis.contact",
+    "corrugation": "bh.applications.corrugation",
+    "creases": "bh.analysis.creases",
+    "interactive": "bh.plotting.interactive",
     "isometric": "bh.analysis.isometric",
-    "node_sensitivities": "bh.analysis.node_sensitivities", "pinching": "bh.applications.pinching",
-    "plotting": "bh.plotting", "polish": "bh.applications.polish", "scan": "bh.applications.scan",
+    "node_sensitivities": "bh.analysis.node_sensitivities",
+    "pinching": "bh.applications.pinching",
+    "plotting": "bh.plotting",
+    "polish": "bh.applications.polish",
     "rulings": "bh.analysis.rulings",
+    "scan": "bh.applications.scan",
     "sensitivities": "bh.analysis.sensitivities",
-    "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",
-}  # fmt: skip
+    "stiffness_probe": "bh.analysis.stiffness_probe",
+    "sweep": "bh.sweep",
+}
 
 __all__ = [
-    "Accuracy", "ArcLength", "Automatic", "Bar", "CreaseLaw", "Displace", "DisplacementControl", "Energy", "Fold",
-    "Force", "Goal", "InputError", "LoadControl", "Model", "ModelError", "Moment",
-    "Newton", "Path", "PathFileError", "Pinch", "RigidBody", "SceneError", "Sheet", "State", "Support", "Tether",
-    "Until", "depth", "load_scene", "trace",
-]  # fmt: skip
+    "Accuracy",
+    "Actuation",
+    "ArcLength",
+    "Automatic",
+    "Body",
+    "Constraint",
+    "CreaseLaw",
+    "Displace",
+    "DisplacementControl",
+    "ElementStiffness",
+    "Energy",
+    "Fold",
+    "Force",
+    "Formulation",
+    "Goal",
+    "Indenter",
+    "InputError",
+    "LoadControl",
+    "Model",
+    "ModelError",
+    "Moment",
+    "Newton",
+    "Outcome",
+    "Path",
+    "PathFileError",
+    "Pinch",
+    "Refinement",
+    "Remark",
+    "RigidBody",
+    "SceneError",
+    "Sheet",
+    "SheetSystem",
+    "State",
+    "Step",
+    "StepBuilder",
+    "Support",
+    "Tether",
+    "Until",
+    "Zone",
+    "depth",
+    "load_scene",
+    "remarks",
+    "trace",
+]
+
+
+def _show(path: Path, **options: Any) -> Any:
+    """What `path.plot()` does."""
+    from bh.plotting.pictures import show
+
+    return show(path[-1], **options)
+
 
 _ensure_kernel_cache()
+_viewer.use(_show)
 
 
 def __getattr__(name: str) -> Any:
+    """A name of the table, loaded now; a module under its short name; or the version."""
     if name in _HOME:
         value = getattr(import_module(_HOME[name]), name)
         globals()[name] = value
         return value
-    if name in _SUBMODULES:
-        return import_module(_SUBMODULES[name])
+    if name in _MODULES:
+        return import_module(_MODULES[name])
     if name == "__version__":
         from importlib.metadata import version
 
@@ -77,4 +152,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    return sorted([*globals(), *_HOME, *_MODULES])

@@ -40,7 +40,7 @@ PUBLIC = ("bh", "meshes")
 USE = ("meshes.io",)
 EXTENSION = (
     "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
-    "bh.formulations.registry", "bh.solvers.system",
+    "bh.formulations.protocols", "bh.formulations.registry", "bh.solvers.system",
 )  # fmt: skip
 
 

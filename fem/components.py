@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.model.actuations import Ramp
+from bh.model.ramp import Ramp
 from bh.model.supports import Constraints
 from fem.connectors import Connectors
 from fem.shell import ShellElements
@@ -145,7 +145,7 @@ def lay_out(
     turns = elements.tables.rotations
     still = np.zeros((edges, turns), dtype=bool)
     still[clamped] = True
-    fixed = np.concatenate((constraints.fixed.ravel(), still.ravel(), np.repeat(creases.held, turns)))
+    fixed = np.concatenate((constraints.fixed.ravel(), still.ravel(), np.repeat(creases.prescribed, turns)))
     none = np.zeros(turns * edges)
     displacement = local_axes(constraints, positions - mesh.nodes).ravel()
     begin = np.concatenate((displacement, none, beta[creases.hinges].ravel()))

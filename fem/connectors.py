@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.loading.load_step import StepProgram
-from bh.model.actuations import Ramp
-from bh.model.laws import HELD, SHEET, SPRING
+from bh.loading.load_step import LoadStep
+from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from fem.shell import edge_tangents
 from fem.spaces import tables
 from meshes.curved import ElementMesh
@@ -40,7 +40,7 @@ class Connectors:
     Attributes:
         hinges: (c,) rows of `mesh.topology.hinges`; edges: (c,) of `mesh.topology.edges`.
         of_edge: (e,) row of a creased edge, -1 elsewhere.
-        held: (c,) True where beta is imposed; `angle` (c, r) what is imposed.
+        prescribed: (c,) True where beta is imposed; `angle` (c, r) what is imposed.
         mass: (c, r, r) int of the products of beta's shape functions, mm.
         stiffness: (c,) k_f a length, N mm / (mm rad); rest: (c, r) beta_R; moment: (c,) couple a length, N.
     """
@@ -48,7 +48,7 @@ class Connectors:
     hinges: Ints
     edges: Ints
     of_edge: Ints
-    held: NDArray[np.bool_]
+    prescribed: NDArray[np.bool_]
     angle: Ramp
     mass: Array
     stiffness: Array
@@ -95,7 +95,7 @@ class Connectors:
 
 
 def connectors(
-    mesh: ElementMesh, model: Model, program: StepProgram, beta: Array, couple: Array
+    mesh: ElementMesh, model: Model, load_step: LoadStep, beta: Array, couple: Array
 ) -> Connectors:
     """Creased edges of a step that begins with fold angles beta (m, r) and couples on them (m, r), N mm / rad.
 
@@ -103,13 +103,13 @@ def connectors(
         ModelError: a couple acts where there is no crease to turn.
     """
     topology = model.mesh.topology
-    loaded = (program.law == SHEET) & ((program.moment.start != 0.0) | (program.moment.end != 0.0))
+    loaded = (load_step.law == SHEET) & ((load_step.moment.start != 0.0) | (load_step.moment.end != 0.0))
     if loaded.any():
         edge = topology.hinges[int(np.argmax(loaded)), 1:3].tolist()
         raise ModelError(
             f"a moment acts at edge {edge}, which is no spring crease; give its crease a stiffness (0 for a free hinge)"
         )
-    hinges = np.flatnonzero(program.law != SHEET)
+    hinges = np.flatnonzero(load_step.law != SHEET)
     edges = topology.hinge_edges[hinges]
     of_edge = np.full(len(topology.edges), -1, dtype=np.int64)
     of_edge[edges] = np.arange(len(edges))
@@ -117,8 +117,8 @@ def connectors(
     turns = table.rotations
     speed = np.linalg.norm(edge_tangents(mesh, mesh.nodes), axis=-1)
     mass = np.einsum("p,cp,ip,jp->cij", table.edge_weights, speed[edges], table.turn, table.turn)
-    held = program.law[hinges] == HELD
-    stiffness = np.where(program.law == SPRING, program.stiffness, 0.0)[hinges]
+    prescribed = load_step.law[hinges] == PRESCRIBED
+    stiffness = np.where(load_step.law == SPRING, load_step.stiffness, 0.0)[hinges]
 
     def fold(angles: Array) -> Array:
         """(c, r) fold angles of dihedral angles (m, 2) at the ends of edges, or (m,) of whole edges."""
@@ -126,15 +126,16 @@ def connectors(
         return out
 
     begin = beta[hinges]
-    imposed = program.held_angles(math.pi - (beta if turns == 2 else beta[:, 0]))
-    springs = program.rest_ends if turns == 2 else program.rest
-    angle = Ramp(*(np.where(held[:, None], fold(at), 0.0) for at in (imposed.start, imposed.end)))
-    # a held crease that is released keeps its moment: k (rest - beta) is what the crease carried
+    imposed = load_step.prescribed_angles(math.pi - (beta if turns == 2 else beta[:, 0]))
+    springs = load_step.rest_ends if turns == 2 else load_step.rest
+    angle = Ramp(*(np.where(prescribed[:, None], fold(at), 0.0) for at in (imposed.start, imposed.end)))
+    # a prescribed crease that is released keeps its moment: k (rest - beta) is what the crease carried
     turn = np.linalg.solve(mass, couple[hinges][..., None])[..., 0]
     released = begin + turn / np.where(stiffness > 0.0, stiffness, np.inf)[:, None]
     start = fold(springs.start)
     rest = Ramp(np.where(np.isnan(start), released, start), fold(springs.end))
     load = Ramp(
-        np.where(held, 0.0, program.moment.start[hinges]), np.where(held, 0.0, program.moment.end[hinges])
+        np.where(prescribed, 0.0, load_step.moment.start[hinges]),
+        np.where(prescribed, 0.0, load_step.moment.end[hinges]),
     )
-    return Connectors(hinges, edges, of_edge, held, angle, mass, stiffness, rest, load)
+    return Connectors(hinges, edges, of_edge, prescribed, angle, mass, stiffness, rest, load)

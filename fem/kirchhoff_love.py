@@ -9,18 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.formulations.remarks import Remark
 from bh.formulations.state import State
-from bh.loading.load_step import StepProgram
-from bh.loading.program import program
-from bh.model.model import Model, Sheet
+from bh.loading.builder import load_steps
+from bh.loading.load_step import LoadStep
+from bh.model.model import Model
 from bh.model.refinement import Refinement
+from bh.model.sheet import Sheet
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
+from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
 from fem.loads import EdgeMoments
-from fem.observables import ShellState, observe
+from fem.observables import observe
 from fem.shell import ShellElements, shell_elements
+from fem.state import ShellState
 from fem.system import ShellSystem
 from meshes import SheetMesh
 from meshes.curved import LinearMesh, lift
@@ -40,7 +44,7 @@ class Shell:
     )
 
     def system(
-        self, model: Model, program: StepProgram, start: State | None, moments: EdgeMoments = FREE
+        self, model: Model, load_step: LoadStep, start: State | None, moments: EdgeMoments = FREE
     ) -> ShellSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet).
 
@@ -51,7 +55,11 @@ class Shell:
             raise ModelError(
                 f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
             )
-        return ShellSystem(model, program, start, _elements(model.mesh, model.sheet, self.degree), moments)
+        return ShellSystem(model, load_step, start, _elements(model.mesh, model.sheet, self.degree), moments)
+
+    def remarks(self, model: Model) -> tuple[Remark, ...]:
+        """None: the shell asks nothing of the pattern of its mesh."""
+        return ()
 
     def observe(
         self,
@@ -104,16 +112,16 @@ def _follow(
     shell = Shell()
     states: list[ShellState] = []
     increments: list[Increment] = []
-    programs = program(model)
-    for step, ramps in enumerate(programs):
+    steps = load_steps(model)
+    for step, load_step in enumerate(steps):
         now = moments[step] if moments else FREE
-        system = shell.system(model, ramps, states[-1] if states else None, now)
+        system = shell.system(model, load_step, states[-1] if states else None, now)
         begin = point(system, system.start(), 0.0)
         if not states:
             states.append(shell.observe(model, system, begin.q, 0.0))
         for increment in walk(Walk(system, strategy, (begin,))):
             increments.append(increment)
-            if increment.outcome != "reached":
+            if increment.outcome != Outcome.REACHED:
                 return states, increments
             at = increment.point
             states.append(shell.observe(model, system, at.q, at.lam, step, increment.stable))

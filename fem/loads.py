@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.formulations.observables import Until
-from bh.loading.program import program
-from bh.model.actuations import Actuation, Displace, Fold, Force, Ramp
+from bh.loading.builder import load_steps
+from bh.model.actuations import Displace, Fold, Force
 from bh.model.model import Model
+from bh.model.ramp import Ramp
+from bh.model.step import Actuation
 from bh.model.supports import Constraints, select
 from fem.components import edge_set
 from fem.shell import ShellElements
@@ -38,11 +39,14 @@ def constraints(mesh: ElementMesh, model: Model, step: int) -> Constraints:
 
     A support of listed nodes holds just these corners.
     """
-    steps = tuple(tuple(_plain(item) for item in actuations) for actuations in model.steps[: step + 1])
-    return program(replace(model, mesh=mesh.linear, steps=steps))[step].constraints
+    steps = tuple(
+        replace(each, actuations=tuple(_plain(item) for item in each.actuations))
+        for each in model.steps[: step + 1]
+    )
+    return load_steps(replace(model, mesh=mesh.linear, steps=steps))[step].constraints
 
 
-def _plain(item: Actuation | Until) -> Actuation | Until:
+def _plain(item: Actuation) -> Actuation:
     """Fold angles an edge do not fit the halved edges, and do not matter here."""
     if not isinstance(item, Fold):
         return item
@@ -61,17 +65,16 @@ def forces(mesh: ElementMesh, model: Model, step: int, acting: Ramp, lengths: Ar
     They are those of `acting` (corners, 3), what the steps ask for, but that a `total` on a named set of edges is a
     uniform line load a length of edge instead of equal shares.
     """
-    for actuations in model.steps[
+    for each in model.steps[
         :step
-    ]:  # nobody knows here which part of a line load acted where such a step ended
-        moved = any(isinstance(item, Force | Displace) for item in actuations)
-        if moved and any(isinstance(item, Until) for item in actuations):
+    ]:  # which part of a line load acted where such a step ended is not known here
+        if each.until is not None and any(isinstance(item, Force | Displace) for item in each.actuations):
             raise ModelError("the shell cannot go on after a force or displacement that `until` ended early")
     lines: dict[str, Array] = {}
     before: dict[str, Array] = {}
-    for actuations in model.steps[: step + 1]:
+    for each in model.steps[: step + 1]:
         before = dict(lines)
-        for item in actuations:
+        for item in each.actuations:
             if isinstance(item, Force) and isinstance(item.at, str) and item.at in mesh.sheet.edge_sets:
                 lines[item.at] = _line(mesh, item, lengths)
 

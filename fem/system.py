@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.loading.load_step import StepProgram
-from bh.model.actuations import Ramp
+from bh.loading.load_step import LoadStep
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from bh.model.supports import TURNED, UNBALANCED
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
-from bh.solvers.system import Evaluation, grows_ahead
+from bh.solvers.outcome import Outcome
+from bh.solvers.system import Evaluation, Tangent, grows_ahead
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
 from fem.connectors import connectors
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
-from fem.observables import ShellState
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
 from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, unit
+from fem.state import ShellState
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -65,7 +66,7 @@ class ShellSystem:
     def __init__(
         self,
         model: Model,
-        program: StepProgram,
+        load_step: LoadStep,
         start: ShellState | None,
         elements: ShellElements,
         moments: EdgeMoments,
@@ -74,11 +75,11 @@ class ShellSystem:
             raise ModelError(
                 "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
             )
-        if program.bodies:
+        if load_step.bodies:
             raise ModelError(
                 "the shell knows no bars and tethers; take formulation consistent or bars-and-hinges"
             )
-        self.program, self.elements = program, elements
+        self.load_step, self.elements = load_step, elements
         mesh = self.mesh = elements.mesh
         step = 0 if start is None else start.step + 1
         x = mesh.nodes if start is None else start.nodes
@@ -86,9 +87,9 @@ class ShellSystem:
         flat = np.zeros((len(model.mesh.topology.hinges), elements.tables.rotations))
         beta = flat if start is None else start.fold_angles
         couple = flat if start is None else start.crease_couples
-        self.creases = connectors(mesh, model, program, beta, couple)
+        self.creases = connectors(mesh, model, load_step, beta, couple)
         self.constraints = loads.constraints(mesh, model, step)
-        clamped = mesh.sheet.topology.find_edges(program.constraints.clamped)
+        clamped = mesh.sheet.topology.find_edges(load_step.constraints.clamped)
         self.components = lay_out(elements, self.constraints, self.creases, x, beta, clamped)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
@@ -97,7 +98,7 @@ class ShellSystem:
 
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
-        force = loads.forces(self.mesh, model, step, self.program.force, self.elements.lengths)
+        force = loads.forces(self.mesh, model, step, self.load_step.force, self.elements.lengths)
         couple = loads.edge_moments(self.elements, moments)
         none = np.zeros(self.elements.tables.rotations * len(self.creases))
         ends = [
@@ -118,7 +119,7 @@ class ShellSystem:
 
     @property
     def rotation(self) -> float:
-        return self.program.rotation
+        return self.load_step.rotation
 
     @cached_property
     def energy_scale(self) -> float:
@@ -243,8 +244,12 @@ class ShellSystem:
     def element_tangents(self, here: Here, forces: Array) -> Array:
         return self.elements.tangent(here.x, forces.reshape(here.forces.shape), here.B, self.frames)
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         here = self.at(q, lam)
+        return Tangent(self._matrix(here, forces), partial(self._predicted_forces, here.B))
+
+    def _matrix(self, here: Here, forces: Array) -> Matrix:
         K = self.element_tangents(here, forces)
         if (self.constraints.frame_of >= 0).any():
             turn_blocks(K, self.mesh.triangles, self.constraints.frame_of, self.constraints.frames)
@@ -261,11 +266,11 @@ class ShellSystem:
         ground = self._ground(Z, data)
         return FreeBodyMatrix(pattern.matrix(data), Z, *ground)
 
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
-        assert self._here is not None  # the tangent was made there
+    def _predicted_forces(self, B: Array, forces: Array, dq: Array) -> Array:
+        """Element forces after an increment dq (size,) from where measures had the derivatives B, linear in dq."""
         change = np.zeros(len(self.components.number))
         change[self.components.free] = dq
-        measure = np.einsum("tkj,tj->tk", self._here.B, self.components.gather(change))
+        measure = np.einsum("tkj,tj->tk", B, self.components.gather(change))
         return forces + self.elements.forces(*np.hsplit(measure, 2)).ravel()
 
     def control_rate(self, q: Array, lam: float) -> Array:
@@ -313,10 +318,10 @@ class ShellSystem:
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         return ""  # the shell knows no contact: its sides may pass through each other
 
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+    def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
         if not self.constraints.rigid_body or not (self.load.start.any() or self.load.end.any()):
-            return "", ""
-        return ("mechanism", TURNED) if grows_ahead(self, q, lam, self._unbalanced) else ("", "")
+            return None
+        return (Outcome.MECHANISM, TURNED) if grows_ahead(self, q, lam, self._unbalanced) else None
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         c = self.components

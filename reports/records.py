@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from reports.figures import Plot, ReportError, csv_link
 
+REACHED = "reached"  # the outcome of a record that has a value; others say why there is none
 VERDICTS = ("holds", "reported", "differs")  # from the best to the worst
 
 
@@ -34,7 +35,7 @@ class Check(BaseModel):
     unknowns: float | None = None
     iterations: float | None = None
     wall_time_s: float | None = None
-    outcome: str = "reached"
+    outcome: str = REACHED
 
     @property
     def use(self) -> float:
@@ -57,7 +58,7 @@ class Check(BaseModel):
             return "reported"
         if self.passed:
             return "pass"
-        return "failed" if self.outcome == "reached" else f"failed: {self.outcome}"
+        return "failed" if self.outcome == REACHED else f"failed: {self.outcome}"
 
 
 class Picture(BaseModel):

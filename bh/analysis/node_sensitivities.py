@@ -13,18 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.analysis.sensitivities import (
-    OFFSETS,
-    STEP,
-    Data,
-    Observable,
-    Situation,
-    data_of,
-    derivatives_to_data,
-    differences,
-)
+from bh.analysis.sensitivities import OFFSETS, STEP, Observable, data_of, derivatives_to_data, differences
+from bh.analysis.situation import Situation
 from bh.errors import ModelError
-from bh.loading.program import program
+from bh.formulations.protocols import Data
+from bh.loading.builder import load_steps
 from bh.paths.path import Path
 from bh.runtime.threads import one_blas_thread
 
@@ -61,11 +54,11 @@ def of_nodes(path: Path, observables: Sequence[Observable], index: int = -1) -> 
         mesh = at.model.mesh
         if not mesh.flat:
             raise ModelError("sensitivities to nodes are those of flat sheets; this one is made curved")
-        if any(not np.isnan(step.pinch.toward).all() for step in program(at.model)[: at.step + 1]):
+        if any(not np.isnan(step.pinch.toward).all() for step in load_steps(at.model)[: at.step + 1]):
             raise ModelError("a pinched zone depends on all nodes of its crease; take bh.sensitivities.of")
         slopes = [(observable.value(at), observable.slope(at)) for observable in observables]
         weights = [derivatives_to_data(at, slope, value) for value, slope in slopes]
-        support = at.design.support()
+        support = at.derivatives.support()
         colour = colours(mesh.topology.hinges, mesh.triangles, len(mesh.points))
         ends = mesh.points[mesh.topology.edges]
         h = STEP * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
@@ -85,7 +78,7 @@ def _rates(at: Situation, moving: NDArray[np.bool_], axis: int, h: float) -> Dat
         points = at.model.mesh.points.copy()
         points[moving, axis] += offset * h
         around.append(data_of(at, replace(at.model, mesh=replace(at.model.mesh, points=points))))
-    return differences(around, h)[0]
+    return differences(around, h, at.derivatives.unfollowed)[0]
 
 
 def _add(out: Array, weight: Data, rates: Data, support: dict[str, Ints], moving: NDArray[np.bool_]) -> None:

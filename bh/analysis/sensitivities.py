@@ -8,8 +8,8 @@ supports), the design p behind them and an observable J, the adjoint a of the fa
 one solve for each observable and any number of design parameters. Here q are the places of the free nodes, with the
 edge rotations or moments that go with them: they stay while the stress-free sheet changes under them.
 
-K, a and both partial derivatives are exact (`bh.mechanics.bars_and_hinges.derivatives`, `consistent_design`). dd/dp comes from the
-function that makes the model: central differences of sixth order of the element data. No solution and no residual is
+K, a and both partial derivatives are exact (`bh.formulations.protocols.Derivatives`). dd/dp comes from the function
+that makes the model: central differences of sixth order of the element data. No solution and no residual is
 differenced, only smooth closed formulas such as a length or E t^3 L^2 / (6 A). Their error is measured as the distance
 to differences of fourth order and reported (`Sensitivity.error`). Of a stiffness the derivative of K along the sheet's
 response is differenced as well. Where a pinch goes on from angles that the step before came to, the adjoint of that
@@ -18,38 +18,30 @@ step's end follows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bh.analysis.situation import Situation
 from bh.errors import ModelError
-from bh.formulations.observables import until_of
-from bh.formulations.registry import formulation
-from bh.formulations.state import State
+from bh.formulations.protocols import Data
+from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges
-from bh.loading.program import program
 from bh.model.model import Model
 from bh.model.supports import directions, select
 from bh.paths.path import Path
 from bh.runtime.threads import one_blas_thread
-from bh.solvers.factor import Factor, IndefiniteError
-from bh.solvers.matrices import FreeBodyMatrix
-from bh.solvers.saddle import MultiplierMatrix
 
 Array = NDArray[np.float64]
-Data = dict[str, Array]
 Build = Callable[[Array], Model]
 STEP = 1e-3  # of a parameter
 OFFSETS = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
 SIXTH = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 FOURTH = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
 ALONG = 1e-3  # of the shortest edge: how far a state is moved along a response
-UNBALANCED = 1e-8  # part of an observable's gradient along motions that are free
-REFINED = 2
 KINDS = ("stretching", "bending", "folding")
 
 
@@ -61,89 +53,16 @@ class Slope(NamedTuple):
     data: Data
 
 
-class Situation:
-    """A solved state with its factorised tangent: what observables are read from."""
-
-    def __init__(self, path: Path, index: int) -> None:
-        self.path, self.model = path, path.model
-        self.system, record = path.solved(index)
-        if not hasattr(self.system, "design"):
-            raise ModelError(
-                f"formulation '{path.model.formulation}' has no sensitivities; use bars-and-hinges or consistent"
-            )
-        if record.step > 0 and record.lam != 1.0:
-            raise ModelError(
-                f"the state at lambda {record.lam:.4g} of step {record.step + 1} depends on the step before; "
-                "take its end"
-            )
-        if any(until_of(step) is not None for step in path.model.steps[: record.step + 1]):
-            raise ModelError(
-                "a step that ends where an observable has a value has no sensitivities; give it its end"
-            )
-        if self.system.touching is not None:
-            raise ModelError("sheets that bars press on have no sensitivities; leave the bars out")
-        self.step, self.q, self.lam = record.step, record.q, record.lam
-        self.state: State = path[index]
-        before = [i for i, other in enumerate(path.records) if other.step < record.step]
-        self._before = before[-1] if before else None
-        self.start: State | None = None if self._before is None else path[self._before]
-        self.moving = int(self.system.moving)
-        self.matrix = self.system.tangent(self.q, self.lam, self.system.evaluate(self.q, self.lam).forces)
-        try:
-            self._factor: Factor = self.matrix.factorise_any()[0]
-        except IndefiniteError:
-            raise ModelError(
-                "the tangent of this state is singular: it has no sensitivities; add supports"
-            ) from None
-        inner = self.matrix.augmented if isinstance(self.matrix, MultiplierMatrix) else self.matrix
-        self._rigid = np.zeros((len(self.q), 0))
-        if isinstance(inner, FreeBodyMatrix):
-            self._rigid = np.zeros((len(self.q), inner.Z.shape[1]))
-            self._rigid[: len(inner.Z)] = inner.Z
-
-    @cached_property
-    def previous(self) -> Situation:
-        """The last state of the step before."""
-        assert self._before is not None
-        return Situation(self.path, self._before)
-
-    @cached_property
-    def design(self) -> Any:
-        """Exact derivatives of the system at this state."""
-        return self.system.design(self.q, self.lam)
-
-    def solve(self, load: Array, value: float = 0.0) -> Array:
-        """Response (size,) of the unknowns to a load, the slope of an observable of that value.
-
-        Raises:
-            ModelError: a free sheet would be moved as a rigid body.
-        """
-        along = self._rigid.T @ load
-        size = max(float(np.linalg.norm(load)), abs(value) / self.model.mesh.size)
-        if np.linalg.norm(along) > UNBALANCED * size:
-            raise ModelError(
-                "this observable changes when the sheet moves as a rigid body, which nothing prevents; give the model "
-                "supports, or observe something else"
-            )
-        load = load - self._rigid @ along
-        x = self._factor.solve(load)
-        for _ in range(REFINED):
-            x = x + self._factor.solve(load - self.matrix @ x)
-        return np.asarray(x - self._rigid @ (self._rigid.T @ x))
-
-    def load(self, points: Array, other: Array) -> Array:
-        """(size,) derivatives to the unknowns from those to all positions and to the other unknowns."""
-        out = np.array(self.system.loads(points))
-        out[self.moving :] += other
-        return out
-
-
 class Observable(Protocol):
     """A number that is read from a state."""
 
-    def value(self, at: Situation) -> float: ...
+    def value(self, at: Situation) -> float:
+        """The number itself."""
+        ...
 
-    def slope(self, at: Situation) -> Slope: ...
+    def slope(self, at: Situation) -> Slope:
+        """Its derivatives."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -164,9 +83,11 @@ class Position:
         return forces
 
     def value(self, at: Situation) -> float:
+        """Mean coordinate along the direction, mm."""
         return float(np.vdot(self.forces(at), at.state.points))
 
     def slope(self, at: Situation) -> Slope:
+        """Unit force along the direction."""
         return Slope(self.forces(at), np.zeros(len(at.q) - at.moving), {})
 
 
@@ -177,16 +98,23 @@ class Energy:
     kind: str = "total"
 
     def __post_init__(self) -> None:
+        """See that the kind is known.
+
+        Raises:
+            ModelError: it is not.
+        """
         if self.kind not in ("total", *KINDS):
             raise ModelError(f"energy '{self.kind}' is not known; use total, {', '.join(KINDS)}")
 
     def value(self, at: Situation) -> float:
+        """Energy of the kind, N mm."""
         return float(getattr(at.state.energy, self.kind))
 
     def slope(self, at: Situation) -> Slope:
+        """Forces and moments of the kind, and what its data do to it."""
         kinds = KINDS if self.kind == "total" else (self.kind,)
-        points, other = at.design.energy_gradient(kinds)
-        return Slope(points, other, at.design.energy_to_data(kinds))
+        points, other = at.derivatives.energy_gradient(kinds)
+        return Slope(points, other, at.derivatives.energy_to_data(kinds))
 
 
 @dataclass(frozen=True)
@@ -205,11 +133,13 @@ class FoldAngle:
         return hinges[[self.edge]]
 
     def value(self, at: Situation) -> float:
+        """Mean fold angle, rad; mountain positive."""
         return float(np.pi - at.state.dihedral_angles[self._hinges(at)].mean())
 
     def slope(self, at: Situation) -> Slope:
+        """Gradients of the angle, rad / mm."""
         hinges = self._hinges(at)
-        return Slope(*at.design.angle_gradient(hinges, np.full(len(hinges), -1.0 / len(hinges))))
+        return Slope(*at.derivatives.angle_gradient(hinges, np.full(len(hinges), -1.0 / len(hinges))))
 
 
 @dataclass(frozen=True)
@@ -219,9 +149,15 @@ class OfPoints:
     function: Callable[[Array], tuple[float, Array]]
 
     def value(self, at: Situation) -> float:
+        """What the function gives."""
         return float(self.function(at.state.points)[0])
 
     def slope(self, at: Situation) -> Slope:
+        """The gradient that the function gives.
+
+        Raises:
+            ModelError: it is not of the shape of the points.
+        """
         gradient = np.asarray(self.function(at.state.points)[1], dtype=float)
         if gradient.shape != at.state.points.shape:
             raise ModelError(
@@ -238,12 +174,14 @@ class OfNodes:
     """
 
     nodes: Sequence[int]
-    function: Callable[[Any], Any]
+    function: Callable[[NDArray[np.float64 | np.complex128]], complex]
 
     def value(self, at: Situation) -> float:
+        """What the function gives."""
         return float(np.real(self.function(at.state.points[list(self.nodes)])))
 
     def slope(self, at: Situation) -> Slope:
+        """The gradient of the function by a complex step, exact to rounding."""
         places = at.state.points[list(self.nodes)]
         points = np.zeros_like(at.state.points)
         for i, node in enumerate(self.nodes):
@@ -271,6 +209,7 @@ class Stiffness:
         return 1.0 / float(load @ w), w
 
     def value(self, at: Situation) -> float:
+        """Stiffness, N / mm."""
         return self._response(at)[0]
 
     def slope(self, at: Situation) -> Slope:
@@ -280,12 +219,13 @@ class Stiffness:
         ends = at.model.mesh.points[at.model.mesh.topology.edges]
         short = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
         step = ALONG * short / float(np.abs(v).max())
-        moved = [at.system.design(at.q + k * step * w, at.lam).second_variation(v, other) for k in OFFSETS]
+        beside = (at.formulation.derivatives(at.system, at.q + k * step * w, at.lam) for k in OFFSETS)
+        moved = [there.second_variation(v, other) for there in beside]
         scale = stiffness**2
         points, rest = (
             scale / step * np.tensordot(SIXTH, np.array([m[part] for m in moved]), 1) for part in range(2)
         )
-        data = {key: scale * value for key, value in at.design.second_to_data(v, other).items()}
+        data = {key: scale * value for key, value in at.derivatives.second_to_data(v, other).items()}
         return Slope(points, rest, data)
 
 
@@ -318,6 +258,7 @@ def of(
         path: solved, of `build(design)`.
         build: makes the model of a design (k,): geometry by a parametrised pattern and a mesh of fixed topology, sheet,
             creases, rest angles, forces, whatever a model has. It must be smooth near the design.
+        design: (k,) parameters of the solved path.
         observables: `Position`, `Energy`, `FoldAngle`, `Stiffness`, `OfPoints` or any `Observable`.
         index: of the state, at the end of a step (in the first step any).
         steps: (k,) of the differences, by default a thousandth of each parameter (0.001 where it is zero).
@@ -353,13 +294,13 @@ def _gradient(at: Situation, slope: Slope, value: float, around: _Around) -> tup
         [sum(float(np.vdot(np.abs(by_data[key]), off[key])) for key in by_data) for _, off in rates]
     )
     # what a pinch imposes follows from the angles that its step began with
-    pinch = program(at.model)[at.step].pinch
+    pinch = load_steps(at.model)[at.step].pinch
     weights = np.where(np.isnan(pinch.base) & ~np.isnan(pinch.toward), 1.0 - pinch.part, 0.0)
-    weights = weights * at.design.imposed(by_data)
+    weights = weights * at.derivatives.imposed(by_data)
     follows = np.flatnonzero(weights)
     if len(follows) == 0:
         return gradient, error
-    earlier = Slope(*at.previous.design.angle_gradient(follows, weights[follows]))
+    earlier = Slope(*at.previous.derivatives.angle_gradient(follows, weights[follows]))
     more = _gradient(at.previous, earlier, float(np.abs(weights).sum()), around)
     return gradient + more[0], error + more[1]
 
@@ -368,9 +309,9 @@ def derivatives_to_data(at: Situation, slope: Slope, value: float) -> Data:
     """Derivatives of an observable to element data at equilibrium: its own, and by way of the state (the adjoint)."""
     adjoint = at.solve(at.load(slope.points, slope.other), value)
     v, w = at.system.vectors(adjoint), adjoint[at.moving :]
-    by_data = {key: -part for key, part in at.design.residual_to_data(v, w).items()}
+    by_data = {key: -part for key, part in at.derivatives.residual_to_data(v, w).items()}
     # nodes that supports hold move with them
-    by_data["places"] = slope.points - at.design.second_variation(v, w)[0]
+    by_data["places"] = slope.points - at.derivatives.second_variation(v, w)[0]
     for key, part in slope.data.items():
         by_data[key] = by_data[key] + part if key in by_data else part
     return by_data
@@ -396,7 +337,7 @@ class _Around:
         """For each parameter derivatives of the element data of a situation, and their measured errors."""
         if at.step not in self._known:
             self._known[at.step] = [
-                differences([data_of(at, model) for model in row], h)
+                differences([data_of(at, model) for model in row], h, at.derivatives.unfollowed)
                 for row, h in zip(self.models, self.steps, strict=True)
             ]
         return self._known[at.step]
@@ -404,7 +345,7 @@ class _Around:
 
 def data_of(at: Situation, model: Model) -> Data:
     """Element data of another model where a situation is."""
-    system = formulation(model.formulation).system(model, program(model)[at.step], at.start)
+    system = at.formulation.system(model, load_steps(model)[at.step], at.start)
     if system.size != at.system.size:
         raise ModelError("the unknowns change with the design; keep supports and creases fixed")
     here, there = at.system.constraints, system.constraints
@@ -412,20 +353,31 @@ def data_of(at: Situation, model: Model) -> Data:
         here.frames, there.frames, rtol=0.0, atol=1e-12
     ):
         raise ModelError("the directions of oblique supports change with the design; keep them fixed")
-    data: Data = system.design(at.q, at.lam).data()
-    return data
+    return at.formulation.derivatives(system, at.q, at.lam).data()
 
 
-def differences(around: list[Data], h: float) -> tuple[Data, Data]:
+def differences(around: list[Data], h: float, unfollowed: Mapping[str, str]) -> tuple[Data, Data]:
+    """Derivatives of element data by a parameter, from six samples.
+
+    Args:
+        around: data of the models at the parameter plus h times `OFFSETS`, in that order.
+        h: step of the parameter.
+        unfollowed: names of data that must not change, and what to say if they do (`Derivatives.unfollowed`).
+
+    Returns:
+        the derivatives, of sixth order, and their distances from those of fourth order.
+
+    Raises:
+        ModelError: data change by which no derivative is known.
+    """
     rates, errors = {}, {}
     for key in around[0]:
         samples = np.array([data[key] for data in around])
         rates[key] = np.tensordot(SIXTH, samples, 1) / h
         errors[key] = np.abs(np.tensordot(SIXTH - FOURTH, samples, 1)) / h
-    if "ghost" in rates and np.abs(rates["ghost"]).max(initial=0.0) > 0.0:
-        raise ModelError(
-            "sensitivities to geometry do not know clamped edges; hold their nodes, or keep the geometry"
-        )
+    for key, why in unfollowed.items():
+        if np.abs(rates[key]).max(initial=0.0) > 0.0:
+            raise ModelError(why)
     return rates, errors
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from bh.errors import ModelError
 from bh.formulations.registry import formulation
 from bh.formulations.state import State
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.model.model import Model
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.newton import Newton
@@ -55,15 +55,11 @@ def relax(model: Model, points: ArrayLike, newton: Newton | None = None) -> Rela
             f"positions have shape {x.shape}; give a finite array {model.mesh.points.shape} in mm"
         )
     form = formulation(model.formulation)
-    system = form.system(model, program(model)[0], None)
+    system = form.system(model, load_steps(model)[0], None)
     with one_blas_thread():
         # the least-squares displacement of the unknowns, which are components in orthonormal axes
         start = system.positions(np.zeros(system.size), 1.0)
-        q = system.loads(x - start) if hasattr(system, "loads") else None
-        if q is None:
-            raise ModelError(
-                f"formulation '{model.formulation}' cannot start from positions; use another one"
-            )
+        q = system.loads(x - start)
         found = (newton or Newton()).solve(system, q, 1.0)
     state = form.observe(model, system, found.q, 1.0, 0, found.stable)
     moved = np.linalg.norm(state.points - x, axis=1)

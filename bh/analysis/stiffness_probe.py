@@ -101,7 +101,7 @@ class Probe:
     """The tangent of one state of a path, factorised once.
 
     Args:
-        path: a solved path, of any formulation whose system has `vectors` and `loads`.
+        path: a solved path, of any formulation.
         index: of the state; the last one by default.
         hold: places whose nodes are held in all directions while probing, besides the supports.
 
@@ -117,10 +117,6 @@ class Probe:
         if not -len(path) <= index < len(path):
             raise ModelError(f"the path has {len(path)} states, none of index {index}; give one that it has")
         self.system, record = path.solved(index)
-        if not hasattr(self.system, "loads"):
-            raise ModelError(
-                f"formulation '{path.model.formulation}' has no nodal loads to probe with; solve with another one"
-            )
         self.mesh = path.model.mesh
         self.thickness = path.model.sheet.t
         self.q, self.lam = record.q, record.lam
@@ -128,7 +124,7 @@ class Probe:
         self._held = self._places(hold)
         with one_blas_thread():
             forces = self.system.evaluate(self.q, self.lam).forces
-            self.matrix: Matrix = self.system.tangent(self.q, self.lam, forces)
+            self.matrix: Matrix = self.system.tangent(self.q, self.lam, forces).matrix
             try:
                 self._factor: Factor = self.matrix.factorise_any()[0]
             except IndefiniteError:
@@ -228,12 +224,10 @@ class Probe:
             root = np.sqrt(TONNE * density * self.thickness * self._nodal_areas())
 
         def weigh(u: Array) -> Array:
-            out: Array = self.system.loads(root[:, None] * self.system.vectors(u))
-            return out
+            return self.system.loads(root[:, None] * self.system.vectors(u))
 
         def describe(u: Array) -> str:
-            words: str = self.system.describe(self.q, self.lam, u)
-            return words
+            return self.system.describe(self.q, self.lam, u)
 
         with one_blas_thread():
             response = Response(self._solve, H, self._rigid)

@@ -22,9 +22,10 @@ import meshes
 from bh.analysis.midplane import MidPlane, midplane
 from bh.errors import InputError, ModelError
 from bh.formulations.state import State
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from bh.paths.path import Path
-from bh.solving.follow import trace
+from bh.solving.trace import trace
 from meshes import CreasePattern
 
 Array = NDArray[np.float64]
@@ -108,7 +109,7 @@ def respond(pattern: CreasePattern, how: Pinching | None = None) -> Response:
         ModelError: the sheet did not get there; the message says how far.
     """
     path = trace((how or Pinching()).model(pattern))
-    if path.outcome != "reached":
+    if not path.reached:
         raise ModelError(
             f"the sheet could not be folded and pinched: {path.outcome} ({path.steps[-1].reason})"
         )

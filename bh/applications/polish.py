@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.analysis.sensitivities import Build, Observable, Situation, of
+from bh.analysis.sensitivities import Build, Observable, of
+from bh.analysis.situation import Situation
 from bh.errors import InputError, ModelError
 from bh.paths.path import Path
+from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy
-from bh.solving.follow import trace
+from bh.solving.trace import trace
 
 Array = NDArray[np.float64]
 FIRST = 0.25  # longest first step, in units of the scale
@@ -88,13 +90,13 @@ def polish(
         raise ModelError("the start lies outside its bounds; move it inside")
     observables = [observable for observable, _ in targets]
     path = trace(build(p), strategy=strategy)
-    if path.outcome != "reached":
+    if not path.reached:
         raise ModelError(f"the start cannot be solved ({path.outcome}): {path.reason}")
     missed = _values(path, observables) - wanted
     solves, history, trust, outcome = 1, [float((np.abs(missed) / allowed).max())], FIRST, ""
     while not outcome:
         if history[-1] <= 1.0:
-            outcome = "reached"
+            outcome = Outcome.REACHED
             break
         found = of(path, build, p, observables, steps=steps)
         J = np.array([item.gradient for item in found]) / allowed[:, None] * sizes
@@ -148,7 +150,7 @@ def _better(
         path = trace(build(p), strategy=strategy)
     except InputError:
         return None
-    if path.outcome != "reached":
+    if not path.reached:
         return None
     off = _values(path, observables) - wanted
     return (path, p, off) if ((off / allowed) ** 2).sum() < ((missed / allowed) ** 2).sum() else None

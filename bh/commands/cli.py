@@ -144,10 +144,10 @@ def run(
         written.append(folder / name)
     if not quiet:
         _summary(path, loaded, written, contact)
-    if path.outcome == "reached" and path.accuracy is not None and not path.accuracy.met:
+    if path.reached and path.accuracy is not None and not path.accuracy.met:
         typer.echo(f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}", err=True)
         raise typer.Exit(1)
-    if path.outcome != "reached":
+    if not path.reached:
         why = f" ({path.reason})" if path.reason else ""
         kept = "; the finished result of an earlier run is kept" if names == UNFINISHED else ""
         typer.echo(

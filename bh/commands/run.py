@@ -26,7 +26,8 @@ from bh.paths.path import Path as Trace
 from bh.paths.storage import PathFile, reading
 from bh.runtime.progress import ProgressMeter
 from bh.scene.load import Scene
-from bh.solving.follow import trace
+from bh.solvers.outcome import Outcome
+from bh.solving.trace import trace
 from meshes.io.export import replacing
 
 FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
@@ -72,7 +73,7 @@ def solve(
             _take_back(file, made)
         raise
     clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
-    if path.outcome == "reached":
+    if path.reached:
         if names == UNFINISHED:
             _move(file, folder / FINISHED[0])
         names = FINISHED
@@ -93,7 +94,7 @@ def _is_whole(file: Path, model: Model) -> bool:
     """True if all steps of the model are reached in a path file."""
     with contextlib.closing(PathFile.open(file)) as stored, reading(file):
         outcomes = [outcome for outcome, *_ in stored.steps().values()]
-    return outcomes == ["reached"] * len(model.steps)
+    return outcomes == [Outcome.REACHED] * len(model.steps)
 
 
 def path_file(folder: Path) -> Path:
@@ -149,7 +150,7 @@ def _is_finished(folder: Path) -> bool:
         result = json.loads((folder / FINISHED[1]).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return isinstance(result, dict) and result.get("outcome") == "reached"
+    return isinstance(result, dict) and result.get("outcome") == Outcome.REACHED
 
 
 def _make(folder: Path) -> list[Path]:
@@ -283,7 +284,7 @@ def extras(
     path: Trace, scene: Scene, folder: Path, pictures: bool, vtu: bool
 ) -> dict[str, Callable[[], Any]]:
     """What is written on request beside the result, by name (marked where a finished result is kept)."""
-    mark = "-unfinished" if path.outcome != "reached" and _is_finished(folder) else ""
+    mark = "-unfinished" if not path.reached and _is_finished(folder) else ""
 
     def draw() -> None:
         from bh.plotting import picture

@@ -3,75 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.formulations.state import State
 from bh.model.plugins import named
+from bh.model.until import Until
 from meshes import SheetMesh
 from meshes.topology import Ints
 
-if TYPE_CHECKING:
-    from bh.formulations.state import State
-
 Array = NDArray[np.float64]
-Observable = Callable[["State", str | None], float]
+Observable = Callable[[State, str | None], float]
 
 
-@dataclass(frozen=True)
-class Until:
-    """Ends a step of a model where an observable has a value; the step has failed if it never has it.
+def measure(until: Until, state: State) -> float:
+    """The observable of an `Until` at a state, in its own unit.
 
-    Attributes:
-        observable: a name of `OBSERVABLES`, or "module:function" of a function of a `State` (or that function itself,
-            if it can be imported).
-        value: wanted, in the observable's unit.
-        of: the crease or place that it is of, where it needs one.
-        tolerance: on the value.
+    Raises:
+        ModelError: the state has no such thing, or "module:function" cannot be imported.
     """
-
-    observable: str
-    value: float
-    of: str | None = None
-    tolerance: float = 1e-4
-
-    def __post_init__(self) -> None:
-        if callable(self.observable):
-            object.__setattr__(self, "observable", _importable(self.observable))
-        if self.observable not in OBSERVABLES and ":" not in self.observable:
-            known = ", ".join(OBSERVABLES)
-            raise ModelError(
-                f"observable '{self.observable}' is not known; use one of {known}, or module:function"
-            )
-        if not math.isfinite(self.value):
-            raise ModelError(f"until {self.observable} = {self.value} cannot be; give a finite number")
-        if not (math.isfinite(self.tolerance) and self.tolerance > 0.0):
-            raise ModelError(f"until: tolerance = {self.tolerance} cannot be; give a positive number")
-        if self.of is None and self.observable in NEEDS:
-            raise ModelError(f"until {self.observable} needs `of`, {NEEDS[self.observable]}")
-
-    def measure(self, state: State) -> float:
-        """The observable of a state."""
-        if self.observable in OBSERVABLES:
-            return OBSERVABLES[self.observable](state, self.of)
-        return float(named(self.observable)(state))
-
-
-def until_of(actuations: Sequence[object]) -> Until | None:
-    """What ends a step early, if anything does."""
-    return next((item for item in actuations if isinstance(item, Until)), None)
-
-
-def depth(to: float, tolerance: float = 1e-4) -> Until:
-    """Fold until a corrugation is `to` mm deep, highest mountain to lowest valley point (see `depth_of`)."""
-    if not (math.isfinite(to) and to > 0.0):
-        raise ModelError(f"depth = {to} mm cannot be; give a positive length in mm")
-    return Until("depth", to, tolerance=tolerance)
+    if until.observable in OBSERVABLES:
+        return OBSERVABLES[until.observable](state, until.of)
+    return float(named(until.observable)(state))
 
 
 def depth_of(state: State) -> tuple[float, Array]:
@@ -130,11 +86,11 @@ def _moved(state: State, of: str) -> Array:
 
 
 OBSERVABLES: dict[str, Observable] = {
-    "depth": lambda state, of: depth_of(state)[0],
-    "energy": lambda state, of: state.energy.total,
-    "stretching": lambda state, of: state.energy.stretching,
-    "bending": lambda state, of: state.energy.bending,
-    "folding": lambda state, of: state.energy.folding,
+    "depth": lambda state, _: depth_of(state)[0],
+    "energy": lambda state, _: state.energy.total,
+    "stretching": lambda state, _: state.energy.stretching,
+    "bending": lambda state, _: state.energy.bending,
+    "folding": lambda state, _: state.energy.folding,
     "fold_angle": lambda state, of: float(state.fold_angle(str(of)).mean()),
     "largest_fold": lambda state, of: float(np.abs(state.fold_angle(str(of))).max()),
     "dihedral": lambda state, of: float(state.dihedral(str(of)).mean()),
@@ -142,21 +98,3 @@ OBSERVABLES: dict[str, Observable] = {
     **{f"reaction_{axis}": _component(lambda s, of: s.reaction(of), k) for k, axis in enumerate("xyz")},
     **{f"displacement_{axis}": _component(_moved, k) for k, axis in enumerate("xyz")},
 }
-NEEDS = {
-    **dict.fromkeys(("fold_angle", "largest_fold", "dihedral", "moment"), "the name of a crease"),
-    **{
-        f"{what}_{axis}": "a place such as edge:start"
-        for what in ("reaction", "displacement")
-        for axis in "xyz"
-    },
-}
-
-
-def _importable(function: Callable[[State], float]) -> str:
-    """ "module:function" of a function, which must be found again in another process."""
-    module, name = getattr(function, "__module__", ""), getattr(function, "__qualname__", "")
-    if getattr(import_module(module), name, None) is not function:
-        raise ModelError(
-            f"until takes a function at the top of a module, not {name or function!r}; give it a name"
-        )
-    return f"{module}:{name}"

@@ -59,7 +59,7 @@ class State:
         crease_moments: (m,) moment a length carried by each crease hinge, N mm / mm, nan off creases; positive
             where it works to open the dihedral angle below the sheet against the crease. Near closed with what the
             lock carries (`Model.hinge_lock`).
-        pressing: force of every `Bar` of the step on the sheet, (3,), N, by its name.
+        contact_forces: force of every `Indenter` of the step on the sheet, (3,), N, by its name.
         stable: True if the tangent is positive definite there (False: not, None: not known).
     """
 
@@ -73,7 +73,7 @@ class State:
     reactions: Array
     crease_moments: Array
     stable: bool | None = None
-    pressing: Mapping[str, Array] = field(default_factory=dict)
+    contact_forces: Mapping[str, Array] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line: "State(step 0, lambda 1, energy 0.0534 N mm, stable)"."""

@@ -3,79 +3,91 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.formulations.registry import formulation as registered
-from bh.formulations.registry import names
+from bh.formulations.protocols import Formulation, Mirrored, SheetSystem
+from bh.formulations.registry import able
 from bh.formulations.state import State
-from bh.loading.load_step import Ended, StepProgram
-from bh.loading.program import program
+from bh.loading.builder import load_steps
+from bh.loading.load_step import LoadStep, StepEnd
 from bh.loading.symmetry import Mirror, Plane, check, halved, mirror
 from bh.model.model import Model
 from bh.solvers.modes import count_negative
 
-R = TypeVar("R")
+Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Half:
-    """One step: `system` of the half, `sheet` of the whole."""
+    """One step: `system` of the half, `sheet` of the whole, both made by the formulation."""
 
-    formulation: Any
+    formulation: Mirrored[SheetSystem]
     plane: Mirror
-    system: Any
-    sheet: Any
+    system: SheetSystem
+    sheet: SheetSystem
 
-    def unknowns(self, q: Any, lam: float) -> Any:
-        """Unknowns of the whole sheet."""
+    def unknowns(self, q: Array, lam: float) -> Array:
+        """Unknowns (sheet.size,) of the whole sheet from those of the half, q (system.size,)."""
         return self.formulation.whole(self.sheet, self.system, self.plane, q, lam)
 
-    def whole(self, record: R) -> R:
-        """A record of the half as one of the whole sheet; all that it knows of stability is where the half has none."""
-        at: Any = record
-        points = tuple(
-            replace(c, q=self.unknowns(c.q, c.lam), mode=self.sheet.loads(self.system.vectors(c.mode)))
-            for c in at.critical
-        )
-        return replace(at, q=self.unknowns(at.q, at.lam), negative=at.negative or None, critical=points)
+    def part(self, q: Array, lam: float) -> Array:
+        """Unknowns (system.size,) of the half from those of the whole sheet, q (sheet.size,)."""
+        return self.formulation.part(self.sheet, self.system, self.plane, q, lam)
 
-    def part(self, record: R) -> R:
-        """A record of the whole sheet as one of the half."""
-        at: Any = record
-        return replace(at, q=self.formulation.part(self.sheet, self.system, self.plane, at.q, at.lam))
+    def mode(self, mode: Array) -> Array:
+        """A mode (system.size,) of the half as one of the whole sheet (sheet.size,), by what the nodes do in it."""
+        return self.sheet.loads(self.system.vectors(mode))
 
 
 class Halves:
-    """The halves of all steps of a model.
+    """The halves of all steps of a model."""
 
-    Raises:
-        ModelError: the formulation cannot be solved by halves, or something is not symmetric; one line names it.
-    """
+    def __init__(
+        self, formulation: Formulation[SheetSystem], model: Model, steps: Sequence[LoadStep], plane: Plane
+    ) -> None:
+        """See that everything is symmetric.
 
-    def __init__(self, formulation: Any, model: Model, steps: Sequence[StepProgram], plane: Plane) -> None:
-        if not hasattr(formulation, "half"):
-            able = ", ".join(name for name in names() if hasattr(registered(name), "half"))
+        Args:
+            formulation: of the model.
+            model: the whole sheet.
+            steps: its load steps.
+            plane: "x", "y" or a normal; see `bh.loading.symmetry.mirror`.
+
+        Raises:
+            ModelError: the formulation cannot be solved by halves, or something is not symmetric; one line names it.
+        """
+        if not isinstance(formulation, Mirrored):
+            others = ", ".join(able(lambda other: isinstance(other, Mirrored)))
             raise ModelError(
-                f"formulation '{formulation.name}' cannot be solved by halves; take one of: {able}"
+                f"formulation '{formulation.name}' cannot be solved by halves; take one of: {others}"
             )
-        self.formulation, self.model = formulation, model
+        self.formulation: Mirrored[SheetSystem] = formulation
+        self.model = model
         self.plane = mirror(model.mesh, plane)
         check(model, steps, self.plane)
         self._half = halved(model, self.plane, any(step.constraints.rigid_body for step in steps))
         self._found: dict[int, Half] = {}
 
-    def of(self, step: int, sheet: Any, start: State | None, ended: Mapping[int, Ended]) -> Half:
-        """The half of a step that begins at a state of the whole sheet, whose system is `sheet`."""
+    def of(self, step: int, sheet: SheetSystem, start: State | None, ends: Mapping[int, StepEnd]) -> Half:
+        """The half of a step.
+
+        Args:
+            step: its index, from 0.
+            sheet: the system of the whole sheet in that step.
+            start: the state of the whole sheet that it begins at; None for the stress-free one.
+            ends: where earlier steps ended before they were complete.
+        """
         if step not in self._found:
-            ramps = program(self._half, ended)[step]
-            system = self.formulation.half(self.model, ramps, start, self.plane)
+            load_step = load_steps(self._half, ends)[step]
+            system = self.formulation.half(self.model, load_step, start, self.plane)
             self._found[step] = Half(self.formulation, self.plane, system, sheet)
         return self._found[step]
 
     @staticmethod
-    def negative(sheet: Any, record: Any) -> int:
-        """Negative modes of the whole sheet, symmetric or not."""
-        forces = sheet.evaluate(record.q, record.lam).forces
-        return count_negative(sheet.tangent(record.q, record.lam, forces))
+    def negative(sheet: SheetSystem, q: Array, lam: float) -> int:
+        """Number of negative modes of the whole sheet at unknowns q (sheet.size,), symmetric modes or not."""
+        return count_negative(sheet.tangent(q, lam, sheet.evaluate(q, lam).forces).matrix)

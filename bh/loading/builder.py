@@ -1,78 +1,139 @@
-"""Where the actuations of a model leave what they ask for, step by step. docs/extending.md adds one."""
+"""From the actuations of a model to load steps, one after another. docs/extending.md adds an actuation."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.formulations.observables import Until
-from bh.loading.load_step import Ended, StepProgram, edge_hinges, hinge_name
-from bh.model.actuations import Actuation, Array, Bar, Ramp, Tether
-from bh.model.laws import HELD, SPRING
-from bh.model.model import CreaseLaw, Model
-from bh.model.pinch import Pinched
+from bh.loading.load_step import LoadStep, Pinched, StepEnd, edge_hinges, hinge_name
+from bh.model.laws import PRESCRIBED, SPRING
+from bh.model.model import Model
+from bh.model.ramp import Ramp
+from bh.model.sheet import CreaseLaw, Sheet
+from bh.model.step import Body, Step, Zone
 from bh.model.supports import Prescribed, resolve
+from meshes import SheetMesh
 from meshes.topology import Ints, dihedral_angles
 
+Array = NDArray[np.float64]
 Direction = tuple[float, float, float]
+OVERLAP = 1e-9  # rad or N mm / mm: two zones that differ by less ask for the same
 
 
-class Ramps:
-    """Walks through the steps and remembers what the last one left behind.
+@dataclass(eq=False)
+class _Asked:
+    """What hinges (m,) and nodes (n,) are asked for at the end of a step; the next step begins with it.
 
-    An actuation calls what it needs in `apply`: `creases` to find hinges, then `hold`, `rest_at`, `couple`, `pull`,
-    `displace` or `touch`. What nobody calls stays as it was.
-
-    Attributes:
-        mesh, sheet: of the model; steps: number of the step, from one.
-        law, rest, rest_ends, held: see `bh.loading.load_step.StepProgram`, at the end of the step.
+    For the fields see `LoadStep`. `pinched` marks hinges whose prescribed angle follows from a solved state.
     """
 
+    law: NDArray[np.int64]
+    stiffness: Array
+    rest: Array
+    rest_ends: Array
+    prescribed: Array
+    moment: Array
+    force: Array
+    pinched: NDArray[np.bool_]
+    displaced: dict[tuple[int, Direction], float]
+
+    @classmethod
+    def nothing(cls, mesh: SheetMesh) -> _Asked:
+        """Nothing yet: the stress-free sheet."""
+        hinges, nodes = len(mesh.topology.hinges), len(mesh.points)
+        return cls(
+            law=np.zeros(hinges, dtype=np.int64),
+            stiffness=np.zeros(hinges),
+            rest=dihedral_angles(mesh.points, mesh.topology.hinges),
+            rest_ends=np.full((hinges, 2), math.pi),
+            prescribed=np.full(hinges, np.nan),
+            moment=np.zeros(hinges),
+            force=np.zeros((nodes, 3)),
+            pinched=np.zeros(hinges, dtype=bool),
+            displaced={},
+        )
+
+    def copy(self) -> _Asked:
+        """The same in arrays of its own."""
+        return _Asked(**{name: value.copy() for name, value in vars(self).items()})
+
+    def angles(self) -> Array:
+        """(m,) angles that this is meant to bring about, rad."""
+        by_law = [self.law == PRESCRIBED, self.law == SPRING]
+        return np.select(by_law, [self.prescribed, self.rest], math.pi)
+
+
+@dataclass(eq=False)
+class _Step:
+    """What belongs to the step in hand alone.
+
+    Attributes:
+        angles: (m,) that a late actuation begins with, rad.
+        pinch: see `LoadStep`.
+        released, folded: (m,) hinges that were let go of, or folded as a whole.
+        given: (2, m) angles and moments that something was given, nan elsewhere.
+        moved: displacements that were asked for, mm.
+        zones: what zones ask for, and where these are.
+        bodies: see `LoadStep`.
+    """
+
+    angles: Array
+    pinch: Pinched
+    released: NDArray[np.bool_]
+    folded: NDArray[np.bool_]
+    given: Array
+    moved: dict[tuple[int, Direction], float] = field(default_factory=dict)
+    zones: dict[int, tuple[float, float]] = field(default_factory=dict)
+    bodies: list[Body] = field(default_factory=list)
+
+    @classmethod
+    def after(cls, asked: _Asked) -> _Step:
+        """Nothing is asked for yet. A pinch of an earlier step stays as it is until something else is."""
+        hinges, now = len(asked.law), asked.angles()
+        pinch = replace(Pinched.none(hinges), present=now.copy())
+        pinch.toward[asked.pinched] = asked.prescribed[asked.pinched]
+        none = np.zeros(hinges, dtype=bool)
+        return cls(now, pinch, none, none.copy(), np.full((2, hinges), np.nan))
+
+
+class LoadStepBuilder:
+    """Walks through the steps of a model; the `bh.model.step.StepBuilder` that its actuations speak to."""
+
     def __init__(self, model: Model) -> None:
-        self.model, self.mesh, self.sheet = model, model.mesh, model.sheet
-        hinges, nodes = len(model.mesh.topology.hinges), len(model.mesh.points)
-        self.law = np.zeros(hinges, dtype=np.int64)
-        self.stiffness = np.zeros(hinges)
-        self.rest = dihedral_angles(model.mesh.points, model.mesh.topology.hinges)
-        self.made = self.rest.copy()  # rest angles of the laws; they come in during the first step
-        self.rest_ends = np.full((hinges, 2), math.pi)
-        self.held = np.full(hinges, np.nan)
-        self.moment = np.zeros(hinges)
-        self.force = np.zeros((nodes, 3))
-        self.displaced: dict[tuple[int, Direction], float] = {}
-        self.steps = 0
-        self.pinched = np.zeros(hinges, dtype=bool)  # held at an angle that follows from a solved state
-        self._begin()
+        """Begin before the first step of a model.
+
+        Raises:
+            ModelError, MeshError: its creases cannot be; one line.
+        """
+        self.mesh: SheetMesh = model.mesh
+        self.sheet: Sheet = model.sheet
+        self._supports = model.supports
+        self._number = 0
+        self._asked = _Asked.nothing(model.mesh)
+        self._rest_of_laws = self._asked.rest.copy()  # they come in during the first step
+        self._step = _Step.after(self._asked)
         for name, crease in model.creases.items():
-            self.spring(self.hinges(name), crease.Lstar, crease.stiffness)
-            self.made[self.hinges(name)] = crease.rest
+            self.spring(self._hinges(name), crease.Lstar, crease.stiffness)
+            self._rest_of_laws[self._hinges(name)] = crease.rest
         for step in model.steps:  # a spring that a later step names is there from the start, at rest flat
-            for item in step:
-                if isinstance(item, Actuation):
-                    item.prepare(self)
+            for item in step.actuations:
+                item.prepare(self)
 
     # ------------------------------------------------------------------------------- what actuations call
 
-    def hinges(self, crease: str) -> Ints:
-        """Rows of `mesh.topology.hinges` along a crease, in order."""
-        found = edge_hinges(self.mesh, crease)
-        if (found < 0).any():
-            raise ModelError(
-                f"crease '{crease}' runs along the boundary, where nothing can fold; draw it inside"
-            )
-        return found
-
     def creases(self, name: str) -> tuple[Ints, Array, Array]:
-        """Hinges of a crease or of "all", the drawn sense (+1 mountain, -1 valley) and the drawn fold angles."""
+        """Hinges (k,) of a crease or of "all", drawn sense and drawn fold angles; see `StepBuilder.creases`."""
         names = [name]
         if name == "all":
             names = [crease for crease in self.mesh.creases if self.mesh.folds.get(crease) != "flat"]
             if not names:
                 raise ModelError("fold of crease 'all': the sheet has no mountain or valley crease")
-        hinges = [self.hinges(each) for each in names]
+        hinges = [self._hinges(each) for each in names]
         sense = [
             np.full(len(found), -1.0 if self.mesh.folds.get(each) == "valley" else 1.0)
             for each, found in zip(names, hinges, strict=True)
@@ -87,152 +148,230 @@ class Ramps:
             joined = np.concatenate(hinges)[first]
         return joined, np.concatenate(sense)[first], np.concatenate(drawn)[first]
 
+    def angles(self, hinges: Ints) -> Array:
+        """(k,) dihedral angles, rad; see `StepBuilder.angles`."""
+        return np.asarray(self._step.angles[hinges])
+
+    def laws(self, hinges: Ints) -> Ints:
+        """(k,) SHEET, SPRING or PRESCRIBED."""
+        return np.asarray(self._asked.law[hinges])
+
     def spring(self, hinges: Ints, Lstar: float | None = None, stiffness: float | None = None) -> None:
-        """Hinges of an elastic crease, for all steps; see `bh.CreaseLaw`."""
+        """Hinges of an elastic crease, for all steps; see `StepBuilder.spring`.
+
+        Raises:
+            ModelError: the crease has another stiffness already.
+        """
         value = CreaseLaw(Lstar, stiffness).per_length(self.sheet)
-        other = (self.law[hinges] == SPRING) & ~np.isclose(self.stiffness[hinges], value, rtol=1e-12)
+        known = self._asked.stiffness[hinges]
+        other = (self._asked.law[hinges] == SPRING) & ~np.isclose(known, value, rtol=1e-12)
         if other.any():
             edge = self.mesh.topology.hinges[hinges[int(np.argmax(other))], 1:3].tolist()
             raise ModelError(
-                f"the crease at edge {edge} has two stiffnesses ({self.stiffness[hinges][other][0]:.6g} and "
+                f"the crease at edge {edge} has two stiffnesses ({known[other][0]:.6g} and "
                 f"{value:.6g} N mm / (mm rad)); give it one, it cannot change from step to step"
             )
-        self.law[hinges] = SPRING
-        self.stiffness[hinges] = value
+        self._asked.law[hinges] = SPRING
+        self._asked.stiffness[hinges] = value
 
-    def hold(self, hinges: Ints, angle: Array) -> None:
-        """Impose dihedral angles, rad, at the end of this step."""
-        self._turn(hinges, angle)
-        self.law[hinges], self.held[hinges] = HELD, angle
+    def prescribe(self, hinges: Ints, angle: Array, zone: Zone | None = None) -> None:
+        """Impose dihedral angles (k,), rad; see `StepBuilder.prescribe`."""
+        asked, pinch = self._asked, self._step.pinch
+        asked.law[hinges] = PRESCRIBED
+        if zone is None:
+            self._turn(hinges, angle)
+            asked.prescribed[hinges] = angle
+            return
+        asked.prescribed[hinges] = self._partly(hinges, angle, zone)
+        pinch.toward[hinges], pinch.part[hinges], pinch.ends[hinges] = angle, zone.part, zone.ends
+        pinch.base[hinges] = np.where(self._step.folded[hinges], self._step.angles[hinges], np.nan)
+        asked.pinched[hinges] = True
 
-    def rest_at(self, hinges: Ints, angle: Array, release: bool = False) -> None:
-        """Turn the rest angles of springs, rad; `release` lets go of angles that are held now."""
-        self._turn(hinges, angle)
+    def rest_at(self, hinges: Ints, angle: Array, release: bool = False, zone: Zone | None = None) -> None:
+        """Turn the rest angles (k,) of springs, rad; see `StepBuilder.rest_at`.
+
+        Raises:
+            ModelError: a hinge is no spring.
+        """
+        asked = self._asked
+        if zone is None:
+            self._turn(hinges, angle)
         if release:
-            self.released[hinges] = self.law[hinges] == HELD
-            self.law[hinges], self.held[hinges] = SPRING, np.nan
-        if (self.law[hinges] != SPRING).any():
-            row = int(hinges[int(np.argmax(self.law[hinges] != SPRING))])
+            self._step.released[hinges] = asked.law[hinges] == PRESCRIBED
+            asked.law[hinges], asked.prescribed[hinges] = SPRING, np.nan
+        if (asked.law[hinges] != SPRING).any():
+            row = int(hinges[int(np.argmax(asked.law[hinges] != SPRING))])
             raise ModelError(
                 f"fold of {hinge_name(self.mesh, row)} by its rest angle needs Lstar or stiffness"
             )
-        self.rest[hinges] = angle
-        self.rest_ends[hinges] = np.asarray(angle)[..., None]
+        if zone is None:
+            asked.rest[hinges] = angle
+            asked.rest_ends[hinges] = np.asarray(angle)[..., None]
+            return
+        asked.rest[hinges] = self._partly(hinges, angle, zone)
+        asked.rest_ends[hinges] += zone.ends * (angle[:, None] - asked.rest_ends[hinges])
 
-    def couple(self, hinges: Ints, moment: Array) -> None:
-        """Dead couples a length, N mm / mm, positive towards smaller dihedral angles."""
-        self._once(1, hinges, moment, "N mm / mm")
-        self.moment[hinges] = moment
+    def couple(self, hinges: Ints, moment: Array, zone: Zone | None = None) -> None:
+        """Dead couples (k,) a length, N mm / mm; see `StepBuilder.couple`."""
+        if zone is None:
+            self._once(1, hinges, moment, "N mm / mm")
+            self._asked.moment[hinges] = moment
+            return
+        wanted = zone.part * moment
+        self._claim(hinges, wanted, zone)
+        self._asked.moment[hinges] = wanted
 
     def pull(self, nodes: Ints, force: Array) -> None:
-        """Dead forces, N, (k, 3) or (3,), in place of what pulled there."""
-        self.force[nodes] = force
+        """Dead forces (k, 3) or (3,), N, in place of what pulled there."""
+        self._asked.force[nodes] = force
 
     def displace(self, nodes: Ints, direction: Sequence[float], by: float) -> None:
-        """Prescribe the displacement of nodes along a unit vector, mm from the stress-free position."""
+        """Prescribe the displacement of nodes (k,) along a unit vector, mm from the stress-free position.
+
+        Raises:
+            ModelError: a node is displaced twice along it in one step.
+        """
         x, y, z = (float(part) for part in direction)
         for node in nodes.tolist():
-            if self.now.setdefault((node, (x, y, z)), by) != by:
+            known = self._step.moved.setdefault((node, (x, y, z)), by)
+            if known != by:
                 raise ModelError(
-                    f"node {node} is displaced by {self.now[node, (x, y, z)]:g} and by {by:g} mm along the same "
-                    "direction in one step; remove one of them"
+                    f"node {node} is displaced by {known:g} and by {by:g} mm along the same direction in one step; "
+                    "remove one of them"
                 )
-            self.displaced[node, (x, y, z)] = by
+            self._asked.displaced[node, (x, y, z)] = by
 
-    def touch(self, body: Bar | Tether) -> None:
-        """A body that the sheet touches in this step."""
-        self.bodies.append(body)
-
-    def present(self) -> Array:
-        """(m,) angles that the steps so far are meant to bring about, rad."""
-        return np.select([self.law == HELD, self.law == SPRING], [self.held, self.rest], math.pi)
+    def attach(self, body: Body) -> None:
+        """Let a body act on the sheet in this step."""
+        self._step.bodies.append(body)
 
     # ------------------------------------------------------------------------------- steps
 
-    def step(self, items: Sequence[Actuation | Until]) -> StepProgram:
-        """The ramps of the next step."""
-        rest, held, moment, force = (part.copy() for part in (self.rest, self.held, self.moment, self.force))
-        ends, displaced = self.rest_ends.copy(), dict(self.displaced)
-        self.steps += 1
-        if self.steps == 1:
-            self.rest = self.made.copy()
-            self.rest_ends = np.repeat(self.made, 2).reshape(-1, 2)
-        self._begin()
-        held[self.pinched] = np.nan  # it begins where it is
-        acting = [item for item in items if isinstance(item, Actuation)]
-        for item in acting:
+    def build(self, step: Step) -> LoadStep:
+        """The load step of the next step of the model."""
+        start = self._asked.copy()
+        asked = self._asked
+        self._number += 1
+        if self._number == 1:
+            asked.rest = self._rest_of_laws.copy()
+            asked.rest_ends = np.repeat(asked.rest, 2).reshape(-1, 2)
+        self._step = now = _Step.after(asked)
+        start.prescribed[asked.pinched] = np.nan  # it begins where it is
+        for item in step.actuations:
             if not item.late:
                 item.apply(self)
-        self.before = self.present()
-        for item in acting:
+        now.angles = asked.angles()
+        for item in step.actuations:
             if item.late:
                 item.apply(self)
-        rest[self.released] = np.nan
-        ends[self.released] = np.nan
-        return StepProgram(
-            law=self.law.copy(),
-            stiffness=self.stiffness.copy(),
-            rest=Ramp(rest, self.rest.copy()),
-            rest_ends=Ramp(ends, self.rest_ends.copy()),
-            held=Ramp(held, self.held.copy()),
-            pinch=self.pinch,
-            moment=Ramp(moment, self.moment.copy()),
-            force=Ramp(force, self.force.copy()),
+        start.rest[now.released] = start.rest_ends[now.released] = np.nan
+        end = asked.copy()
+        return LoadStep(
+            law=end.law,
+            stiffness=end.stiffness,
+            rest=Ramp(start.rest, end.rest),
+            rest_ends=Ramp(start.rest_ends, end.rest_ends),
+            prescribed=Ramp(start.prescribed, end.prescribed),
+            pinch=now.pinch,
+            moment=Ramp(start.moment, end.moment),
+            force=Ramp(start.force, end.force),
             constraints=resolve(
-                self.mesh, self.model.supports, self._prescribed(displaced), touching=bool(self.bodies)
+                self.mesh, self._supports, self._displacements(start), in_contact=bool(now.bodies)
             ),
-            bodies=tuple(self.bodies),
+            bodies=tuple(now.bodies),
         )
 
-    def stop(self, step: StepProgram, end: Ended) -> None:
-        """What the next step begins with where `step` ended early."""
-        self.rest, self.rest_ends, self.moment, self.force = (
+    def end_early(self, step: LoadStep, end: StepEnd) -> None:
+        """Let the next step begin where `step` ended before it was complete.
+
+        Raises:
+            ModelError: a prescribed crease was released in it, whose rest angle is not known on the way.
+        """
+        asked = self._asked
+        asked.rest, asked.rest_ends, asked.moment, asked.force = (
             ramp.at(end.lam) for ramp in (step.rest, step.rest_ends, step.moment, step.force)
         )
-        if np.isnan(self.rest).any():
+        if np.isnan(asked.rest).any():
             raise ModelError(
-                "a held crease is released in a step that ends early (until); release it in a step before"
+                "a prescribed crease is released in a step that ends early (until); release it in a step before"
             )
-        self.held = np.where(self.law == HELD, end.dihedral_angles, np.nan)
+        asked.prescribed = np.where(asked.law == PRESCRIBED, end.dihedral_angles, np.nan)
         moved = end.points - self.mesh.points
-        self.displaced = {(node, axis): float(moved[node] @ axis) for node, axis in self.displaced}
+        asked.displaced = {(node, axis): float(moved[node] @ axis) for node, axis in asked.displaced}
 
-    def _begin(self) -> None:
-        """Nothing is asked for yet. A pinch of an earlier step stays as it is until something else is."""
-        hinges = len(self.law)
-        self.released = np.zeros(hinges, dtype=bool)
-        self.folded = np.zeros(hinges, dtype=bool)
-        self.given = np.full((2, hinges), np.nan)  # angles and moments
-        self.now: dict[tuple[int, Direction], float] = {}
-        self.bodies: list[Bar | Tether] = []
-        self.claimed: dict[int, tuple[float, float]] = {}  # angles that pinches want, and where these are
-        self.pinch = Pinched.none(hinges)
-        self.pinch.toward[self.pinched] = self.held[self.pinched]
-        self.pinch.present[:] = self.before = self.present()
+    # ------------------------------------------------------------------------------- its own
+
+    def _hinges(self, crease: str) -> Ints:
+        """Rows of `mesh.topology.hinges` along a crease, in order."""
+        found = edge_hinges(self.mesh, crease)
+        if (found < 0).any():
+            raise ModelError(
+                f"crease '{crease}' runs along the boundary, where nothing can fold; draw it inside"
+            )
+        return found
 
     def _turn(self, hinges: Ints, angle: Array) -> None:
         """A crease that is folded is pinched no more."""
         self._once(0, hinges, angle, "rad")
-        self.folded[hinges], self.pinched[hinges] = True, False
-        self.pinch.toward[hinges] = np.nan
+        self._step.folded[hinges], self._asked.pinched[hinges] = True, False
+        self._step.pinch.toward[hinges] = np.nan
 
     def _once(self, kind: int, hinges: Ints, value: Array, unit: str) -> None:
         """Refuse two different values for one crease in one step."""
         value = np.broadcast_to(value, hinges.shape)
-        known = self.given[kind, hinges]
+        known = self._step.given[kind, hinges]
         other = ~np.isnan(known) & ~np.isclose(known, value, rtol=1e-12, atol=0.0)
         if other.any():
             row = int(np.argmax(other))
             raise ModelError(
                 f"{hinge_name(self.mesh, int(hinges[row]))} is given {known[row]:g} and {value[row]:g} {unit} in one "
-                f"step ({self.steps}); give it one, or the second in a step of its own"
+                f"step ({self._number}); give it one, or the second in a step of its own"
             )
-        self.given[kind, hinges] = value
+        self._step.given[kind, hinges] = value
 
-    def _prescribed(self, before: dict[tuple[int, Direction], float]) -> list[Prescribed]:
+    def _partly(self, hinges: Ints, angle: Array, zone: Zone) -> Array:
+        """(k,) angles a part of the way to `angle`, rad, which no other zone may want otherwise."""
+        now = self._step.angles[hinges]
+        wanted = np.asarray(now + zone.part * (angle - now))
+        self._claim(hinges, wanted, zone)
+        return wanted
+
+    def _claim(self, hinges: Ints, wanted: Array, zone: Zone) -> None:
+        """Refuse zones that overlap and ask for different things."""
+        for row, value in zip(hinges.tolist(), wanted.tolist(), strict=True):
+            known, other = self._step.zones.setdefault(row, (value, zone.at))
+            if abs(known - value) > OVERLAP:
+                raise ModelError(
+                    f"two pinches of crease '{zone.crease}' overlap and contradict each other (at {other:g} and "
+                    f"{zone.at:g}); keep their zones apart, or pinch one after the other"
+                )
+
+    def _displacements(self, start: _Asked) -> list[Prescribed]:
         # a node that begins to be displaced in a later step begins where it is
-        start = np.nan if self.steps > 1 else 0.0
+        first = np.nan if self._number > 1 else 0.0
         return [
-            Prescribed(np.array([node]), direction, before.get((node, direction), start), end)
-            for (node, direction), end in self.displaced.items()
+            Prescribed(np.array([node]), direction, start.displaced.get((node, direction), first), end)
+            for (node, direction), end in self._asked.displaced.items()
         ]
+
+
+def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple[LoadStep, ...]:
+    """The load steps of a model, in order; nothing is solved.
+
+    Args:
+        model: what is described.
+        ends: where steps ended that ended early, by their index.
+
+    Returns:
+        one load step for each step.
+
+    Raises:
+        ModelError, MeshError: an actuation or support that the sheet cannot take; the message names it.
+    """
+    builder = LoadStepBuilder(model)
+    found = []
+    for number, step in enumerate(model.steps):
+        found.append(builder.build(step))
+        if ends is not None and number in ends:
+            builder.end_early(found[-1], ends[number])
+    return tuple(found)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.model.model import Model
 from bh.model.supports import Constraints, RigidBody, Support
 from meshes import Arc, SheetMesh
@@ -55,10 +55,12 @@ class Mirror:
 
     @cached_property
     def edge_weight(self) -> Array:
+        """(e,) parts of the edges in the kept half."""
         return self._weight(self.edge, self.side[self.mesh.topology.edges].sum(axis=1))
 
     @cached_property
     def hinge_weight(self) -> Array:
+        """(m,) parts of the hinges in the kept half."""
         return np.asarray(self.edge_weight[self.mesh.topology.hinge_edges])
 
     @cached_property
@@ -69,6 +71,7 @@ class Mirror:
 
     @cached_property
     def triangle_weight(self) -> Array:
+        """(t,) parts of the triangles in the kept half."""
         return self._weight(self.triangle, self.side[self.mesh.triangles].sum(axis=1))
 
     @staticmethod
@@ -154,7 +157,7 @@ def halved(model: Model, plane: Mirror, free: bool) -> Model:
     return replace(model, supports=(*model.supports, *extra))
 
 
-def check(model: Model, steps: Sequence[StepProgram], plane: Mirror) -> None:
+def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
     """Raises `ModelError` with one line that names what is not symmetric."""
     for number, step in enumerate(steps):
         where = f"step {number + 1}"
@@ -177,9 +180,9 @@ def check(model: Model, steps: Sequence[StepProgram], plane: Mirror) -> None:
             raise ModelError(f"{where}: the clamped edges are not mirror-symmetric; {ADVICE}")
 
 
-def _check_hinges(model: Model, step: StepProgram, plane: Mirror, where: str) -> None:
+def _check_hinges(model: Model, step: LoadStep, plane: Mirror, where: str) -> None:
     values = {"law": step.law, "stiffness": step.stiffness}
-    for name in ("rest", "held", "moment"):
+    for name in ("rest", "prescribed", "moment"):
         ramp = getattr(step, name)
         values |= {f"{name} at the start": ramp.start, f"{name} at the end": ramp.end}
     values |= {"pinch": step.pinch.toward, "extent of the pinch": step.pinch.part}

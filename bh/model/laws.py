@@ -1,3 +1,7 @@
-"""What a hinge of the mesh can be in a step."""
+"""What a hinge of the mesh can be in a step; kept in integer arrays, one entry a hinge."""
 
-SHEET, SPRING, HELD = 0, 1, 2  # uncreased, elastic crease, angle imposed exactly
+from typing import Final
+
+SHEET: Final = 0  # uncreased
+SPRING: Final = 1  # elastic crease
+PRESCRIBED: Final = 2  # angle imposed exactly

@@ -2,106 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
-from bh.formulations.observables import Until
-from bh.model.actuations import Actuation, Displace, Fold, Force, Moment, Pinch
-from bh.model.supports import Holding, RigidBody, Support
+from bh.model.actuations import Displace, Fold, Force, Moment
+from bh.model.pinch import Pinch
+from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
+from bh.model.step import Actuation, Step
+from bh.model.supports import Constraint, RigidBody, Support
+from bh.model.until import Until
 from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
-
-if TYPE_CHECKING:
-    from bh.formulations.remarks import Remark
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sheet:
-    """A thin elastic sheet; its values are given by name: `Sheet(E=4000, nu=0.38, t=0.127)`.
-
-    Attributes:
-        E: Young's modulus, MPa.
-        t: thickness, mm.
-        nu: Poisson's ratio in (-1, 0.5]; bars and hinges take 0, as the source does (3.3.2).
-    """
-
-    E: float
-    t: float
-    nu: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, unit in (("E", "MPa"), ("t", "mm")):
-            value = getattr(self, name)
-            if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
-                raise ModelError(f"sheet {name} = {value!r} cannot be; give a positive number in {unit}")
-        if not (isinstance(self.nu, Real) and -1.0 < self.nu <= 0.5):
-            raise ModelError(f"sheet nu = {self.nu!r} cannot be; Poisson's ratio lies in (-1, 0.5]")
-
-    def bending_stiffness(self, nu: float | None = None) -> float:
-        """D = E t^3 / (12 (1 - nu^2)), N mm (Eq. B.2); `nu` overrides the sheet's."""
-        nu = self.nu if nu is None else nu
-        return self.E * self.t**3 / (12.0 * (1.0 - nu**2))
-
-
-@dataclass(frozen=True)
-class CreaseLaw:
-    """A spring crease: moment a length = stiffness (phi - rest), N mm / mm.
-
-    A `rest` angle that is not flat comes in during the first step, since the sheet begins flat.
-    """
-
-    Lstar: float | None = None
-    stiffness: float | None = None
-    rest: float = math.pi
-
-    def __post_init__(self) -> None:
-        if (self.Lstar is None) == (self.stiffness is None):
-            raise ModelError("a crease needs either Lstar (mm) or stiffness (N mm / (mm rad))")
-        value = self.Lstar if self.Lstar is not None else self.stiffness
-        assert value is not None
-        low_ok = value > 0.0 if self.Lstar is not None else value >= 0.0
-        if not (math.isfinite(value) and low_ok):
-            raise ModelError(
-                f"crease stiffness {value} cannot be; give a positive Lstar, or a stiffness of 0 or more"
-            )
-
-    def per_length(self, sheet: Sheet) -> float:
-        """Stiffness a length of crease (Eq. 3.12 with nu = 0), N mm / (mm rad)."""
-        if self.stiffness is not None:
-            return self.stiffness
-        assert self.Lstar is not None
-        return sheet.bending_stiffness(nu=0.0) / self.Lstar
-
-
-@dataclass(frozen=True, eq=False)
-class ElementStiffness:
-    """Given stiffness of every element, in place of what the sheet would give.
-
-    Attributes:
-        bars: (e,) axial stiffness of the bar on every edge of `mesh.topology.edges`, N/mm.
-        green: bars measure Green's strain, energy 1/2 k L^2 e^2 with e = (l^2 - L^2) / (2 L^2), in place of l - L.
-        hinges: (m,) rotational stiffness of every hinge of `mesh.topology.hinges` (total, not a length), N mm / rad.
-    """
-
-    bars: NDArray[np.float64]
-    hinges: NDArray[np.float64]
-    green: bool = False
-
-    def __post_init__(self) -> None:
-        for name in ("bars", "hinges"):
-            values = np.array(getattr(self, name), dtype=float)
-            if not (np.isfinite(values).all() and (values >= 0.0).all()):
-                raise ModelError(f"stiffness of {name} must be finite and not negative")
-            values.setflags(write=False)
-            object.__setattr__(self, name, values)
 
 
 @dataclass(frozen=True, repr=False)
@@ -112,7 +29,7 @@ class Model:
         mesh: the stress-free sheet.
         sheet: its material and thickness.
         supports: none at all means the rigid-body support.
-        steps: each a tuple of actuations that act together (and an `Until` that ends it); steps run one after another.
+        steps: actuations that act together, and what ends them early; steps run one after another.
         creases: laws of spring creases. A crease with no law and no fold is ordinary sheet.
         formulation: name of a registered formulation.
         stiffness: given element stiffness (bars and hinges only), or None to derive it from the sheet.
@@ -122,14 +39,19 @@ class Model:
 
     mesh: SheetMesh
     sheet: Sheet
-    supports: tuple[Holding, ...] = ()
-    steps: tuple[tuple[Actuation | Until, ...], ...] = ()
+    supports: tuple[Constraint, ...] = ()
+    steps: tuple[Step, ...] = ()
     creases: Mapping[str, CreaseLaw] = field(default_factory=dict)
     formulation: str = "bars-and-hinges"
     stiffness: ElementStiffness | None = None
     hinge_lock: bool = True
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         for name, kind, how in (
             ("mesh", SheetMesh, "meshes.structured(pattern, aspect_ratio=8)"),
             ("sheet", Sheet, "bh.Sheet(E=4000, nu=0.38, t=0.127)"),
@@ -141,6 +63,11 @@ class Model:
                 )
                 raise ModelError(
                     f"the {name} of a model is {what}; give bh.Model(mesh, sheet) {how} as {name}"
+                )
+        for step in self.steps:
+            if not isinstance(step, Step):
+                raise ModelError(
+                    f"a step of a model is a {type(step).__name__}; give bh.Step, or use model.step(...)"
                 )
         if not isinstance(self.hinge_lock, bool):
             raise ModelError(f"hinge_lock = {self.hinge_lock!r} cannot be; give True or False")
@@ -169,10 +96,14 @@ class Model:
         """A bar-and-hinge problem given as plain arrays, as other codes hand it over.
 
         Args:
-            points: (n, 3) nodes, mm; triangles: (t, 3).
-            bars: (b, 2) node pairs and their stiffness (b,), N/mm; every edge of the mesh must have one.
-            bending_hinges, folding_hinges: (m, 2) or (m, 4) rows that begin with the two nodes of the edge, and their
-                stiffness (m,), N mm / rad. The folding hinges become the crease "fold", at rest flat.
+            points: (n, 3) nodes, mm.
+            triangles: (t, 3) nodes of the triangles.
+            bars: (b, 2) node pairs; every edge of the mesh must have one.
+            bar_stiffness: (b,) their stiffness, N/mm.
+            bending_hinges: (m, 2) or (m, 4) rows that begin with the two nodes of the edge.
+            bending_stiffness: (m,) their stiffness, N mm / rad.
+            folding_hinges: as `bending_hinges`; they become the crease "fold", at rest flat.
+            folding_stiffness: (m,) their stiffness, N mm / rad.
             supports: (s, 4) rows node, x, y, z with 1 for a direction that is held.
             green: bars measure Green's strain; see `ElementStiffness`.
 
@@ -205,16 +136,9 @@ class Model:
                 model = model.support([node], letters)
         return model
 
-    @property
-    def remarks(self) -> tuple[Remark, ...]:
-        """What the mesh does to the answer with this formulation (`bh.formulations.remarks`); empty where there is nothing to say."""
-        from bh.formulations.remarks import remarks
-
-        return remarks(self)
-
     def support(
         self,
-        at: str | Sequence[int] | Holding,
+        at: str | Sequence[int] | Constraint,
         fix: str | Sequence[Sequence[float]] = "xyz",
         clamp: bool = False,
     ) -> Model:
@@ -223,7 +147,11 @@ class Model:
         `at` can be a support of your own. See `bh.model.supports`.
         """
         item = (
-            at if isinstance(at, Holding) else RigidBody() if at == "rigid-body" else Support(at, fix, clamp)
+            at
+            if isinstance(at, Constraint)
+            else RigidBody()
+            if at == "rigid-body"
+            else Support(at, fix, clamp)
         )
         return replace(self, supports=(*self.supports, item))
 
@@ -232,15 +160,9 @@ class Model:
         self.mesh.crease_edges(name)
         return replace(self, creases={**self.creases, name: CreaseLaw(**law)})
 
-    def step(self, *actuations: Actuation | Until, until: Until | None = None) -> Model:
+    def step(self, *actuations: Actuation, until: Until | None = None) -> Model:
         """Add a step in which all `actuations` act together; it ends before they are complete where `until` says."""
-        if until is not None:
-            actuations = (*actuations, until)
-        if all(isinstance(item, Until) for item in actuations):
-            raise ModelError("a step needs at least one actuation (fold, pinch, moment, force or displace)")
-        if sum(isinstance(item, Until) for item in actuations) > 1:
-            raise ModelError("a step has two targets to end at (until); give it one")
-        return replace(self, steps=(*self.steps, actuations))
+        return replace(self, steps=(*self.steps, Step(actuations, until)))
 
     def fold(self, crease: str, until: Until | None = None, **how: Any) -> Model:
         """Add a step that folds a crease; arguments of `bh.Fold`."""

@@ -1,4 +1,6 @@
-"""How far each edge of a crease takes part in a pinch. Arc lengths in mm of the flat sheet; parts in [0, 1].
+"""A crease that is folded already is closed further over a part of its length.
+
+Arc lengths in mm of the flat sheet; parts, how far an edge takes part, in [0, 1].
 
 Profiles of a pinch of length b about its middle (s = 0), as parts of the way from the present angle to the pinched one:
 
@@ -12,20 +14,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.model.laws import HELD, SHEET
+from bh.model.laws import PRESCRIBED, SHEET
+from bh.model.step import Actuation, StepBuilder, Zone
 from meshes import SheetMesh
 from meshes.curves import arc_lengths
 from meshes.topology import Ints
-
-if TYPE_CHECKING:
-    from bh.loading.builder import Ramps
-    from bh.model.actuations import Pinch
 
 Array = NDArray[np.float64]
 Profile = Literal["cosine", "grip"]
@@ -55,27 +54,107 @@ PROFILES: dict[str, tuple[Callable[[Array, float], Array], Callable[[Array, floa
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Pinched:
-    """Held creases whose angles at the end of a step follow from those at its start.
+@dataclass(frozen=True)
+class Pinch(Actuation):
+    """Close a crease that is folded already over a part of its length (source 5.3.2).
+
+    Along the pinched zone the dihedral angle goes from what it is to the pinched one by a profile (`bh.model.pinch`).
+    Outside of the zone, and in later steps, the crease stays what it was; `Fold` with the stiffness of its spring opens
+    a pinch again. In one step with the fold, the zone goes to where the fold would have brought it.
 
     Attributes:
-        toward: (m,) angle in the middle of the pinch, rad; nan where there is none.
-        base: (m,) angle that the pinch goes from, rad; nan where it is the one that the step begins with.
-        part: (m,) how far the edge goes from there to `toward`, and `ends` (m, 2) at its lower and its higher node.
-        present: (m,) what the steps before make of the angle at the start, rad, for the size of increments only.
+        crease: its name, or "all" for every crease that is drawn as mountain or valley.
+        at: where the middle of the zone is, in parts of the crease's length from its start, 0 to 1.
+        to: dihedral angle in the middle, rad in (0, 2 pi).
+        by: fold angle in the middle instead, mountain or valley as drawn, rad in (0, pi). If neither is given it is
+            pi - pi / 14, the source's pinch.
+        length: of the zone along the crease, mm; a fifth of the crease if not given.
+        how: "imposed" holds the angles of the zone exactly. "rest" only sets the rest angles of the crease's spring,
+            which the sheet resists: with the source's L* of 0.5 and 2 mm such a pinch stops far above its angle.
+            "couple" lets closing couples act over the zone, spread by the profile, which grow until the angle is
+            reached somewhere in it (`Model.pinch`; alone, or without such an `Until`, they grow to their end).
+        profile: "cosine", or "grip" for the pinched angle all over the zone.
+        couple: with "couple" the largest one a length in the middle, N mm / mm; more than the pinch needs.
     """
 
-    toward: Array
-    base: Array
-    part: Array
-    ends: Array
-    present: Array
+    crease: str
+    at: float = 0.5
+    to: float | None = None
+    by: float | None = None
+    length: float | None = None
+    how: Literal["imposed", "rest", "couple"] = "imposed"
+    profile: Profile = "cosine"
+    couple: float | None = None
+    late: ClassVar[bool] = True
 
-    @classmethod
-    def none(cls, hinges: int) -> Pinched:
-        empty = np.full(hinges, np.nan)
-        return cls(empty, empty.copy(), np.zeros(hinges), np.zeros((hinges, 2)), np.full(hinges, np.pi))
+    def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
+        what = f"pinch of crease '{self.crease}'"
+        if self.to is not None and self.by is not None:
+            raise ModelError(f"{what} has to and by; give one of them")
+        for key, low, high in (("to", 0.0, 2.0 * math.pi), ("by", 0.0, math.pi)):
+            value = getattr(self, key)
+            if value is not None and not low < value < high:
+                hint = "; angles are radians, not degrees" if abs(value) > 7.0 else ""
+                raise ModelError(
+                    f"{what}: {key} = {value} rad closes it beyond what it can; stay inside ({low:g}, {high:.4g}){hint}"
+                )
+        if not 0.0 <= self.at <= 1.0:
+            raise ModelError(
+                f"{what}: at = {self.at} is outside the crease; give a part of its length, 0 to 1"
+            )
+        if self.length is not None and not (math.isfinite(self.length) and self.length > 0.0):
+            raise ModelError(f"{what}: length = {self.length} cannot be; give a positive length in mm")
+        for key, known in (("how", ("imposed", "rest", "couple")), ("profile", tuple(PROFILES))):
+            if getattr(self, key) not in known:
+                raise ModelError(
+                    f"{what}: {key} = '{getattr(self, key)}' is not known; use {' or '.join(known)}"
+                )
+        if (self.how == "couple") != (self.couple is not None):
+            raise ModelError(
+                f"{what}: couple goes with how = 'couple', and only with it; give both or neither"
+            )
+        if self.couple is not None and not (math.isfinite(self.couple) and self.couple > 0.0):
+            raise ModelError(f"{what}: couple = {self.couple} cannot be; give a positive number in N mm / mm")
+
+    def target(self, sense: Array) -> Array:
+        """(k,) dihedral angles in the middle, rad, for edges drawn as mountain (+1) or valley (-1)."""
+        if self.to is not None:
+            return np.full(len(sense), float(self.to))
+        return np.asarray(math.pi - sense * self.fold)
+
+    @property
+    def fold(self) -> float:
+        """Size of the fold angle in the middle, rad."""
+        if self.to is not None:
+            return abs(math.pi - self.to)
+        return math.pi - math.pi / 14.0 if self.by is None else self.by
+
+    def apply(self, builder: StepBuilder) -> None:
+        """Ask for the pinch, from the angles that the other actuations of its step lead to."""
+        for name in _names(builder.mesh, self.crease):
+            self._apply_to(builder, name)
+
+    def _apply_to(self, builder: StepBuilder, name: str) -> None:
+        hinges, sense, _ = builder.creases(name)
+        line = chain(builder.mesh, name)
+        part, ends = parts(line, self.at, zone_length(line, name, self.at, self.length), self.profile)
+        turned = builder.mesh.crease_edges(name)
+        ends = np.where((turned[:, 0] > turned[:, 1])[:, None], ends[:, ::-1], ends)
+        inside = np.flatnonzero(part > 0.0)
+        rows, target = hinges[inside], self.target(sense)[inside]
+        _check(builder, name, self, rows, target)
+        zone = Zone(part[inside], ends[inside], name, self.at)
+        if self.couple is not None:
+            builder.couple(rows, sense[inside] * self.couple, zone)
+        elif self.how == "rest":
+            builder.rest_at(rows, target, zone=zone)
+        else:
+            builder.prescribe(rows, target, zone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +166,7 @@ class Chain:
 
     @property
     def length(self) -> float:
+        """Of the whole crease, mm."""
         return float(self.ends[-1, 1])
 
 
@@ -134,7 +214,7 @@ def parts(line: Chain, at: float, length: float, profile: str) -> tuple[Array, A
     return mean, np.clip(ends / max(float(ends.max()), LEAST), 0.0, 1.0)
 
 
-def zone(line: Chain, name: str, at: float, length: float | None) -> float:
+def zone_length(line: Chain, name: str, at: float, length: float | None) -> float:
     """Length of a pinched zone, mm; a fifth of the crease unless it is given.
 
     Raises:
@@ -161,57 +241,24 @@ def zone(line: Chain, name: str, at: float, length: float | None) -> float:
     return length
 
 
-def pinch(ramps: Ramps, item: Pinch) -> None:
-    """Ask for a pinch, from the angles that the other actuations of its step lead to."""
-    names = [item.crease]
-    if item.crease == "all":
-        folds, mesh = ramps.mesh.folds, ramps.mesh
-        names = [name for name in mesh.creases if folds.get(name) != "flat" and is_chain(mesh, name)]
-        if not names:
-            raise ModelError("pinch of crease 'all': the sheet has no mountain or valley crease")
-    for name in names:
-        _pinch_one(ramps, name, item)
+def _names(mesh: SheetMesh, crease: str) -> list[str]:
+    """The creases that a pinch means, one line each."""
+    if crease != "all":
+        return [crease]
+    found = [name for name in mesh.creases if mesh.folds.get(name) != "flat" and is_chain(mesh, name)]
+    if not found:
+        raise ModelError("pinch of crease 'all': the sheet has no mountain or valley crease")
+    return found
 
 
-def _pinch_one(ramps: Ramps, name: str, item: Pinch) -> None:
-    hinges, sense, _ = ramps.creases(name)
-    line = chain(ramps.mesh, name)
-    part, ends = parts(line, item.at, zone(line, name, item.at, item.length), item.profile)
-    turned = ramps.mesh.crease_edges(name)
-    ends = np.where((turned[:, 0] > turned[:, 1])[:, None], ends[:, ::-1], ends)
-    inside = np.flatnonzero(part > 0.0)
-    rows, part, ends = hinges[inside], part[inside], ends[inside]
-    now, target = ramps.before[rows], item.target(sense)[inside]
-    _check(ramps, name, item, rows, now, target)
-    nominal = now + part * (target - now)
-    wanted = nominal if item.couple is None else part * item.couple
-    for row, angle in zip(rows.tolist(), wanted.tolist(), strict=True):
-        known, other = ramps.claimed.setdefault(row, (angle, item.at))
-        if abs(known - angle) > 1e-9:
-            raise ModelError(
-                f"two pinches of crease '{name}' overlap and contradict each other (at {other:g} and "
-                f"{item.at:g}); keep their zones apart, or pinch one after the other"
-            )
-    if item.couple is not None:
-        ramps.moment[rows] = sense[inside] * wanted
-        return
-    if item.how == "rest":
-        ramps.rest[rows] = nominal
-        ramps.rest_ends[rows] += ends * (target[:, None] - ramps.rest_ends[rows])
-        return
-    ramps.law[rows], ramps.held[rows] = HELD, nominal
-    ramps.pinch.toward[rows], ramps.pinch.part[rows], ramps.pinch.ends[rows] = target, part, ends
-    ramps.pinch.base[rows] = np.where(ramps.folded[rows], now, np.nan)
-    ramps.pinched[rows] = True
-
-
-def _check(ramps: Ramps, name: str, item: Pinch, rows: Ints, now: Array, target: Array) -> None:
-    law = ramps.law[rows]
+def _check(builder: StepBuilder, name: str, item: Pinch, rows: Ints, target: Array) -> None:
+    """Refuse a pinch of ordinary sheet, of prescribed angles by what acts on springs, and to the other side."""
+    law, now = builder.laws(rows), builder.angles(rows)
     if (law == SHEET).any():
         raise ModelError(
             f"pinch of crease '{name}': it is ordinary sheet there; fold it before, or in the same step"
         )
-    if item.how != "imposed" and (law == HELD).any():
+    if item.how != "imposed" and (law == PRESCRIBED).any():
         by = "rest angles" if item.how == "rest" else "couples"
         raise ModelError(
             f"pinch of crease '{name}' by {by}: its angle is imposed there and no spring acts; use how = 'imposed'"

@@ -39,6 +39,11 @@ class Goal:
     direction: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         ok = isinstance(self.within, float | int) and not isinstance(self.within, bool)
         if not (ok and LEAST <= self.within <= MOST):
             raise ModelError(
@@ -124,7 +129,7 @@ def pattern_of(model: Model) -> CreasePattern:
         if isinstance(support, Support):
             _check_place(support.at, f"supports[{number}]")
     for number, step in enumerate(model.steps):
-        for item in step:
+        for item in step.actuations:
             where = f"steps[{number}].{type(item).__name__.lower()}"
             _check_actuation(model, item, where)
     return pattern

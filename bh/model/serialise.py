@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import PathFileError
-from bh.formulations.observables import Until
-from bh.model.actuations import Actuation, Bar, Displace, Fold, Force, Moment, Pinch, Tether
-from bh.model.model import CreaseLaw, ElementStiffness, Model, Sheet
+from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
+from bh.model.model import Model
+from bh.model.pinch import Pinch
 from bh.model.plugins import named
-from bh.model.supports import Holding, RigidBody, Support
+from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
+from bh.model.step import Actuation, Step
+from bh.model.supports import Constraint, RigidBody, Support
+from bh.model.until import Until
 from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
@@ -29,13 +32,8 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "displace": Displace,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
-STEP_ITEMS: dict[str, type[Actuation | Until]] = {
-    **ACTUATIONS,
-    "bar": Bar,
-    "tether": Tether,
-    "until": Until,
-}
-FORMAT = 1
+STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether}
+FORMAT = 2  # raised with every change of the description
 
 
 def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
@@ -64,7 +62,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         },
         "supports": [_support(s) for s in model.supports],
         "creases": {name: _plain(law) for name, law in model.creases.items()},
-        "steps": [[_tagged(item, STEP_ITEMS) for item in step] for step in model.steps],
+        "steps": [_step(step) for step in model.steps],
     }
     return data, arrays
 
@@ -77,7 +75,8 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
     """
     if data.get("format") != FORMAT:
         raise PathFileError(
-            f"stored model has format {data.get('format')}, this version reads {FORMAT}; solve again"
+            f"stored model has format {data.get('format')}, this version reads {FORMAT}; make it anew "
+            "from its scene or script"
         )
     try:
         flat = data["mesh"]
@@ -93,8 +92,8 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
         return Model(
             mesh=mesh,
             sheet=Sheet(**data["sheet"]),
-            supports=tuple(_held(s) for s in data["supports"]),
-            steps=tuple(tuple(_untagged(item, STEP_ITEMS) for item in step) for step in data["steps"]),
+            supports=tuple(_constraint(s) for s in data["supports"]),
+            steps=tuple(_stored_step(step) for step in data["steps"]),
             creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
             formulation=data["formulation"],
             stiffness=ElementStiffness(arrays["stiffness/bars"], arrays["stiffness/hinges"], data["green"])
@@ -140,17 +139,29 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
     return named(data["kind"])(**lists)
 
 
-def _support(item: Holding) -> Any:
+def _step(step: Step) -> dict[str, Any]:
+    return {
+        "actuations": [_tagged(item, STEP_ITEMS) for item in step.actuations],
+        "until": None if step.until is None else _plain(step.until),
+    }
+
+
+def _stored_step(data: Mapping[str, Any]) -> Step:
+    until = None if data["until"] is None else Until(**data["until"])
+    return Step(tuple(_untagged(item, STEP_ITEMS) for item in data["actuations"]), until)
+
+
+def _support(item: Constraint) -> Any:
     if isinstance(item, RigidBody):
         return "rigid-body"
     return _plain(item) if type(item) is Support else _tagged(item, {})
 
 
-def _held(data: Any) -> Holding:
+def _constraint(data: Any) -> Constraint:
     if data == "rigid-body":
         return RigidBody()
-    held: Holding = _untagged(data, {}) if "kind" in data else Support(**data)
-    return held
+    found: Constraint = _untagged(data, {}) if "kind" in data else Support(**data)
+    return found
 
 
 def _jsonable(value: Any) -> Any:

@@ -22,12 +22,13 @@ UNBALANCED = (
 TURNED = "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
 
 
-class Holding:
-    """What holds a sheet. A support of your own derives from it and is a frozen dataclass of plain values
-    (docs/extending.md).
+class Constraint:
+    """What holds a sheet.
+
+    A support of your own derives from it and is a frozen dataclass of plain values (docs/extending.md).
     """
 
-    def held(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+    def fixed(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
         """Nodes and a unit direction in which they cannot move, (k,) and (3,), as often as needed."""
         raise NotImplementedError
 
@@ -37,7 +38,7 @@ class Holding:
 
 
 @dataclass(frozen=True)
-class Support(Holding):
+class Support(Constraint):
     """Nodes that cannot move in some directions.
 
     Attributes:
@@ -51,19 +52,22 @@ class Support(Holding):
     fix: str | Sequence[Sequence[float]] = "xyz"
     clamp: bool = False
 
-    def held(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+    def fixed(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+        """See `Constraint.fixed`."""
         nodes = select(mesh, self.at)
         return [(nodes, direction) for direction in directions(self.fix)]
 
     def clamps(self, mesh: SheetMesh) -> Ints:
+        """See `Constraint.clamps`."""
         return clamped_edges(mesh, self.at) if self.clamp else super().clamps(mesh)
 
 
 @dataclass(frozen=True)
-class RigidBody(Holding):
+class RigidBody(Constraint):
     """Takes out exactly the rigid motions that the other supports leave free, without any force (see `bh.trace`)."""
 
-    def held(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+    def fixed(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+        """See `Constraint.fixed`."""
         return []
 
 
@@ -137,13 +141,13 @@ def select(mesh: SheetMesh, at: str | Sequence[int]) -> Ints:
 
 def resolve(
     mesh: SheetMesh,
-    supports: Iterable[Holding],
+    supports: Iterable[Constraint],
     prescribed: Iterable[Prescribed] = (),
-    touching: bool = False,
+    in_contact: bool = False,
 ) -> Constraints:
     """Collect all supports and prescribed displacements into local axes a node.
 
-    A sheet without any support gets the rigid-body support by itself, unless it is `touching` something that holds it.
+    A sheet without any support gets the rigid-body support by itself, unless it is `in_contact` with what holds it.
 
     Raises:
         ModelError: supports contradict each other, or leave rigid motions free.
@@ -154,7 +158,7 @@ def resolve(
     oblique: dict[int, list[tuple[Array, float, float]]] = {}
     rigid_body = (not supports and not prescribed) or any(isinstance(s, RigidBody) for s in supports)
     for support in supports:
-        for nodes, direction in support.held(mesh):
+        for nodes, direction in support.fixed(mesh):
             if np.abs(direction).max() == 1.0:
                 fixed[nodes, int(np.abs(direction).argmax())] = True
             else:
@@ -186,8 +190,8 @@ def resolve(
     stacked = np.array(frames).reshape(-1, 3, 3)
     clamps = [support.clamps(mesh) for support in supports]
     clamped = mesh.topology.edges[np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *clamps]))]
-    constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body and not touching, clamped)
-    if not touching:
+    constraints = Constraints(fixed, start, end, frame_of, stacked, rigid_body and not in_contact, clamped)
+    if not in_contact:
         _check_rigid_motions(mesh, constraints)
     return constraints
 
@@ -243,7 +247,7 @@ def free_motions(points: Array, constraints: Constraints) -> Array:
     # the triangular factor has the same null space and six rows at most, where all left vectors would be (k, k)
     _, values, right = np.linalg.svd(np.linalg.qr(rows, mode="r"), full_matrices=True)
     rank = int((values > 1e-7 * max(values[0], 1e-300)).sum())
-    return scale[:, None] * right[rank:].T
+    return np.asarray(scale[:, None] * right[rank:].T)
 
 
 def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints) -> None:

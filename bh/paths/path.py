@@ -4,68 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.formulations.observables import until_of
-from bh.formulations.registry import Formulation, formulation
+from bh.formulations.protocols import Formulation, SheetSystem
+from bh.formulations.registry import checked_system, formulation, remarks
 from bh.formulations.state import State
-from bh.loading.load_step import Ended, StepProgram, open_ends
-from bh.loading.program import program
+from bh.loading.builder import load_steps
+from bh.loading.load_step import LoadStep, StepEnd, open_ends
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
 from bh.paths.provenance import provenance_of
+from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
-from bh.solvers.increments import ARC, LOAD, CriticalPoint
+from bh.runtime import viewer
+from bh.solvers.increments import ARC, CriticalPoint
+from bh.solvers.outcome import Outcome
 from meshes.mesh import count
 
 if TYPE_CHECKING:
-    from bh.formulations.symmetry_reduction import Half
+    from bh.formulations.symmetry_reduction import Half, Halves
     from bh.loading.symmetry import Plane
-    from bh.solving.accuracy import Accuracy
+    from bh.paths.estimate import Accuracy
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class StepOutcome:
-    """How one step ended: "reached", or why not, with one line of reason."""
-
-    outcome: str
-    reason: str = ""
-    iterations: int = 0  # of the increment that failed
-
-
-@dataclass(frozen=True, eq=False)
-class Record:
-    """One accepted state in the solver's terms; see `bh.solvers.increments.Increment`.
-
-    `negative` counts the negative modes of the tangent, `mode` says how to go on from here, `jumped` that the state
-    lies on another branch than the one before, `critical` holds the limit and bifurcation points passed before it.
-    """
-
-    step: int
-    lam: float
-    q: Array
-    iterations: int
-    imbalance: float
-    wall_time_s: float
-    next_increment: float
-    negative: int | None = None
-    mode: str = LOAD
-    note: str = ""
-    cuts: tuple[str, ...] = ()
-    jumped: bool = False
-    critical: tuple[CriticalPoint, ...] = ()
-
-    @property
-    def stable(self) -> bool | None:
-        """True if no mode is negative, None where that was not looked at."""
-        return None if self.negative is None else self.negative == 0
 
 
 class Path:
@@ -78,37 +44,52 @@ class Path:
     """
 
     def __init__(
-        self, model: Model, provenance: dict[str, Any] | None = None, symmetry: Plane | None = None
+        self, model: Model, provenance: dict[str, object] | None = None, symmetry: Plane | None = None
     ) -> None:
+        """An empty path of a model.
+
+        Args:
+            model: the model; its formulation is looked up here.
+            provenance: of a path that was stored; None makes it anew.
+            symmetry: plane of a model that is solved by one half (`bh.loading.symmetry`), or None.
+
+        Raises:
+            ModelError: the model cannot be solved as described.
+        """
         self.model = model
         self.provenance = provenance or provenance_of(model)
         self.records: list[Record] = []
         self.steps: list[StepOutcome] = []
         self.accuracy: Accuracy | None = None
-        self._formulation: Formulation = formulation(model.formulation)
-        self._programs: tuple[StepProgram, ...] = program(model)
-        self._halves = None
+        self._formulation: Formulation[SheetSystem] = formulation(model.formulation)
+        self._load_steps: tuple[LoadStep, ...] = load_steps(model)
+        self._halves: Halves | None = None
         if symmetry is not None:
             from bh.formulations.symmetry_reduction import Halves
 
-            self._halves = Halves(self._formulation, model, self._programs, symmetry)
-        self._systems: dict[int, Any] = {}
+            self._halves = Halves(self._formulation, model, self._load_steps, symmetry)
+        self._systems: dict[int, SheetSystem] = {}
         self._states: dict[int, State] = {}
 
     # ------------------------------------------------------------------------------- reading
 
     @property
-    def outcome(self) -> str:
-        """ "reached" if every step was; else the outcome of the first step that was not."""
+    def outcome(self) -> Outcome:
+        """Outcome.REACHED if every step was; else the outcome of the first step that was not."""
         for step in self.steps:
-            if step.outcome != "reached":
+            if not step.reached:
                 return step.outcome
-        return "reached" if len(self.steps) == len(self.model.steps) else "unfinished"
+        return Outcome.REACHED if len(self.steps) == len(self.model.steps) else Outcome.UNFINISHED
+
+    @property
+    def reached(self) -> bool:
+        """Was every step reached?"""
+        return self.outcome is Outcome.REACHED
 
     @property
     def reason(self) -> str:
         """Why the path ended early, or an empty string."""
-        return next((step.reason for step in self.steps if step.outcome != "reached"), "")
+        return next((step.reason for step in self.steps if not step.reached), "")
 
     @property
     def stable(self) -> bool | None:
@@ -120,7 +101,9 @@ class Path:
         """Of a sheet solved by halves, count the negative modes of the last state, symmetric or not, when asked."""
         if self._halves is not None and self.records and self.records[-1].negative is None:
             last = self.records[-1]
-            self.records[-1] = replace(last, negative=self._halves.negative(self._system(last.step), last))
+            self.records[-1] = replace(
+                last, negative=self._halves.negative(self.system(last.step), last.q, last.lam)
+            )
             self._states.pop(len(self.records) - 1, None)
 
     @property
@@ -138,7 +121,7 @@ class Path:
         if arc:
             found.append(f"{count(len(arc), 'state')} found by arc length")
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
-        ends = [line for step in self._programs for line in open_ends(self.model.mesh, step)]
+        ends = [line for step in self._load_steps for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
         if self.accuracy is not None and not self.accuracy.met:
             found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
@@ -146,7 +129,7 @@ class Path:
         modes = self.records[-1].negative if self.records else None
         if modes:
             found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
-        return found + [f"{remark.code}: {remark}" for remark in self.model.remarks]
+        return found + [f"{remark.code}: {remark}" for remark in remarks(self.model)]
 
     @property
     def iterations(self) -> int:
@@ -160,6 +143,7 @@ class Path:
 
     @property
     def unknowns(self) -> int:
+        """Number of unknowns of the last state."""
         return len(self.records[-1].q) if self.records else 0
 
     @property
@@ -169,13 +153,14 @@ class Path:
 
     def __repr__(self) -> str:
         """One line: "Path(reached, 6 states, 16 iterations, 1 of 1 step)"."""
-        reached = sum(step.outcome == "reached" for step in self.steps)
+        reached = sum(step.reached for step in self.steps)
         return (
             f"Path({self.outcome}, {count(len(self), 'state')}, {count(self.iterations, 'iteration')}, "
             f"{reached} of {count(len(self.model.steps), 'step')})"
         )
 
     def __len__(self) -> int:
+        """Number of states."""
         return len(self.records)
 
     @overload
@@ -184,29 +169,36 @@ class Path:
     def __getitem__(self, index: slice) -> list[State]: ...
 
     def __getitem__(self, index: int | slice) -> State | list[State]:
+        """The state of an index, or a list of those of a slice; read when it is first asked for."""
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         index = range(len(self))[index]
         if index not in self._states:
             record = self.records[index]
-            self._states[index] = self._formulation.observe(
-                self.model, self._system(record.step), record.q, record.lam, record.step, record.stable
-            )
+            self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
         return self._states[index]
 
+    def observe(self, step: int, q: Array, lam: float, stable: bool | None = None) -> State:
+        """What is to be read from unknowns q (n,) of a step at `lam`; of the whole sheet where halves are solved."""
+        return self._formulation.observe(self.model, self.system(step), q, lam, step, stable)
+
+    def take_over(self, other: Path) -> None:
+        """Begin with all that a path of the same model with fewer steps has; its states are not read anew."""
+        self.records, self.steps = list(other.records), list(other.steps)
+        self._states = dict(other._states)
+
     def __iter__(self) -> Iterator[State]:
+        """States in order."""
         return (self[i] for i in range(len(self)))
 
-    def solved(self, index: int = -1) -> tuple[Any, Record]:
+    def solved(self, index: int = -1) -> tuple[SheetSystem, Record]:
         """The system of the step that a state belongs to, and its record: what analyses of a state begin with."""
         record = self.records[range(len(self))[index]]
-        return self._system(record.step), record
+        return self.system(record.step), record
 
     def plot(self, **options: Any) -> Any:
         """Show the last state as a picture; options of `bh.plotting.show`."""
-        from bh.plotting.pictures import show
-
-        return show(self[-1], **options)
+        return viewer.show(self, **options)
 
     # ------------------------------------------------------------------------------- files
 
@@ -217,8 +209,8 @@ class Path:
             PathFileError: the file cannot be written.
         """
         target = new_file(self, FilePath(file))
-        for index, record in enumerate(self.records):
-            target.add(self._row(index, record))
+        for index in range(len(self)):
+            target.add(self.row(index))
         for step, end in enumerate(self.steps):
             target.finish_step(step, *astuple(end))
         target.close()
@@ -235,12 +227,16 @@ class Path:
             meta = source.meta()
             path = cls(rebuild(meta["model"], source.arrays()), meta["provenance"])
             for row in source.states():
-                path.records.append(_record(row))
+                path.records.append(Record.of_row(row))
             ends = source.steps()
-            path.steps = [StepOutcome(*ends[step]) for step in sorted(ends)]
+            path.steps = [
+                StepOutcome(Outcome(end), reason, lost) for _, (end, reason, lost) in sorted(ends.items())
+            ]
         return path
 
-    def _row(self, index: int, record: Record) -> StateRow:
+    def row(self, index: int) -> StateRow:
+        """A state as a path file stores it."""
+        record = self.records[index]
         energy = self[index].energy
         critical = tuple(
             CriticalRow(record.step, c.kind, c.lam, c.error, c.negative, c.q, c.mode) for c in record.critical
@@ -251,44 +247,35 @@ class Path:
             record.note, record.cuts, record.q, self[index].points, critical,
         )  # fmt: skip
 
-    def _system(self, step: int) -> Any:
+    def system(self, step: int) -> SheetSystem:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
-            if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
-                self._programs = program(self.model, self._ended(step))
-            self._systems[step] = self._formulation.system(
-                self.model, self._programs[step], self._start(step)
-            )
+            if any(each.until is not None for each in self.model.steps[:step]):
+                self._load_steps = load_steps(self.model, self._ended(step))
+            made = self._formulation.system(self.model, self._load_steps[step], self._start(step))
+            self._systems[step] = checked_system(made, self.model.formulation)
         return self._systems[step]
 
-    def _half(self, step: int) -> Half | None:
+    def half(self, step: int) -> Half | None:
         """The half that solves a step, or None where the whole sheet is solved."""
         if self._halves is None:
             return None
-        return self._halves.of(step, self._system(step), self._start(step), self._ended(step))
+        return self._halves.of(step, self.system(step), self._start(step), self._ended(step))
 
     def _start(self, step: int) -> State | None:
         """The state that a step begins at; None is the stress-free sheet."""
         last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
         return None if last is None else self[last]
 
-    def _ended(self, before: int) -> dict[int, Ended]:
+    def _ended(self, before: int) -> dict[int, StepEnd]:
         """Steps before `before` that ended early, by an `Until`."""
         last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
         found = {}
         for step, index in last.items():
-            if until_of(self.model.steps[step]) is not None and self.records[index].lam < 1.0:
+            if self.model.steps[step].until is not None and self.records[index].lam < 1.0:
                 state = self[index]
-                found[step] = Ended(state.lam, state.points, state.dihedral_angles)
+                found[step] = StepEnd(state.lam, state.points, state.dihedral_angles)
         return found
-
-
-def _record(row: StateRow) -> Record:
-    return Record(
-        row.step, row.lam, row.q, row.iterations, row.imbalance, row.wall_time_s, row.next_increment,
-        negative=row.negative, mode=row.mode, note=row.note, cuts=row.cuts, jumped=row.jumped,
-        critical=tuple(CriticalPoint(c.kind, c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical),
-    )  # fmt: skip
 
 
 def new_file(path: Path, file: FilePath) -> PathFile:

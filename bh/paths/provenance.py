@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
 
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
@@ -23,5 +22,6 @@ def versions() -> dict[str, str]:
     return found
 
 
-def provenance_of(model: Model) -> dict[str, Any]:
+def provenance_of(model: Model) -> dict[str, object]:
+    """Fingerprint of the input, versions and formulation of a model."""
     return {"input": fingerprint(model), "versions": versions(), "formulation": model.formulation}

@@ -14,16 +14,18 @@ from typing import Any
 import numpy as np
 
 from bh.errors import InputError, SceneError
-from bh.formulations.observables import Until
 from bh.formulations.registry import formulation, names
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
-from bh.model.actuations import Actuation, Displace, Force
-from bh.model.model import CreaseLaw, Model, Sheet
+from bh.model.actuations import Displace, Force
+from bh.model.model import Model
 from bh.model.plugins import made
 from bh.model.refinement import Goal, pattern_of
 from bh.model.serialise import ACTUATIONS as MAKERS
-from bh.model.supports import Holding, RigidBody, Support, directions, select
+from bh.model.sheet import CreaseLaw, Sheet
+from bh.model.step import Actuation, Step
+from bh.model.supports import Constraint, RigidBody, Support, directions, select
+from bh.model.until import Until
 from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
 from bh.scene.reading import (
     as_table,
@@ -199,7 +201,7 @@ def _symmetry(model: Model, data: Any) -> Plane:
     if not isinstance(data, str | list):
         raise SceneError(f'symmetry = {shown(data)} cannot be; give "x", "y" or a normal [x, y, 0]')
     with within("symmetry"):
-        check(model, program(model), mirror(model.mesh, data))
+        check(model, load_steps(model), mirror(model.mesh, data))
     return data if isinstance(data, str) else tuple(data)
 
 
@@ -340,11 +342,11 @@ def _check_triangles(triangles: float) -> None:
         raise SceneError(f"mesh: this is some {triangles:.2g} triangles; ask for fewer than {LARGEST_MESH:,}")
 
 
-def _support(item: Any, at: str) -> Holding:
+def _support(item: Any, at: str) -> Constraint:
     if isinstance(item, dict) and ":" in str(item.get("kind")):
         with within(at):
-            held: Holding = made(item["kind"], without(item, "kind"), Holding)
-            return held
+            own: Constraint = made(item["kind"], without(item, "kind"), Constraint)
+            return own
     table = read_table(SupportTable, item, at)
     if table.at == "rigid-body":
         return RigidBody()
@@ -366,19 +368,20 @@ def _crease(item: Any, at: str) -> CreaseLaw:
         return CreaseLaw(table.Lstar, table.stiffness, table.rest)
 
 
-def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
+def _step(item: Any, at: str) -> Step:
     step = as_table(item, at)
     check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTUATIONS, "until"))
     if not set(step) - {"until"}:
         raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
-    found: list[Actuation | Until] = []
+    found: list[Actuation] = []
+    until = None
     for key, value in step.items():
         if key == "until":
-            found.append(_until(value, f"{at}.until"))
+            until = _until(value, f"{at}.until")
             continue
         for where, each in one_or_more(value, f"{at}.{key}"):
             found.append(_actuation(key, each, where))
-    return tuple(found)
+    return Step(tuple(found), until)
 
 
 def _until(item: Any, at: str) -> Until:
@@ -421,8 +424,8 @@ def _check(model: Model) -> None:
         if isinstance(support, Support):
             with within(f"supports[{i}].at"):
                 select(mesh, support.at)
-    for i, actuations in enumerate(model.steps):
-        for item in actuations:
+    for i, asked in enumerate(model.steps):
+        for item in asked.actuations:
             key = type(item).__name__.lower()
             crease = getattr(item, "crease", "all")
             if crease != "all":
@@ -432,11 +435,11 @@ def _check(model: Model) -> None:
                 with within(f"steps[{i}].{key}.at"):
                     select(mesh, item.at)
     try:
-        steps = program(model)
+        steps = load_steps(model)
     except InputError:
         for i in range(len(model.steps)):  # the first step that the sheet cannot take
             with within(f"steps[{i}]"):
-                program(replace(model, steps=model.steps[: i + 1]))
+                load_steps(replace(model, steps=model.steps[: i + 1]))
         raise
     for i, step in enumerate(steps):
         if step.constraints.rigid_body and step.force.end.any():  # forces on a free sheet have to balance

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bh.errors import InputError
+from bh.formulations.registry import remarks
 from bh.model.supports import Support, select
 from bh.scene.load import Scene
 from meshes import SheetMesh
@@ -53,8 +54,9 @@ def report(scene: Scene) -> list[str]:
     if not model.supports:
         lines.append("supports: none; rigid motions are taken out, nothing is held")
     for i, step in enumerate(model.steps):
-        lines.append(f"step {i + 1}: " + ", ".join(_words(item) for item in step))
-    return lines + [f"remark ({remark.code}): {remark}" for remark in model.remarks]
+        items = (*step.actuations, step.until) if step.until else step.actuations
+        lines.append(f"step {i + 1}: " + ", ".join(_words(item) for item in items))
+    return lines + [f"remark ({remark.code}): {remark}" for remark in remarks(model)]
 
 
 def _words(item: Any) -> str:

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.hyperplane import correct
-from bh.solvers.increments import ARC, DISPLACEMENT, CriticalPoint, Increment, Point, point
+from bh.solvers.increments import ARC, DISPLACEMENT, CriticalPoint, Increment, Mode, Point, point
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.newton import Newton
+from bh.solvers.outcome import Outcome
 from bh.solvers.stability import locate
-from bh.solvers.system import Evaluation, System
+from bh.solvers.system import Evaluation, System, Tangent
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ class Control(Protocol):
     """What is prescribed in place of lambda: a hyperplane, and how far an increment goes."""
 
     @property
-    def mode(self) -> str:
+    def mode(self) -> Mode:
         """How states found so are marked in the path."""
         ...
 
@@ -50,9 +51,11 @@ class Cylindrical:
     mode = ARC
 
     def normal(self, system: System, tangent: Array) -> Array:
+        """(primal,) the tangent itself."""
         return tangent[: system.primal]
 
     def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        """Increment of lambda whose arc has the given length."""
         return length / measure
 
 
@@ -64,6 +67,7 @@ class Generalised(Cylindrical):
     """
 
     def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        """Increment of lambda for a given length; no larger one than the first."""
         return min(length, first * first_measure) / measure
 
 
@@ -79,6 +83,7 @@ class Displacement:
     mode = DISPLACEMENT
 
     def normal(self, system: System, tangent: Array) -> Array:
+        """(primal,) weights of the displacement that grows."""
         if self.along is not None:
             return self.along(system)
         normal = np.zeros(system.primal)
@@ -86,13 +91,15 @@ class Displacement:
         return normal
 
     def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
+        """Increment of lambda in which the displacement grows by the given length."""
         return length / measure
 
 
 @dataclass(frozen=True)
-class _Tangent:
-    """The path's own tangent dq / dlambda at an accepted state, its hyperplane and number of negative modes."""
+class _Direction:
+    """The path's own direction dq / dlambda at an accepted state, its hyperplane and number of negative modes."""
 
+    tangent: Tangent
     rate: Array
     normal: Array
     measure: float
@@ -154,7 +161,7 @@ class ArcLength:
                 yield item
         except IndefiniteError:
             reason = "the tangent is singular, or has too many constraints to count its modes"
-            yield Increment(last, "stalled", 0, math.nan, 0.0, note=reason)
+            yield Increment(last, Outcome.STALLED, 0, math.nan, 0.0, note=reason)
 
     def _follow(
         self, system: System, history: Sequence[Point], increment: float | None, origin: Point | None
@@ -162,84 +169,90 @@ class ArcLength:
         here = history[-1]
         direction = here.q - history[-2].q if len(history) > 1 else None
         p = system.primal
-        start = self._tangent(system, origin or history[0])
+        start = self._direction(system, origin or history[0])
         largest = self.growth * self.first * start.measure
-        tangent = self._tangent(system, here)
+        path = self._direction(system, here)
         length = increment if here.mode == self.control.mode else None
-        length = (increment or self.first) * tangent.measure if length is None else length
+        length = (increment or self.first) * path.measure if length is None else length
         shortest = self.smallest * length
         iterations = 0
         for _ in range(self.most):
-            sign = 1.0 if direction is None else math.copysign(1.0, float(tangent.rate[:p] @ direction[:p]))
-            scale = self.control.scale(length, max(tangent.measure, 1e-300), self.first, start.measure)
-            found = self._increment(system, here, tangent, sign * scale)
+            sign = 1.0 if direction is None else math.copysign(1.0, float(path.rate[:p] @ direction[:p]))
+            scale = self.control.scale(length, max(path.measure, 1e-300), self.first, start.measure)
+            found = self._increment(system, here, path, sign * scale)
             iterations += found.iterations
             there = found.point
             if there is None or found.evaluation is None:
                 length *= 0.4
                 if length < shortest:
-                    yield Increment(here, "stalled", iterations, math.nan, length, note=found.reason)
+                    yield Increment(here, Outcome.STALLED, iterations, math.nan, length, note=found.reason)
                     return
                 continue
             if there.lam < self.lowest:
                 note = f"the path runs back below lambda {self.lowest:g}"
-                yield Increment(here, "limit-point", iterations, math.nan, length, note=note)
+                yield Increment(here, Outcome.LIMIT_POINT, iterations, math.nan, length, note=note)
                 return
-            before = tangent.negative
+            before = path.negative
             direction = there.q - here.q
             length = min(largest, length * min(1.8, math.sqrt(self.goal / max(found.iterations, 1))))
             critical: tuple[CriticalPoint, ...] = ()
-            tangent = self._tangent(system, there)
-            if self.locate and tangent.negative != before:
-                critical = locate(system, here, there, (before, tangent.negative), self.newton.tolerance)
-                tangent = self._tangent(system, there)  # predictions are made with the last tangent
-            here = replace(there, negative=tangent.negative)
+            path = self._direction(system, there)
+            if self.locate and path.negative != before:
+                critical = locate(system, here, there, (before, path.negative), self.newton.tolerance)
+            here = replace(there, negative=path.negative)
             imbalance = found.evaluation.imbalance
             yield Increment(
-                here, "reached", iterations, imbalance, length, note=self.control.mode, critical=critical
+                here,
+                Outcome.REACHED,
+                iterations,
+                imbalance,
+                length,
+                note=self.control.mode,
+                critical=critical,
             )
             iterations = 0
             if here.lam >= 1.0:
                 return
         yield Increment(
-            here, "stalled", 0, math.nan, 0.0, note=f"{self.most} increments of {self.control.mode}"
+            here, Outcome.STALLED, 0, math.nan, 0.0, note=f"{self.most} increments of {self.control.mode}"
         )
 
-    def _tangent(self, system: System, here: Point) -> _Tangent:
-        factor, negative = system.tangent(here.q, here.lam, here.forces).factorise_any()
+    def _direction(self, system: System, here: Point) -> _Direction:
+        tangent = system.tangent(here.q, here.lam, here.forces)
+        factor, negative = tangent.matrix.factorise_any()
         rate = -factor.solve(system.control_rate(here.q, here.lam))
         normal = self.control.normal(system, rate)
         measure = abs(float(normal @ rate[: system.primal])) / max(float(np.linalg.norm(normal)), 1e-300)
-        return _Tangent(rate, normal, measure, negative)
+        return _Direction(tangent, rate, normal, measure, negative)
 
-    def _increment(self, system: System, here: Point, tangent: _Tangent, step: float) -> _Arrival:
+    def _increment(self, system: System, here: Point, path: _Direction, step: float) -> _Arrival:
         """One predictor of size `step` in lambda and its corrections; the last one ends at lambda = 1 exactly."""
         p = system.primal
         lam = here.lam + step
         if lam > 1.0:
-            return self._arrive(system, here, (1.0 - here.lam) * tangent.rate)
-        guess = here.q + step * tangent.rate
-        forces = system.predicted_forces(here.forces, step * tangent.rate)
-        found = correct(system, guess, lam, forces, tangent.normal, self.newton.tolerance, self.iterations)
+            return self._arrive(system, here, path, (1.0 - here.lam) * path.rate)
+        guess = here.q + step * path.rate
+        forces = path.tangent.predicted_forces(here.forces, step * path.rate)
+        found = correct(system, guess, lam, forces, path.normal, self.newton.tolerance, self.iterations)
         if found.reason:
             return _Arrival(None, None, found.iterations, found.reason)
         turned = system.objection(here.q, here.lam, found.q, found.lam)
         # off the tangent by more than 34 degrees: the path turns sharply, and could be followed backwards
-        sharp = np.linalg.norm((found.q - here.q)[:p]) > 1.2 * abs(step) * np.linalg.norm(tangent.rate[:p])
+        sharp = np.linalg.norm((found.q - here.q)[:p]) > 1.2 * abs(step) * np.linalg.norm(path.rate[:p])
         if turned or sharp:
             return _Arrival(None, None, found.iterations, turned or "sharp turn")
         if found.lam > 1.0:
             part = (1.0 - here.lam) / (found.lam - here.lam)
-            system.tangent(here.q, here.lam, here.forces)  # predictions are made with the last tangent
-            return self._arrive(system, here, part * (found.q - here.q))
+            return self._arrive(system, here, path, part * (found.q - here.q))
         there = point(system, found.q, found.lam, self.control.mode, found.evaluation)
         return _Arrival(there, found.evaluation, found.iterations)
 
-    def _arrive(self, system: System, here: Point, change: Array) -> _Arrival:
+    def _arrive(self, system: System, here: Point, path: _Direction, change: Array) -> _Arrival:
         """The state at lambda = 1 from a guess, if it lies ahead on the path and not on another branch."""
         q = here.q + change
         newton = replace(self.newton, unstable=True)
-        solution = newton.solve_boldly(system, q, 1.0, system.predicted_forces(here.forces, change))
+        forces = path.tangent.predicted_forces(here.forces, change)
+        solution = newton.solve_boldly(system, q, 1.0, forces)
         if not solution.converged:
             return _Arrival(None, None, solution.iterations, solution.reason)
         p = system.primal

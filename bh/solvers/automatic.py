@@ -10,6 +10,7 @@ from bh.solvers.arc_length import ArcLength
 from bh.solvers.continuation import AtBifurcation, LoadControl
 from bh.solvers.increments import ARC, LOAD, Increment, Point, point
 from bh.solvers.newton import Solution
+from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import System
 
@@ -54,7 +55,7 @@ class Automatic:
                 failure = yield from self._run(bold.follow(system, points[-3:], increment), points)
                 if failure is None:
                     return
-                if failure.outcome == "bifurcation" and self.at_bifurcation == "stop":
+                if failure.outcome is Outcome.BIFURCATION and self.at_bifurcation == "stop":
                     yield failure
                     return
                 if len(points) < 2:
@@ -84,7 +85,7 @@ class Automatic:
     ) -> Generator[Increment, None, Increment | None]:
         """Hand on accepted increments and remember their points; returns the failure that ended them, or None."""
         for item in increments:
-            if item.outcome != "reached":
+            if not item.reached:
                 return item
             if item.jumped:
                 points.clear()
@@ -97,7 +98,7 @@ class Automatic:
     ) -> Generator[Increment, None, Increment | None]:
         """As `_run`, but stops where load control can take over again, and marks that state so."""
         for item in increments:
-            if item.outcome != "reached":
+            if not item.reached:
                 return item
             points.append(item.point)
             if self.at_bifurcation == "stable":
@@ -119,7 +120,12 @@ class Automatic:
     def _leave(system: System, item: Increment, load: LoadControl) -> Increment | None:
         """The stable state below one that lies behind a bifurcation of a stable branch, or None."""
         first = item.critical[0] if item.critical else None
-        if first is None or first.kind != "bifurcation" or first.negative[0] != 0 or item.point.lam >= 1.0:
+        if (
+            first is None
+            or first.kind is not Critical.BIFURCATION
+            or first.negative[0] != 0
+            or item.point.lam >= 1.0
+        ):
             return None
         here = item.point
         saddle = Solution(here.q, system.evaluate(here.q, here.lam), 0, True, negative=here.negative)

@@ -7,7 +7,6 @@ The address is an argument, so kernels that use it can be cached. All matrices a
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -26,11 +25,10 @@ def addresses() -> Addresses:
     return np.array([get_cython_function_address("scipy.linalg.cython_blas", name) for name in names])
 
 
-@intrinsic
-def _call(typing: Any, address: Any, arguments: Any) -> Any:
+def _code_of_call(_typing, address, arguments):  # type: ignore[no-untyped-def]
     """Call the void C function at `address` with pointers, given as a tuple of integers."""
 
-    def codegen(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    def codegen(context, builder, _signature, values):  # type: ignore[no-untyped-def]
         pointer = ir.IntType(8).as_pointer()
         pointers = [builder.inttoptr(v, pointer) for v in cgutils.unpack_tuple(builder, values[1])]
         kind = ir.FunctionType(ir.VoidType(), [pointer] * len(pointers))
@@ -38,6 +36,9 @@ def _call(typing: Any, address: Any, arguments: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(address, arguments), codegen
+
+
+_call = intrinsic(_code_of_call)
 
 
 # What BLAS is told through pointers lives in two arrays of the caller, so that it outlives the call:
@@ -76,7 +77,7 @@ def solve_right(blas, whole, real, m, n, a, lda, b, ldb):  # type: ignore[no-unt
 
 @njit(inline="always")
 def solve_lower(blas, whole, n, a, lda, x):  # type: ignore[no-untyped-def]
-    """x <- L^-1 x with L the unit lower triangle at address a."""
+    """Solve in place, x <- L^-1 x, with L the unit lower triangle at address a."""
     whole[8], whole[9] = n, lda
     w = np.int64(whole.ctypes.data)
     _call(blas[2], (w + 12, w, w + 16, w + 32, a, w + 36, x, w + 20))
@@ -84,7 +85,7 @@ def solve_lower(blas, whole, n, a, lda, x):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def solve_upper(blas, whole, n, a, lda, x):  # type: ignore[no-untyped-def]
-    """x <- L^-T x with L the unit lower triangle at address a."""
+    """Solve in place, x <- L^-T x, with L the unit lower triangle at address a."""
     whole[8], whole[9] = n, lda
     w = np.int64(whole.ctypes.data)
     _call(blas[2], (w + 12, w + 4, w + 16, w + 32, a, w + 36, x, w + 20))
@@ -92,7 +93,7 @@ def solve_upper(blas, whole, n, a, lda, x):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def add_times(blas, whole, real, m, n, a, lda, x, y):  # type: ignore[no-untyped-def]
-    """y += A x with A (m, n)."""
+    """Add y += A x with A (m, n)."""
     whole[8], whole[9], whole[10] = m, n, lda
     w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
     _call(blas[3], (w, w + 32, w + 36, r + 8, a, w + 40, x, w + 20, r + 8, y, w + 20))
@@ -100,7 +101,7 @@ def add_times(blas, whole, real, m, n, a, lda, x, y):  # type: ignore[no-untyped
 
 @njit(inline="always")
 def subtract_transpose_times(blas, whole, real, m, n, a, lda, x, y):  # type: ignore[no-untyped-def]
-    """y -= A^T x with A (m, n)."""
+    """Subtract y -= A^T x with A (m, n)."""
     whole[8], whole[9], whole[10] = m, n, lda
     w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
     _call(blas[3], (w + 4, w + 32, w + 36, r, a, w + 40, x, w + 20, r + 8, y, w + 20))

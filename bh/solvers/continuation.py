@@ -14,6 +14,7 @@ from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, 
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import count_negative
 from bh.solvers.newton import Newton, Solution
+from bh.solvers.outcome import Outcome
 from bh.solvers.stability import leave_saddle, locate
 from bh.solvers.system import System
 
@@ -33,9 +34,10 @@ class _Trial:
     iterations: int
 
     @property
-    def failure(self) -> str:
+    def failure(self) -> Outcome:
         """The outcome of a step that ends here."""
-        return "bifurcation" if self.solution.converged and self.solution.stable is False else "stalled"
+        unstable = self.solution.converged and self.solution.stable is False
+        return Outcome.BIFURCATION if unstable else Outcome.STALLED
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,9 @@ class LoadControl:
             fold = fold_ahead(points, system.primal)
             if self.foresee and fold <= lam and len(cuts) > 2:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
-                yield Increment(here, "limit-point", iterations, math.nan, step, cuts=tuple(cuts), note=note)
+                yield Increment(
+                    here, Outcome.LIMIT_POINT, iterations, math.nan, step, cuts=tuple(cuts), note=note
+                )
                 return
             tried = self._try(system, points, lam, brisk=len(points) > 1 and len(cuts) < self.brisk)
             iterations += tried.iterations
@@ -112,7 +116,7 @@ class LoadControl:
                 cuts.append(f"lambda {lam:.6g}: {tried.objection}")
                 step = 0.5 * (lam - here.lam)
                 if step < self.smallest:
-                    outcome = "limit-point" if fold <= lam else tried.failure
+                    outcome = Outcome.LIMIT_POINT if fold <= lam else tried.failure
                     yield Increment(
                         here, outcome, iterations, imbalance, step, cuts=tuple(cuts), note=tried.objection
                     )
@@ -123,13 +127,21 @@ class LoadControl:
                 where = f" at lambda {critical[0].lam:.6g}" if critical else f" before lambda {lam:.6g}"
                 note = f"the branch loses its stability{where}"
                 yield Increment(
-                    here, "bifurcation", iterations, imbalance, step, tuple(cuts), note, critical=critical
+                    here,
+                    Outcome.BIFURCATION,
+                    iterations,
+                    imbalance,
+                    step,
+                    tuple(cuts),
+                    note,
+                    critical=critical,
                 )
                 return
             points = [tried.point] if tried.note else [*points[-2:], tried.point]
             step = self._next(lam - here.lam, tried.solution.iterations, bool(cuts), largest)
             yield Increment(
-                tried.point, "reached", iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note), critical
+                tried.point, Outcome.REACHED, iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note),
+                critical,
             )  # fmt: skip
             cuts, iterations = [], 0
 
@@ -164,7 +176,8 @@ class LoadControl:
             return ()
         before = here.negative
         if before is None:  # where a step begins nobody has looked yet
-            before = count_negative(system.tangent(here.q, here.lam, here.forces)) if found.negative else 0
+            matrix = system.tangent(here.q, here.lam, here.forces).matrix if found.negative else None
+            before = 0 if matrix is None else count_negative(matrix)
         if before == found.negative:
             return ()
         there = point(system, found.q, lam, evaluation=found.evaluation)
@@ -189,12 +202,13 @@ class LoadControl:
 
         def guess() -> tuple[Array, Array]:
             here = points[-1]
+            tangent = system.tangent(here.q, here.lam, here.forces)
             try:
-                factor, _ = system.tangent(here.q, here.lam, here.forces).factorise_any()
+                factor, _ = tangent.matrix.factorise_any()
             except IndefiniteError:
                 return here.q, here.forces
             change = -(lam - here.lam) * factor.solve(system.control_rate(here.q, here.lam))
-            return here.q + change, system.predicted_forces(here.forces, change)
+            return here.q + change, tangent.predicted_forces(here.forces, change)
 
         return guess
 

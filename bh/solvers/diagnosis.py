@@ -9,6 +9,7 @@ import numpy as np
 from bh.solvers.increments import Increment
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import lowest_mode
+from bh.solvers.outcome import Outcome
 from bh.solvers.system import System
 
 # stiffness of a motion, in parts of the typical one, that is rounding; next to a critical point it is merely small
@@ -22,21 +23,24 @@ def diagnose(system: System, failure: Increment) -> Increment:
     stiffness ("mechanism"), and what the strategy has found ("limit-point", "bifurcation", "stalled").
     """
     here = failure.point
-    outcome, reason = system.obstacle(here.q, here.lam)
-    if outcome:
+    obstacle = system.obstacle(here.q, here.lam)
+    if obstacle is not None:
+        outcome, reason = obstacle
         return replace(failure, outcome=outcome, note=f"{reason}; {failure.note}")
-    if failure.outcome != "stalled":
+    if failure.outcome is not Outcome.STALLED:
         return failure
     motion = free_motion(system, failure)
     if motion:
-        return replace(failure, outcome="mechanism", note=f"{motion} without resistance; {failure.note}")
+        return replace(
+            failure, outcome=Outcome.MECHANISM, note=f"{motion} without resistance; {failure.note}"
+        )
     return failure
 
 
 def free_motion(system: System, failure: Increment) -> str:
     """The motion of the last state that nothing resists, in words, or an empty string."""
     here = failure.point
-    matrix = system.tangent(here.q, here.lam, here.forces)
+    matrix = system.tangent(here.q, here.lam, here.forces).matrix
     try:
         stiffness, mode = lowest_mode(matrix, system.size, system.primal)
     except IndefiniteError:

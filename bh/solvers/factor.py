@@ -18,21 +18,29 @@ class IndefiniteError(ArithmeticError):
     """
 
     def __init__(self, negative: int) -> None:
+        """An error that knows how many eigenvalues are negative, at least."""
         super().__init__(f"{negative} negative eigenvalue(s)")
         self.negative = negative
 
 
 class Descent(NamedTuple):
-    """A direction (n,), and the rate of change of the merit along its primal part (N mm, negative) once the multipliers
-    have been changed as it says."""
+    """A direction in which the merit falls.
+
+    Attributes:
+        direction: (n,) of the unknowns.
+        slope: rate of change of the merit along its primal part (N mm, negative) once the multipliers have been changed
+            as it says.
+    """
 
     direction: Array
     slope: float
 
 
 class Factor(Protocol):
+    """A factorised matrix (n, n)."""
+
     def solve(self, b: Array) -> Array:
-        """x with A x = b, b (n,) or (n, k)."""
+        """Solution x of A x = b, b (n,) or (n, k)."""
         ...
 
     def descend(self, residual: Array) -> Descent:
@@ -47,12 +55,19 @@ class SignedFactor(Factor):
     negative: int
 
     def descend(self, residual: Array) -> Descent:
+        """See `Factor.descend`.
+
+        Raises:
+            IndefiniteError: the matrix has negative eigenvalues, so nothing says where down is.
+        """
         if self.negative:
             raise IndefiniteError(self.negative)
         return super().descend(residual)
 
 
 class Matrix(Protocol):
+    """A symmetric matrix (n, n) that can be factorised and multiplied with."""
+
     def factorise(self, shift: float = 0.0) -> Factor:
         """Factor of A + shift * diag(|A|); raises `IndefiniteError`."""
         ...
@@ -64,7 +79,9 @@ class Matrix(Protocol):
         """
         ...
 
-    def __matmul__(self, x: Array) -> Array: ...
+    def __matmul__(self, x: Array) -> Array:
+        """A x for x (n,)."""
+        ...
 
 
 def unpermuted(rows: Array, order: Ints) -> Array:

@@ -43,7 +43,7 @@ def locate_zero(
         middle = point(system, state.q, state.lam, b.mode, state.evaluation)
         g = goal(middle)
         if abs(g) <= tolerance:
-            negative = count_negative(system.tangent(state.q, state.lam, state.evaluation.forces))
+            negative = count_negative(system.tangent(state.q, state.lam, state.evaluation.forces).matrix)
             return replace(middle, negative=negative), state.evaluation.imbalance, spent
         if g * g_low > 0.0:
             low, g_low = middle, g

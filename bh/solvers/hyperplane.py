@@ -38,8 +38,9 @@ def correct(
             return Correction(q, lam, now, iteration, "diverged")
         if now.imbalance <= tolerance:
             return Correction(q, lam, now, iteration, "")
+        tangent = system.tangent(q, lam, forces)
         try:
-            factor, _ = system.tangent(q, lam, forces).factorise_any()
+            factor, _ = tangent.matrix.factorise_any()
         except IndefiniteError:
             return Correction(q, lam, now, iteration, "singular tangent")
         a = -factor.solve(now.residual)
@@ -49,6 +50,6 @@ def correct(
             return Correction(q, lam, now, iteration, "singular tangent")
         change = -float(normal @ a[:p]) / slope
         dq = a + change * b
-        forces = system.predicted_forces(now.forces, dq)
+        forces = tangent.predicted_forces(now.forces, dq)
         q, lam = q + dq, lam + change
     return Correction(q, lam, system.evaluate(q, lam), most, "iteration limit")

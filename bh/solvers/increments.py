@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
-LOAD = "load control"
-ARC = "arc length"
-DISPLACEMENT = "displacement control"
+
+
+class Mode(StrEnum):
+    """How a path goes on from a state; the values are what path files hold."""
+
+    LOAD = "load control"
+    ARC = "arc length"
+    DISPLACEMENT = "displacement control"
+
+
+LOAD, ARC, DISPLACEMENT = Mode.LOAD, Mode.ARC, Mode.DISPLACEMENT
 
 
 @dataclass(frozen=True)
@@ -29,7 +39,7 @@ class Point:
     forces: Array
     energy: float
     power: float
-    mode: str = LOAD
+    mode: Mode = LOAD
     negative: int | None = None
 
 
@@ -44,7 +54,7 @@ class CriticalPoint:
         error: half the width in lambda of the last interval.
     """
 
-    kind: str
+    kind: Critical
     lam: float
     q: Array
     mode: Array
@@ -63,7 +73,7 @@ class Increment:
     """
 
     point: Point
-    outcome: str
+    outcome: Outcome
     iterations: int
     imbalance: float
     next_increment: float
@@ -73,11 +83,18 @@ class Increment:
     critical: tuple[CriticalPoint, ...] = ()
 
     @property
+    def reached(self) -> bool:
+        """Is this an accepted state?"""
+        return self.outcome is Outcome.REACHED
+
+    @property
     def negative(self) -> int | None:
+        """Number of negative modes of the state; None where that was not looked at."""
         return self.point.negative
 
     @property
     def stable(self) -> bool | None:
+        """True if no mode is negative, None where that was not looked at."""
         return None if self.negative is None else self.negative == 0
 
 
@@ -85,7 +102,7 @@ def point(
     system: System,
     q: Array,
     lam: float,
-    mode: str = LOAD,
+    mode: Mode = LOAD,
     evaluation: Evaluation | None = None,
     negative: int | None = None,
 ) -> Point:

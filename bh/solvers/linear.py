@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 class LinearSystem(System, Protocol):
     """A system that also knows its second derivative with respect to lambda."""
 
-    def control_stiffness(self, q: Array, lam: float) -> float: ...
+    def control_stiffness(self, q: Array, lam: float) -> float:
+        """Second derivative of the energy by lambda at fixed q (n,), N mm."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ def linear_response(system: LinearSystem, q: Array, lam: float = 0.0) -> LinearR
     """Linear response of `system` at (q, lam); raises `IndefiniteError` where the state is not stable."""
     now = system.evaluate(q, lam)
     rate = system.control_rate(q, lam)
-    dq = -system.tangent(q, lam, now.forces).factorise().solve(rate)
+    dq = -system.tangent(q, lam, now.forces).matrix.factorise().solve(rate)
     # potential to second order: 1/2 dq K dq + dq . rate + 1/2 c, with K dq = -rate
     energy = 0.5 * (float(rate @ dq) + system.control_stiffness(q, lam))
     return LinearResponse(dq, energy)

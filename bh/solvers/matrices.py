@@ -36,6 +36,7 @@ class BandMatrix:
     order: Ints
 
     def factorise(self, shift: float = 0.0) -> BandFactor:
+        """Cholesky factor of A + shift * diag(|A|); raises `IndefiniteError`."""
         ab = self.ab.copy(order="F")
         if shift:
             ab[0] += shift * np.maximum(np.abs(ab[0]), 1e-3 * np.abs(ab[0]).mean())
@@ -45,6 +46,7 @@ class BandMatrix:
         return BandFactor(factor, self.order)
 
     def factorise_any(self) -> tuple[Factor, int]:
+        """Cholesky or L D L^T factor of A and its number of negative eigenvalues; see `Matrix.factorise_any`."""
         try:
             return self.factorise(), 0
         except IndefiniteError:
@@ -55,6 +57,7 @@ class BandMatrix:
             return BandLDLFactor(ab, self.order), negative
 
     def __matmul__(self, x: Array) -> Array:
+        """A x for x (n,), in the order of the unknowns."""
         y = x[self.order]
         out = self.ab[0] * y
         n = len(y)
@@ -65,15 +68,19 @@ class BandMatrix:
         return unpermuted(out, self.order)
 
     def diagonal(self) -> Array:
+        """(n,) diagonal, in the order of the unknowns."""
         return unpermuted(self.ab[0], self.order)
 
 
 @dataclass(frozen=True)
 class BandFactor(Factor):
+    """Cholesky factor of a band, in LAPACK form."""
+
     ab: Array
     order: Ints
 
     def solve(self, b: Array) -> Array:
+        """Solution x of A x = b, b (n,) or (n, k)."""
         x, info = lapack.dpbtrs(self.ab, b[self.order], lower=1)
         if info != 0:
             raise ArithmeticError(f"LAPACK dpbtrs refused argument {-info}")
@@ -116,6 +123,7 @@ class BandLDLFactor(Factor):
     order: Ints
 
     def solve(self, b: Array) -> Array:
+        """Solution x of A x = b, b (n,) or (n, k)."""
         unit = {"uplo": "L", "diag": "U"}
         x, _ = lapack.dtbtrs(self.ab, b[self.order], trans="N", **unit)
         pivots = self.ab[0] if x.ndim == 1 else self.ab[0][:, None]
@@ -123,6 +131,7 @@ class BandLDLFactor(Factor):
         return unpermuted(x, self.order)
 
     def descend(self, residual: Array) -> Descent:
+        """Raises `IndefiniteError`: nothing says where down is."""
         raise IndefiniteError(1)
 
 
@@ -147,9 +156,11 @@ class Storage:
 
     @property
     def banded(self) -> bool:
+        """Whether the values are those of a band."""
         return self.sparse is None
 
     def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
+        """The matrix of values data (size,), which it keeps without a copy."""
         if self.sparse is None:
             return BandMatrix(data.reshape((self.bandwidth + 1, len(self.order)), order="F"), self.order)
         return SparseMatrix(data, self.sparse)
@@ -177,9 +188,11 @@ class FreeBodyMatrix:
     weight: Array | None = None
 
     def factorise(self, shift: float = 0.0) -> FreeBodyFactor:
+        """Factor of A + shift * diag(|A|) without rigid motions; raises `IndefiniteError`."""
         return FreeBodyFactor(self.grounded.factorise(shift), self.Z, self._weighted)
 
     def factorise_any(self) -> tuple[Factor, int]:
+        """Factor of A without rigid motions, definite or not, and its number of negative eigenvalues."""
         factor, negative = self.grounded.factorise_any()
         return FreeBodyFactor(factor, self.Z, self._weighted), negative
 
@@ -188,21 +201,26 @@ class FreeBodyMatrix:
         return self.Z if self.weight is None else self.weight[:, None] * self.Z
 
     def __matmul__(self, x: Array) -> Array:
+        """A x for x (n,), with the stiffness of the ground taken out."""
         out = self.grounded @ x
         out[self.ground_rows] -= self.ground @ x[self.ground_rows]
         return out
 
     def diagonal(self) -> Array:
+        """(n,) diagonal, with the stiffness of the ground."""
         return self.grounded.diagonal()
 
 
 @dataclass(frozen=True)
 class FreeBodyFactor(Factor):
+    """Factor of a free body: loads and solutions are without rigid motions."""
+
     factor: Factor
     Z: Array  # orthonormal columns
     weighted: Array  # W Z, which is Z itself without weights
 
     def solve(self, b: Array) -> Array:
+        """Solution x of A x = b for the part of b (n,) that is in equilibrium, of least displacement."""
         x = self.factor.solve(b - self.weighted @ (self.Z.T @ b))
         return x - self.Z @ (self.weighted.T @ x)
 

@@ -9,7 +9,6 @@ the inertia (Sylvester) and the pattern never changes.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numba import njit
@@ -29,6 +28,7 @@ from bh.solvers.dissection import Dissection
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Index = NDArray[np.int32]
 BLOCK = 32  # columns eliminated at once
 STRIP = 128  # columns of an update made by one product: below the diagonal it makes little that is not needed
 
@@ -72,11 +72,13 @@ class Fronts:
         return float((columns * border**2 / 2 + columns**2 * border / 2 + columns**3 / 6).sum())
 
 
-def fronts(tree: Dissection, indptr: Ints, indices: Ints, first: Ints, lower: tuple[Any, Any]) -> Fronts:
+def fronts(tree: Dissection, indptr: Ints, indices: Ints, first: Ints, lower: tuple[Index, Index]) -> Fronts:
     """Symbolic factorisation.
 
     Args:
-        tree: dissection of the graph `indptr`, `indices`; vertices are nodes with a few unknowns each.
+        tree: dissection of the graph; its vertices are nodes with a few unknowns each.
+        indptr: (v + 1,) where the neighbours of every node begin.
+        indices: neighbours of all nodes.
         first: (v + 1,) first unknown (place in the order) of the node at every place of the order.
         lower: (indptr, indices) of the lower triangle in compressed columns, in the order.
     """
@@ -339,7 +341,7 @@ def _factorise(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _solve(L, start, border_start, border, panel, x, y, blas, whole, real):  # type: ignore[no-untyped-def]
-    """x <- (L D L^T)^-1 x, in the order; y is room for the tallest border."""
+    """Solve in place, x <- (L D L^T)^-1 x, in the order; y is room for the tallest border."""
     base, at_x, at_y = np.int64(L.ctypes.data), np.int64(x.ctypes.data), np.int64(y.ctypes.data)
     for k in range(len(start) - 1):
         s, columns = start[k], start[k + 1] - start[k]

@@ -38,6 +38,7 @@ class Solution:
 
     @property
     def stable(self) -> bool | None:
+        """True if no mode is negative, None where that was not looked at."""
         return None if self.negative is None else self.negative == 0
 
 
@@ -102,13 +103,14 @@ class Newton:
         for iteration in range(self.bold):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=False)
-            factor = self._bold_factor(system.tangent(q, lam, forces))
+            tangent = system.tangent(q, lam, forces)
+            factor = self._bold_factor(tangent.matrix)
             if factor is None:
                 return Solution(q, now, iteration, False, "indefinite tangent")
             dq = -factor.solve(now.residual)
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, careful=False)
-            forces = system.predicted_forces(now.forces, dq)
+            forces = tangent.predicted_forces(now.forces, dq)
             q, before = q + dq, now.imbalance
             now = system.evaluate(q, lam)
             if not np.isfinite(now.energy) or now.imbalance > 1e8 * max(least, 1.0):
@@ -133,7 +135,7 @@ class Newton:
         for iteration in range(self.careful):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=True)
-            matrix = system.tangent(q, lam, now.forces)
+            matrix = system.tangent(q, lam, now.forces).matrix
             factor, shift = factorise_shifted(matrix, shift, least=1e-11)
             if factor is None:
                 return Solution(q, now, iteration, False, "singular tangent", careful=True)
@@ -177,7 +179,7 @@ class Newton:
     def _finish(
         system: System, q: Array, lam: float, now: Evaluation, iterations: int, careful: bool
     ) -> Solution:
-        negative = count_negative(system.tangent(q, lam, now.forces))
+        negative = count_negative(system.tangent(q, lam, now.forces).matrix)
         return Solution(q, now, iterations, True, "", negative, careful)
 
 

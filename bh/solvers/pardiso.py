@@ -14,7 +14,7 @@ import weakref
 from collections import deque
 from functools import cache
 from importlib.util import find_spec
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,14 @@ def pays(n: int) -> bool:
     return n >= FEWEST and available()
 
 
+class _Routine(Protocol):
+    """A routine of MKL; its arguments are pointers."""
+
+    def __call__(self, *arguments: object) -> int: ...
+
+
 @cache
-def _library() -> tuple[Any, Any, int]:
+def _library() -> tuple[_Routine, _Routine, int]:
     """PARDISO, the routine that sets its threads, and how many it was meant to have when it was loaded."""
     from pypardiso import PyPardisoSolver
 
@@ -77,6 +83,11 @@ class Handle:
     """PARDISO's memory of one factor; it is freed when this object is."""
 
     def __init__(self, indptr: Index, indices: Index) -> None:
+        """Look at a pattern, the lower triangle in compressed columns.
+
+        Raises:
+            MemoryError: PARDISO could not.
+        """
         self.indptr, self.indices = indptr, indices
         self.options = _options()
         self.memory = np.zeros(64, dtype=np.int64)
@@ -100,10 +111,10 @@ def _call(
 ) -> int:  # fmt: skip
     routine, set_threads, threads = _library()
 
-    def whole(value: int) -> Any:
+    def whole(value: int) -> object:
         return ctypes.byref(ctypes.c_int32(value))
 
-    def pointer(array: NDArray[Any] | None) -> Any:
+    def pointer(array: Array | Index | Ints | None) -> ctypes.c_void_p:
         return ctypes.c_void_p(None if array is None else array.ctypes.data)
 
     error = ctypes.c_int32(0)
@@ -126,6 +137,7 @@ class Analysis:
     """A pattern (lower triangle in compressed columns, in the order of elimination) that PARDISO has looked at."""
 
     def __init__(self, indptr: Index, indices: Index) -> None:
+        """Keep the pattern; PARDISO looks at it when a matrix is factorised."""
         self.indptr, self.indices = indptr, indices
         self._spare: deque[Handle] = deque(maxlen=SPARE)
 
@@ -154,11 +166,17 @@ class PardisoFactor(SignedFactor):
     """A factor; when it is garbage its handle waits for the next one of the same pattern, or is freed."""
 
     def __init__(self, handle: Handle, data: Array, order: Ints, spare: deque[Handle]) -> None:
+        """Hold a handle that has factorised the values `data`, rows in `order`; `spare` takes it back."""
         self._handle, self._data, self._order = handle, data, order
         self.negative = 0
         weakref.finalize(self, spare.append, handle).atexit = False
 
     def solve(self, b: Array) -> Array:
+        """Solution x of A x = b, b (n,) or (n, k).
+
+        Raises:
+            ArithmeticError: PARDISO could not.
+        """
         rows = np.asfortranarray(b[self._order], dtype=float)
         x = np.empty_like(rows)
         with self._handle.lock:

@@ -40,7 +40,8 @@ class PseudoTransient:
                 break
             try:
                 # below rounding there is nothing to damp, and the last steps are Newton's
-                factor = system.tangent(q, lam, now.forces).factorise(shift if shift > 1e-11 else 0.0)
+                matrix = system.tangent(q, lam, now.forces).matrix
+                factor = matrix.factorise(shift if shift > 1e-11 else 0.0)
             except IndefiniteError:
                 shift = max(4.0 * shift, 1e-9)
                 continue

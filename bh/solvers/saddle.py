@@ -49,6 +49,7 @@ class ConstraintRows:
     n: int
 
     def times(self, x: Array) -> Array:
+        """(c,) G x for x (n,)."""
         out = np.empty(len(self.values))
         _times(self.values, self.columns, x, out)
         return out
@@ -68,6 +69,7 @@ class ConstraintRows:
         return out
 
     def transpose_times(self, y: Array) -> Array:
+        """(n,) G^T y for y (c,)."""
         out = np.zeros(self.n)
         _transpose_times(self.values, self.columns, y, out)
         return out
@@ -88,6 +90,7 @@ class MultiplierMatrix:
     compliance: Array  # (c,) of the constraints, tiny: it decides between multipliers that do the same
 
     def factorise(self, shift: float = 0.0) -> MultiplierFactor | DenseSchurFactor:
+        """Factor of the saddle, with A + shift * diag(|A|); raises `IndefiniteError` where K is so on G x = 0."""
         try:
             return MultiplierFactor(self.augmented.factorise(shift), self.G, self.gamma, self.compliance)
         except IndefiniteError:
@@ -100,6 +103,7 @@ class MultiplierMatrix:
         return factor  # type: ignore[return-value]
 
     def factorise_any(self) -> tuple[Factor, int]:
+        """Factor of the saddle, and the number of negative eigenvalues of K on the null space of G."""
         factor, negative = self.augmented.factorise_any()
         if negative == 0:
             return MultiplierFactor(factor, self.G, self.gamma, self.compliance), 0
@@ -110,6 +114,7 @@ class MultiplierMatrix:
         return whole, negative - int((whole.schur_values < 0.0).sum())
 
     def __matmul__(self, x: Array) -> Array:
+        """Saddle matrix times x (n + c,)."""
         n = self.G.n
         turn = self.G.times(x[:n])
         top = self.augmented @ x[:n] + self.G.transpose_times(x[n:] - self.gamma * turn)
@@ -133,6 +138,7 @@ class MultiplierFactor(Factor):
     tolerance: float = 1e-3
 
     def solve(self, b: Array) -> Array:
+        """Solution x (n + c,) of the saddle times x = b (n + c,)."""
         # second row times gamma G^T added to the first: A x + (1 - gamma c) G^T y = b_1 + gamma G^T b_2
         G, n = self.G, self.G.n
         # constraints that say the same (a straight crease between rigid panels) leave a rounding error that no
@@ -194,6 +200,7 @@ class DenseSchurFactor(Factor):
 
     @classmethod
     def of(cls, factor: Factor, G: ConstraintRows, gamma: Array, compliance: Array) -> DenseSchurFactor:
+        """The factor of a saddle, from one of its augmented block A."""
         scale = 1.0 - gamma * compliance
         rows = G.dense()
         influence = factor.solve(np.ascontiguousarray(rows.T))
@@ -204,6 +211,7 @@ class DenseSchurFactor(Factor):
         )
 
     def solve(self, b: Array) -> Array:
+        """Solution x (n + c,) of the saddle times x = b (n + c,)."""
         n = self.G.n
         x = self.factor.solve(b[:n] + self.G.transpose_times(self.gamma * b[n:]))
         y = np.linalg.solve(self.schur, self.G.times(x) - b[n:])

@@ -65,6 +65,9 @@ class SparsePattern:
         """Pattern of nodes with `sizes` (v,) unknowns each, coupled in pairs (high, low); and the order of the nodes.
 
         Args:
+            high: (pairs,) node of every coupled pair, the one of higher number.
+            low: (pairs,) the other one.
+            sizes: (v,) number of unknowns of every node.
             places: (v, d) positions of the nodes, or None.
             unknowns: gives the unknowns of nodes in a given order.
         """
@@ -81,10 +84,12 @@ class SparsePattern:
 
     @cached_property
     def fronts(self) -> multifrontal.Fronts:
+        """Symbolic factor of the pattern."""
         return multifrontal.fronts(self.tree, *self.graph, self.first, (self.indptr, self.indices))
 
     @cached_property
     def pardiso(self) -> pardiso.Analysis:
+        """The pattern as PARDISO knows it."""
         return pardiso.Analysis(self.indptr, self.indices)
 
 
@@ -127,12 +132,14 @@ class SparseMatrix:
         return cls(np.asarray(lower.data, dtype=float), pattern)
 
     def factorise(self, shift: float = 0.0) -> Factor:
+        """Factor of A + shift * diag(|A|); raises `IndefiniteError`."""
         factor, negative = self._factorise(shift)
         if negative:
             raise IndefiniteError(negative)
         return factor
 
     def factorise_any(self) -> tuple[Factor, int]:
+        """Factor of A, definite or not, and its number of negative eigenvalues."""
         return self._factorise(0.0)
 
     def _factorise(self, shift: float) -> tuple[Factor, int]:
@@ -149,22 +156,27 @@ class SparseMatrix:
         return MultifrontalFactor(L, self.pattern, negative), negative
 
     def __matmul__(self, x: Array) -> Array:
+        """A x for x (n,), in the order of the unknowns."""
         p = self.pattern
         out = np.zeros(len(x))
         _multiply(p.indptr, p.indices, self.data, x[p.order], out)
         return unpermuted(out, p.order)
 
     def diagonal(self) -> Array:
+        """(n,) diagonal, in the order of the unknowns."""
         return unpermuted(self.data[self.pattern.indptr[:-1]], self.pattern.order)
 
 
 @dataclass(frozen=True)
 class MultifrontalFactor(SignedFactor):
+    """L D L^T of a sparse matrix, front by front."""
+
     L: Array
     pattern: SparsePattern
     negative: int
 
     def solve(self, b: Array) -> Array:
+        """Solution x of A x = b, b (n,) or (n, k)."""
         order = self.pattern.order
         return unpermuted(multifrontal.solve(self.L, self.pattern.fronts, b[order]), order)
 

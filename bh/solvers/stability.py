@@ -11,6 +11,7 @@ from bh.solvers.hyperplane import correct
 from bh.solvers.increments import CriticalPoint, Point, point
 from bh.solvers.modes import count_negative, lowest_mode, nearest_mode
 from bh.solvers.newton import Newton, Solution
+from bh.solvers.outcome import Critical
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -
     Returns the stable state and a note; if none of lower energy is found, the saddle itself and an empty note.
     """
     tangent = system.tangent(saddle.q, lam, saddle.evaluation.forces)
-    _, mode = lowest_mode(tangent, len(saddle.q), system.primal)
+    _, mode = lowest_mode(tangent.matrix, len(saddle.q), system.primal)
     mode /= max(float(np.abs(mode).max()), 1e-300)
     size = float(np.ptp(saddle.q[: system.primal])) or 1.0
     spent = 0
@@ -63,7 +64,7 @@ def locate(
     found: list[CriticalPoint] = []
     low, high, before = (a, 0.0), (b, 1.0), negative[0]
     while before != negative[1] and len(found) < 4:
-        pair = _bisect(system, a, b, low, high, before, negative[1], tolerance, width)
+        pair = _bisect(system, a, b, (low, high), (before, negative[1]), tolerance, width)
         if pair is None:
             break
         left, right, behind = pair
@@ -76,10 +77,20 @@ Place = tuple[Point, float]  # a state and where it is on the chord, from 0 to 1
 
 
 def _bisect(
-    system: System, a: Point, b: Point, low: Place, high: Place, before: int, behind: int,
-    tolerance: float, width: float,
-) -> tuple[Place, Place, int] | None:  # fmt: skip
-    """The last interval in which the count leaves `before`, and the count behind it; None if the path is lost."""
+    system: System,
+    a: Point,
+    b: Point,
+    places: tuple[Place, Place],
+    negative: tuple[int, int],
+    tolerance: float,
+    width: float,
+) -> tuple[Place, Place, int] | None:
+    """The last interval in which the count leaves the first of `negative`, which it has at the first of `places`.
+
+    Returns:
+        its ends and the count behind it; None if the path is lost.
+    """
+    (low, high), (before, behind) = places, negative
     normal = (b.q - a.q)[: system.primal]
     while high[1] - low[1] > width:
         p, q = low[0], high[0]
@@ -88,7 +99,7 @@ def _bisect(
         if state.reason:
             return None
         middle = point(system, state.q, state.lam, a.mode, state.evaluation), 0.5 * (low[1] + high[1])
-        count = count_negative(system.tangent(state.q, state.lam, state.evaluation.forces))
+        count = count_negative(system.tangent(state.q, state.lam, state.evaluation.forces).matrix)
         if count == before:
             low = middle
         else:
@@ -102,11 +113,11 @@ def _critical_point(
     p = system.primal
     lam, q = 0.5 * (left.lam + right.lam), 0.5 * (left.q + right.q)
     forces = 0.5 * (left.forces + right.forces)
-    mode = nearest_mode(system.tangent(q, lam, forces), system.size, p)
+    mode = nearest_mode(system.tangent(q, lam, forces).matrix, system.size, p)
     # at a limit point the path itself runs along the mode, and the mode does work on the change of the load
     chord = (b.q - a.q)[:p]
     along = abs(float(mode[:p] @ chord)) > 0.1 * float(np.linalg.norm(chord))
     work = mode * system.control_rate(q, lam)
     loaded = abs(float(work.sum())) > 1e-3 * float(np.abs(work).sum())
-    kind = "limit" if along and loaded else "bifurcation"
+    kind = Critical.LIMIT if along and loaded else Critical.BIFURCATION
     return CriticalPoint(kind, lam, q, mode, negative, 0.5 * abs(right.lam - left.lam))

@@ -6,12 +6,14 @@ All actuation enters through one scalar lambda, which runs from 0 to 1 in a step
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.factor import IndefiniteError, Matrix
+from bh.solvers.outcome import Outcome
 
 Array = NDArray[np.float64]
 
@@ -24,7 +26,7 @@ class Evaluation(NamedTuple):
         residual: (n,) its gradient.
         imbalance: scale-free size of the residual: largest component beyond rounding, over the typical element
             force; constraint violations in rad or relative units. Zero for perfect equilibrium.
-        forces: element forces at q (one array, in the system's own order); see `System.tangent`.
+        forces: element forces at q (one array, in the system's own order); see `System.tangent` and `Tangent`.
         penalty: what missed constraints add to the energy where steps are compared (line search), N mm.
     """
 
@@ -40,35 +42,81 @@ class Evaluation(NamedTuple):
         return self.energy + self.penalty
 
 
+def unchanged(forces: Array, _dq: Array) -> Array:
+    """The prediction of a system whose element forces are left alone: with it the iteration is plain Newton's.
+
+    Args:
+        forces: element forces, in the system's own order.
+        _dq: (n,) increment of the unknowns, which is not looked at.
+
+    Returns:
+        `forces` itself.
+    """
+    return forces
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """The tangent of a system at one (q, lambda), and what it says of the element forces beside that state.
+
+    It belongs to the state that it was made at, whatever its system is asked afterwards.
+
+    Attributes:
+        matrix: symmetric, (n, n): the derivative of the residual by the unknowns.
+        predicted_forces: element forces after an increment, from those at q, `Evaluation.forces`, and the increment
+            dq (n,): `tangent.predicted_forces(now.forces, dq)`, linear in dq.
+    """
+
+    matrix: Matrix
+    predicted_forces: Callable[[Array, Array], Array] = unchanged
+
+
 class System(Protocol):
-    """q: (n,) unknowns. The first `primal` of them minimise the energy, the rest are multipliers."""
+    """What the driver asks of a mechanical system; it knows nothing else of it.
+
+    q are its n = `size` unknowns and lambda, from 0 to 1 in a step, is what drives it. The first `primal` unknowns
+    minimise the energy, the rest are multipliers of constraints. Each method answers for the state that it is given:
+    no order of calls is needed.
+    """
 
     @property
-    def size(self) -> int: ...
+    def size(self) -> int:
+        """Number n of unknowns."""
+        ...
 
     @property
-    def primal(self) -> int: ...
+    def primal(self) -> int:
+        """Number of unknowns that minimise the energy; they come first."""
+        ...
 
-    def evaluate(self, q: Array, lam: float) -> Evaluation: ...
+    @property
+    def energy_scale(self) -> float:
+        """Stiffness times one radian squared over all hinges, N mm; 1e-15 of it is rounding."""
+        ...
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
-        """Symmetric tangent with the element forces `forces` in its geometric part.
+    @property
+    def rotation(self) -> float:
+        """Largest change of an imposed or rest angle while lambda runs from 0 to 1, rad; 0 where none changes."""
+        ...
 
-        With `forces` of `evaluate(q, lam)` this is the Hessian; with those of `predicted_forces` it is the tangent
-        of Newton's method with independent forces (Magisano, Leonetti and Garcea 2017).
+    def evaluate(self, q: Array, lam: float) -> Evaluation:
+        """Energy, its gradient and the element forces at unknowns q (n,)."""
+        ...
+
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        """The tangent at q (n,), with the element forces `forces` in its geometric part.
+
+        With `forces` of `evaluate(q, lam)` its matrix is the Hessian; with those that the tangent before had predicted
+        it is that of Newton's method with independent forces (Magisano, Leonetti and Garcea 2017).
         """
         ...
 
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
-        """Element forces that the last tangent predicts after the increment dq."""
-        ...
-
     def control_rate(self, q: Array, lam: float) -> Array:
-        """(n,) d residual / d lambda."""
+        """(n,) d residual / d lambda at fixed q."""
         ...
 
     def power(self, q: Array, lam: float) -> float:
-        """d energy / d lambda at fixed q: the rate of work of the actuation, N mm."""
+        """Rate of work of the actuation, d energy / d lambda at fixed q, N mm."""
         ...
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
@@ -79,29 +127,29 @@ class System(Protocol):
         """What passed through itself between two states, which no increment may, or an empty string."""
         ...
 
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        """Outcome and reason where the state itself tells why a path ends (contact, ...), else empty strings."""
+    def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        """Outcome and reason where the state itself tells why a path ends (contact, ...), else None."""
         ...
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         """A motion (n,) of the unknowns in words, such as "crease 'a' turns freely"."""
         ...
 
-    @property
-    def energy_scale(self) -> float:
-        """Stiffness times one radian squared over all hinges, N mm; 1e-15 of it is rounding."""
-        ...
-
-    @property
-    def rotation(self) -> float:
-        """Largest change of an imposed or rest angle while lambda runs from 0 to 1, rad."""
-        ...
-
 
 def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, float], float]) -> bool:
-    """Does `measure`, zero in equilibrium, grow to first order along the path's own tangent from an accepted state?"""
+    """Does `measure`, zero in equilibrium, grow to first order along the path's own tangent from an accepted state?
+
+    Args:
+        system: of the step.
+        q: (n,) unknowns of the state, in equilibrium at `lam`.
+        lam: of the state.
+        measure: a number of (q, lambda), in parts of its typical size.
+
+    Returns:
+        True if it grows by more than a millionth a unit of lambda; False also where the tangent is indefinite.
+    """
     try:
-        factor = system.tangent(q, lam, system.evaluate(q, lam).forces).factorise(1e-9)
+        factor = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix.factorise(1e-9)
     except IndefiniteError:
         return False
     ahead = 1e-3 * max(lam, 0.01)

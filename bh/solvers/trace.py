@@ -10,9 +10,8 @@ from typing import Protocol
 from bh.solvers.diagnosis import diagnose
 from bh.solvers.goal import locate_zero
 from bh.solvers.increments import Increment, Point
+from bh.solvers.outcome import Outcome
 from bh.solvers.system import System
-
-MISSED = "target-missed"
 
 
 class Strategy(Protocol):
@@ -56,13 +55,15 @@ class Walk:
 def walk(task: Walk) -> Iterator[Increment]:
     """Accepted increments one by one, so that the caller can store each before the next begins.
 
-    The last one has another outcome than "reached" if the step could not be finished, and names the reason.
+    The last one has another outcome than Outcome.REACHED if the step could not be finished, and names the reason.
     """
     items = task.strategy.follow(task.system, task.history, task.increment, task.origin)
     if task.goal is not None:
         items = _until(task, items, task.goal)
     for item in items:
-        yield item if item.outcome in ("reached", MISSED) else diagnose(task.system, item)
+        yield (
+            item if item.outcome in (Outcome.REACHED, Outcome.TARGET_MISSED) else diagnose(task.system, item)
+        )
 
 
 def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float]) -> Iterator[Increment]:
@@ -70,7 +71,7 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
     here = task.history[-1]
     left = goal(here)
     for item in items:
-        if item.outcome != "reached":
+        if not item.reached:
             yield item
             return
         now = goal(item.point)
@@ -78,7 +79,7 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
             found = locate_zero(task.system, here, item.point, (left, now), goal, task.tolerance)
             note = "the target lies between two states, but the path to it was lost"
             if found is None:
-                yield Increment(here, MISSED, item.iterations, math.nan, 0.0, note=note)
+                yield Increment(here, Outcome.TARGET_MISSED, item.iterations, math.nan, 0.0, note=note)
                 return
             target, imbalance, spent = found
             yield replace(
@@ -90,4 +91,4 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
         if abs(now) <= task.tolerance:
             return
     note = f"the target is not met before the end of the step (missed by {left:.6g})"
-    yield Increment(here, MISSED, 0, math.nan, 0.0, note=note)
+    yield Increment(here, Outcome.TARGET_MISSED, 0, math.nan, 0.0, note=note)

@@ -15,23 +15,22 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.analysis.stiffness_probe import Probe
 from bh.errors import ModelError
+from bh.formulations.protocols import Mirrored, Refinable
 from bh.formulations.registry import formulation, names
-from bh.loading.program import program
-from bh.loading.symmetry import Plane
+from bh.loading.builder import load_steps
 from bh.model.model import Model
 from bh.model.refinement import Goal, Refinement, mesh_at, pattern_of, with_mesh
+from bh.paths.estimate import Accuracy, Trial
 from bh.paths.path import Path
-from bh.runtime.progress import ProgressMeter
-from bh.solvers.trace import Strategy
-from bh.solving.follow import trace
 
 Array = NDArray[np.float64]
 LARGEST = 40_000  # triangles
@@ -41,80 +40,14 @@ SAFETY = 1.5
 ORDERS = (1.0, 2.0)
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One solve on the way: formulation, level, mesh, cost and the value of the goal: (k,), nan if not reached."""
-
-    formulation: str
-    level: float
-    triangles: int
-    unknowns: int
-    iterations: int
-    wall_time_s: float
-    outcome: str
-    value: Array
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """How accurate a path is by its own estimate, and what that took.
-
-    Attributes:
-        goal: what was asked for.
-        estimate: of the relative error of the goal at the last state; inf where there is none.
-        met: whether the estimate is within what was asked for.
-        order: that the last three values show, nan where they show none.
-        formulation, mesh: what was chosen.
-        trials: all solves, coarse to fine.
-        wall_time_s: of all of them with their meshes.
-    """
-
-    goal: Goal
-    estimate: float
-    met: bool
-    order: float
-    formulation: str
-    mesh: str
-    trials: tuple[Trial, ...]
-    wall_time_s: float
-
-    def __str__(self) -> str:
-        """ "energy to 1.3 % by its own estimate (2 % asked): consistent, 32 x 4 staggered cells; 3 meshes, 0.11 s" """
-        met = "asked" if self.met else "asked, not met"
-        return (
-            f"{self.goal.of} to {100 * self.estimate:.2g} % by its own estimate ({100 * self.goal.within:g} % {met}): "
-            f"{self.formulation}, {self.mesh}; {len(self.trials)} meshes, {self.wall_time_s:.2g} s"
-        )
-
-    def as_dict(self) -> dict[str, object]:
-        """Plain data for result.json."""
-        return {
-            "of": self.goal.of,
-            "at": self.goal.at,
-            "within": self.goal.within,
-            "estimate": self.estimate if math.isfinite(self.estimate) else None,
-            "met": self.met,
-            "order": self.order if math.isfinite(self.order) else None,
-            "formulation": self.formulation,
-            "mesh": self.mesh,
-            "wall_time_s": self.wall_time_s,
-            "trials": [{**asdict(t), "value": _plain(t.value)} for t in self.trials],
-        }
-
-
-def _plain(value: Array) -> list[float] | None:
-    return [float(v) for v in value] if np.isfinite(value).all() else None
-
-
-def solve(
-    model: Model,
-    goal: Goal,
-    *,
-    progress: bool | ProgressMeter = False,
-    strategy: Strategy | None = None,
-    symmetry: Plane | None = None,
-) -> Path:
+def solve(model: Model, goal: Goal, follow: Callable[[Model], Path], *, halves: bool = False) -> Path:
     """Trace a model to a wanted accuracy; its own mesh and formulation only say what the sheet is.
+
+    Args:
+        model: the sheet, on any mesh of its pattern.
+        goal: what is to be how accurate.
+        follow: solves a model on one mesh; it is called for every mesh that is tried.
+        halves: only formulations that can be solved by halves.
 
     Returns:
         the path on the finest mesh; `path.accuracy` says what was chosen, estimated and spent. If the estimate does not
@@ -126,15 +59,15 @@ def solve(
     began = time.perf_counter()
     pattern = pattern_of(model)
     _check(model, goal)
-    race = _Race(goal, candidates(halves=symmetry is not None))
+    race = _Race(goal, candidates(halves))
     trials: list[Trial] = []
     error, order, lost = math.inf, math.nan, 0
     while True:
         name, level = race.next()
         mesh = mesh_at(pattern, race.options[name].kind, level)
         clock = time.perf_counter()
-        path = trace(with_mesh(model, mesh, name), progress=progress, strategy=strategy, symmetry=symmetry)
-        reached = path.outcome == "reached"
+        path = follow(with_mesh(model, mesh, name))
+        reached = path.reached
         value = reading(path, goal) if reached else np.array([math.nan])
         spent = time.perf_counter() - clock
         trials.append(
@@ -208,10 +141,11 @@ def candidates(halves: bool = False) -> dict[str, Refinement]:
     Raises:
         ModelError: there is none.
     """
-    found = {name: getattr(formulation(name), "refinement", None) for name in names()}
-    known = {name: item for name, item in found.items() if isinstance(item, Refinement)}
-    if halves:
-        known = {name: item for name, item in known.items() if hasattr(formulation(name), "half")}
+    known = {}
+    for name in names():
+        found = formulation(name)
+        if isinstance(found, Refinable) and found.refinement and (not halves or isinstance(found, Mirrored)):
+            known[name] = found.refinement
     if not known:
         raise ModelError(
             "no formulation is installed that says how its meshes are refined; install the project with pip"
@@ -228,7 +162,7 @@ def _check(model: Model, goal: Goal) -> None:
                 f"accuracy at '{goal.at}' names a node of one mesh; name a corner, an edge or a crease"
             )
         model.mesh.nodes(goal.at)
-    if goal.of == "tip" and any(step.constraints.rigid_body for step in program(model)):
+    if goal.of == "tip" and any(step.constraints.rigid_body for step in load_steps(model)):
         raise ModelError(
             "a sheet that is free to move has no tip displacement of its own; hold it, or ask for the energy"
         )
@@ -242,8 +176,6 @@ def reading(path: Path, goal: Goal) -> Array:
     assert goal.at is not None
     if goal.of == "tip":
         return np.asarray(state.displacement(goal.at).mean(axis=0))
-    from bh.analysis.stiffness_probe import Probe
-
     stiffness = float(Probe(path).at(goal.at).loaded(np.asarray(goal.direction)))
     if not math.isfinite(stiffness):
         raise ModelError(

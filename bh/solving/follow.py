@@ -1,4 +1,4 @@
-"""`trace`: follow the equilibrium of a model through its steps, to a file that a killed run goes on from."""
+"""Follow the equilibrium of a model through its steps, to a file that a killed run goes on from."""
 
 from __future__ import annotations
 
@@ -9,24 +9,25 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
 from bh.errors import ModelError, PathFileError
-from bh.formulations.observables import until_of
+from bh.formulations.observables import measure
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
-from bh.paths.path import Path, Record, StepOutcome, new_file
+from bh.paths.path import Path, new_file
+from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import PathFile
 from bh.runtime.progress import ProgressMeter, meter
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.automatic import Automatic
 from bh.solvers.increments import LOAD, Point, point
+from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
 
 if TYPE_CHECKING:
     from bh.formulations.symmetry_reduction import Half
     from bh.loading.symmetry import Plane
-    from bh.model.refinement import Goal
 
 
-def trace(
+def follow(
     model: Model,
     *,
     symmetry: Plane | None = None,
@@ -34,42 +35,17 @@ def trace(
     strategy: Strategy | None = None,
     file: str | FilePath | None = None,
     resume: bool = False,
-    accuracy: float | Goal | None = None,
     after: Path | None = None,
 ) -> Path:
-    """Follow the equilibrium of `model` through all its steps.
-
-    Args:
-        symmetry: "x", "y" or a normal [x, y, 0]: solve one half of a mirror-symmetric model (`bh.loading.symmetry`). States are
-            of the whole sheet; what leaves the symmetry is only looked for in the last state (`path.stable`).
-        progress: True for a bar in the terminal, or an object that is told about every increment.
-        strategy: how increments are chosen; the default suits all scenes.
-        file: write every accepted state to this file before the next increment begins.
-        resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
-        accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
-            chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
-            see `bh.solving.accuracy` and `path.accuracy`. The file is written when that is done.
-        after: a solved path of the same model with fewer steps, whose states this one begins with.
+    """Follow the equilibrium of a model on its own mesh through all its steps; arguments as of `bh.trace`.
 
     Returns:
-        the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
-        its reason and keeps everything up to there.
+        the path up to where it got.
 
     Raises:
-        ModelError: the model has no steps, or cannot be solved as described.
+        ModelError: the model cannot be solved as described.
         PathFileError: the file cannot be written, or is of another model.
     """
-    if not isinstance(model, Model):
-        what = "give scene.model" if hasattr(model, "model") else "give a bh.Model"
-        raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
-    if not model.steps:
-        raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
-    if accuracy is not None:
-        if resume or after is not None:
-            raise ModelError(
-                "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
-            )
-        return _to_accuracy(model, accuracy, symmetry, progress, strategy, file)
     strategy = strategy or Automatic()
     path, target = _opened(model, symmetry, file, resume, after)
     report = meter(progress)
@@ -80,29 +56,12 @@ def trace(
             path.steps.append(end)
             if target is not None:
                 target.finish_step(step, *astuple(end))
-            if end.outcome != "reached":
+            if not end.reached:
                 break
     finally:
         report.close(path.outcome)
         if target is not None:
             target.close()
-    return path
-
-
-def _to_accuracy(
-    model: Model,
-    accuracy: float | Goal,
-    symmetry: Plane | None,
-    progress: bool | ProgressMeter,
-    strategy: Strategy | None,
-    file: str | FilePath | None,
-) -> Path:
-    from bh.solving.accuracy import Goal, solve
-
-    goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)
-    if file is not None:
-        path.save(file)
     return path
 
 
@@ -117,22 +76,22 @@ def _opened(
         raise ModelError("a path that goes on from another one cannot have a file; save it when it is solved")
     if resume:
         return _resume(model, FilePath(file), symmetry)
-    path._system(0)  # a model that cannot be solved must not replace the file of one that was
+    path.system(0)  # a model that cannot be solved must not replace the file of one that was
     return path, new_file(path, FilePath(file))
 
 
 def _run_step(
     path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
 ) -> StepOutcome:
-    half = path._half(step)
-    system = path._system(step) if half is None else half.system
+    half = path.half(step)
+    system = path.system(step) if half is None else half.system
     began = time.perf_counter()
 
     def accept(record: Record) -> None:
-        record = record if half is None else half.whole(record)
+        record = record if half is None else record.of_whole(half)
         path.records.append(record)
         if target is not None:
-            target.add(path._row(len(path.records) - 1, record))
+            target.add(path.row(-1))
 
     increment: float | None = None
     done = [record for record in path.records if record.step == step]
@@ -148,7 +107,7 @@ def _run_step(
             )
             began = time.perf_counter()
     else:
-        recent = [record if half is None else half.part(record) for record in _recent(done)]
+        recent = [record if half is None else record.of_half(half) for record in _recent(done)]
         history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in recent]
         increment = done[-1].next_increment
         if (
@@ -158,7 +117,7 @@ def _run_step(
     goal, tolerance = _goal(path, step, half)
     for item in walk(Walk(system, strategy, tuple(history), increment, origin, goal, tolerance)):
         now = time.perf_counter()
-        if item.outcome != "reached":
+        if not item.reached:
             return StepOutcome(item.outcome, item.note, item.iterations)
         at = item.point
         accept(
@@ -170,19 +129,19 @@ def _run_step(
         )  # fmt: skip
         report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
         began = time.perf_counter()
-    return StepOutcome("reached")
+    return StepOutcome(Outcome.REACHED)
 
 
 def _goal(path: Path, step: int, half: Half | None) -> tuple[Callable[[Point], float] | None, float]:
     """What is zero where the step ends early, and to which tolerance; None if nothing ends it early."""
-    until = until_of(path.model.steps[step])
+    until = path.model.steps[step].until
     if until is None:
         return None, 0.0
 
     def missed(at: Point) -> float:
         q = at.q if half is None else half.unknowns(at.q, at.lam)
-        state = path._formulation.observe(path.model, path._system(step), q, at.lam, step)
-        return until.measure(state) - until.value
+        state = path.observe(step, q, at.lam)
+        return measure(until, state) - until.value
 
     return missed, until.tolerance
 
@@ -198,15 +157,14 @@ def _recent(done: list[Record]) -> list[Record]:
 
 def _continued(after: Path, model: Model, symmetry: Plane | None) -> Path:
     """A path of `model` that begins with all that `after` has."""
-    if after.outcome != "reached":
+    if not after.reached:
         raise ModelError(f"the path to go on from ended early ({after.outcome}); solve it first")
     if fingerprint(replace(model, steps=model.steps[: len(after.steps)])) != after.provenance["input"]:
         raise ModelError(
             "the path to go on from is of another model; add steps to its own: path.model.step(...)"
         )
     path = Path(model, symmetry=symmetry)
-    path.records, path.steps = list(after.records), list(after.steps)
-    path._states = dict(after._states)
+    path.take_over(after)
     return path
 
 
@@ -219,7 +177,7 @@ def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path,
     path = _with_model(path, model, symmetry)
     target = PathFile.open(file)
     target.forget_failed_steps()
-    path.steps = [step for step in path.steps if step.outcome == "reached"]
+    path.steps = [step for step in path.steps if step.reached]
     return path, target
 
 

@@ -12,6 +12,7 @@ import typer
 
 import bh.sweep
 from bh.errors import InputError
+from bh.solvers.outcome import Outcome
 
 
 def sweep(
@@ -62,7 +63,7 @@ def sweep(
         typer.echo(f"bh: interrupted; what is finished is kept, go on with: {again}", err=True)
         return 130
     outcomes = data["outcome"].values.ravel().tolist()
-    failed = [outcome for outcome in outcomes if outcome != "reached"]
+    failed = [outcome for outcome in outcomes if outcome != Outcome.REACHED]
     if not quiet:
         typer.echo(
             f"{asked.name}: {len(outcomes) - len(failed):,} of {len(outcomes):,} points reached; wrote {place}"

@@ -9,6 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
+from bh.solvers.outcome import Outcome
 from bh.sweep.points import SweepError, Value
 from bh.sweep.pools import Pool
 from bh.sweep.task import Finished, Task, work
@@ -101,7 +102,7 @@ def run(
             found += more
         if found:
             store.add(found)
-            failed += sum(point.outcome != "reached" for point in found)
+            failed += sum(point.outcome != Outcome.REACHED for point in found)
             done, now = done + len(found), now + len(found)
             meter.update(done, total, failed, now, time.monotonic() - began)
         if broken and (state.waiting or state.suspects):

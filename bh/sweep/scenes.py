@@ -16,7 +16,7 @@ from bh.model.supports import select
 from bh.paths.path import Path as Trace
 from bh.scene.load import Scene, scene_from_tables
 from bh.scene.reading import read_toml
-from bh.solving.follow import trace
+from bh.solving.trace import trace
 from bh.sweep.dataset import Label
 from bh.sweep.points import SweepError, Value
 from bh.sweep.task import Measured
@@ -79,7 +79,7 @@ class SceneTask:
     def __call__(self, parameters: Mapping[str, Value]) -> Measured:
         scene = self.scene(parameters)
         path = trace(scene.model, accuracy=scene.accuracy)
-        if path.outcome != "reached":
+        if not path.reached:
             where = f"step {len(path.steps)}, lambda {path.records[-1].lam:.6g}"
             return Measured({}, path.outcome, f"{where}: {path.reason}")
         return Measured(self.measure(path))
@@ -97,7 +97,7 @@ class SceneTask:
             paths = line([scene.model for scene in scenes])
         except InputError:
             return None
-        reached = all(path.outcome == "reached" for path in paths)
+        reached = all(path.reached for path in paths)
         return [Measured(self.measure(path)) for path in paths] if reached else None
 
     def measure(self, path: Trace) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bh.errors import InputError
+from bh.solvers.outcome import Outcome
 from bh.sweep.points import SweepError, Value
 
 Task = Callable[[Mapping[str, Value]], "Measured | Mapping[str, Any]"]
@@ -28,7 +29,7 @@ class Measured:
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
-    outcome: str = "reached"
+    outcome: str = Outcome.REACHED
     reason: str = ""
 
 
@@ -58,7 +59,12 @@ def work(task: Task, points: Sequence[tuple[int, Mapping[str, Value]]]) -> list[
             each = (time.perf_counter() - began) / len(points)
             return [
                 Finished(
-                    index, "reached", "", {n: _plain(n, v) for n, v in m.values.items()}, each, worker=worker
+                    index,
+                    Outcome.REACHED,
+                    "",
+                    {n: _plain(n, v) for n, v in m.values.items()},
+                    each,
+                    worker=worker,
                 )
                 for (index, _), m in zip(points, measured, strict=True)
             ]
@@ -72,9 +78,9 @@ def work(task: Task, points: Sequence[tuple[int, Mapping[str, Value]]]) -> list[
             outcome, reason = measured.outcome, measured.reason
             values = {name: _plain(name, value) for name, value in measured.values.items()}
         except InputError as error:
-            outcome, reason, values = "refused", str(error), {}
+            outcome, reason, values = Outcome.REFUSED, str(error), {}
         except Exception as error:  # one bad point must not stop the others
-            outcome, reason, values = "failed", f"{type(error).__name__}: {error}", {}
+            outcome, reason, values = Outcome.FAILED, f"{type(error).__name__}: {error}", {}
         line = " ".join(reason.split())
         found.append(Finished(index, outcome, line, values, time.perf_counter() - began, worker=worker))
     return found

@@ -15,10 +15,12 @@ import numpy as np
 
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
-from bh.paths.path import Path, Record, StepOutcome
+from bh.paths.path import Path
+from bh.paths.record import Record, StepOutcome
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
-from bh.solving.follow import trace
+from bh.solvers.outcome import Outcome
+from bh.solving.trace import trace
 
 SAME = 1e-6  # of the sheet's size: states this near each other are one
 
@@ -40,7 +42,7 @@ def line(models: Sequence[Model]) -> list[Path]:
 
 def same(one: Path, other: Path) -> bool:
     """Do two paths end in one state?"""
-    if one.outcome != "reached" or other.outcome != "reached":
+    if not one.reached or not other.reached:
         return False
     apart = np.abs(one[-1].points - other[-1].points).max()
     return bool(apart <= SAME * one.model.mesh.size)
@@ -64,12 +66,12 @@ def step_over(before: Path, model: Model) -> Path | None:
     The earlier steps are the neighbour's own; of the last step there is its end alone.
     """
     last = len(model.steps) - 1
-    if before.outcome != "reached" or not _alike(before.model, model):
+    if not before.reached or not _alike(before.model, model):
         return None
     path = Path(model)
     path.records = [record for record in before.records if record.step < last]
     path.steps = list(before.steps[:last])
-    system = path._system(last)
+    system = path.system(last)
     old, record = before.solved()
     if len(record.q) != system.size:
         return None
@@ -84,7 +86,7 @@ def step_over(before: Path, model: Model) -> Path | None:
         negative=found.negative, note="from a neighbouring point",
     )  # fmt: skip
     path.records.append(record)
-    path.steps.append(StepOutcome("reached"))
+    path.steps.append(StepOutcome(Outcome.REACHED))
     return path
 
 

@@ -14,13 +14,14 @@ import bh
 import meshes
 from bh import Fold, Force, Model, Sheet, trace
 from bh.formulations.registry import formulation
+from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges, hinge_name
-from bh.loading.program import program
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.shared.hinge_lock import ZONE, lock_terms, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.model.model import ElementStiffness
+from bh.model.sheet import ElementStiffness
+from bh.model.step import Step
 from bh.scene.load import parse_scene
 from verification.studies.solver.derivatives import differences
 
@@ -111,14 +112,14 @@ def closing(force: float = 0.5, **how: float) -> Model:
 def mirrored(model: Model) -> Model:
     """The same with all forces turned to the other side of the sheet."""
     steps = tuple(
-        tuple(replace(f, total=(f.total[0], f.total[1], -f.total[2])) for f in step)  # type: ignore[union-attr]
+        Step(tuple(replace(f, total=(f.total[0], f.total[1], -f.total[2])) for f in step.actuations))  # type: ignore
         for step in model.steps
     )
     return replace(model, steps=steps)
 
 
 def first_system(model: Model) -> BarsAndHingesSystem:
-    return formulation(model.formulation).system(model, program(model)[0], None)  # type: ignore[no-any-return]
+    return formulation(model.formulation).system(model, load_steps(model)[0], None)  # type: ignore[no-any-return]
 
 
 def bent_to(model: Model, angle: float) -> tuple[BarsAndHingesSystem, Array]:
@@ -153,11 +154,11 @@ def test_predicted_moments_hold_the_lock() -> None:
     """Halving the increment quarters the error of the predicted moments, in the zone as well."""
     system, q = bent_to(flap().force("edge:outer", total=(0.0, 0.0, -0.01)), 0.5 * ZONE)
     now = system.evaluate(q, 0.0)
-    system.tangent(q, 0.0, now.forces)
+    tangent = system.tangent(q, 0.0, now.forces)
     v = np.random.default_rng(4).normal(size=system.size)
     errors = [
         float(
-            np.abs(system.predicted_forces(now.forces, h * v) - system.evaluate(q + h * v, 0.0).forces).max()
+            np.abs(tangent.predicted_forces(now.forces, h * v) - system.evaluate(q + h * v, 0.0).forces).max()
         )
         for h in (2e-5, 1e-5)
     ]
@@ -178,9 +179,9 @@ def test_stiffness_of_the_locks() -> None:
     assert e.lock == pytest.approx(e.hinge_stiffness, rel=1e-14)
     assert not first_system(replace(model, hinge_lock=False)).elements.lock.any()
     e = first_system(Model(mesh, SHEET).fold("crease", to=2.0)).elements
-    assert e.held > 0
-    assert not e.lock[-e.held :].any()
-    assert e.lock[: -e.held].all()
+    assert e.prescribed > 0
+    assert not e.lock[-e.prescribed :].any()
+    assert e.lock[: -e.prescribed].all()
 
 
 def test_stiffness_of_the_locks_where_stiffness_is_given() -> None:
@@ -197,7 +198,7 @@ def test_what_is_in_contact_is_named() -> None:
     mesh = flap().mesh
     held = trace(Model(mesh, SHEET).fold("crease", to=0.2 * ZONE))
     assert held.outcome == "reached"
-    assert held._system(0).contact(held.records[-1].q, 1.0) == ""
+    assert held.system(0).contact(held.records[-1].q, 1.0) == ""
     plain = Model(mesh, SHEET).support("crease:crease", "xyz").support("edge:inner", "xyz")  # no law: sheet
     system, q = bent_to(plain.force("edge:outer", total=(0.0, 0.0, -0.01)), 0.2 * ZONE)
     assert system.elements.spring == 0
@@ -251,9 +252,9 @@ def test_soft_crease_stops(stiffness: float, force: float, other_way: bool) -> N
     left = until_closed(path[-1].dihedral("crease"))
     assert left.max() < 0.5 * ZONE
     assert path[-1].energy.lock > 0.0
-    said = path._system(1).contact(path.records[-1].q, 1.0)
+    said = path.system(1).contact(path.records[-1].q, 1.0)
     assert said.startswith("the panels at crease 'crease' (edge ")
-    assert path._system(0).contact(path.records[0].q, 0.0) == ""
+    assert path.system(0).contact(path.records[0].q, 0.0) == ""
 
 
 def test_harder_pressed_is_closer() -> None:
@@ -272,7 +273,7 @@ def test_without_the_lock_nothing_passes(other_way: bool) -> None:
     assert "would pass through each other" in path.reason
     assert path[-1].energy.lock == 0.0
     assert until_closed(path[-1].dihedral("crease")).min() < 1e-3
-    assert "touch" in path._system(1).contact(path.records[-1].q, path.records[-1].lam)
+    assert "touch" in path.system(1).contact(path.records[-1].q, path.records[-1].lam)
 
 
 @pytest.mark.parametrize("small", [1e-9, 0.01, 0.6])
@@ -292,7 +293,7 @@ def test_work_is_total_plus_lock() -> None:
     path = trace(closing(5.0), strategy=bh.LoadControl(largest=0.02))
     assert path.outcome == "reached"
     for record, state in zip(path.records, path, strict=True):
-        system = path._system(record.step)
+        system = path.system(record.step)
         loads = float(np.vdot(system.force.at(record.lam), state.points - state.mesh.points))
         held = state.energy.total + state.energy.lock
         assert system.evaluate(record.q, record.lam).energy == pytest.approx(
@@ -300,7 +301,7 @@ def test_work_is_total_plus_lock() -> None:
         )
     near = [state for state in path if state.energy.lock > 0.0]
     assert len(near) > 5
-    force = path._system(1).force
+    force = path.system(1).force
     work = sum(
         float(np.vdot(0.5 * (force.at(a.lam) + force.at(b.lam)), b.points - a.points))
         for a, b in pairwise(near)
@@ -318,7 +319,7 @@ def test_nothing_changes_where_no_hinge_is_near() -> None:
         Model(mesh, SHEET).fold("crease", rest=1.2, Lstar=2.0),
         Model(mesh, SHEET).fold(
             "crease", to=math.radians(1.0)
-        ),  # a held crease may go where the lock would be
+        ),  # a prescribed crease may go where the lock would be
     ):
         on, off = trace(model), trace(replace(model, hinge_lock=False))
         assert on.outcome == "reached"
@@ -334,7 +335,7 @@ def test_released_in_the_zone() -> None:
     model = flap(0.05).fold("crease", to=0.5 * ZONE).fold("crease", rest=1.0, stiffness=0.05)
     path = trace(model)
     assert path.outcome == "reached", path.reason
-    system = path._system(1)
+    system = path.system(1)
     assert system.elements.lock[system.elements.bending :].all()
     assert system.evaluate(system.start(), 0.0).imbalance < 1e-7
     assert path[-1].dihedral("crease").mean() == pytest.approx(1.0, abs=0.05)

@@ -14,7 +14,7 @@ from bh.model.model import Model
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment
 from fem.kirchhoff_love import follow
-from fem.observables import ShellState
+from fem.state import ShellState
 from verification.studies.app_b import shell_folding as folding
 from verification.studies.app_b.appendix_b_shell import TABLE_B1
 from verification.theory import shell_benchmarks as sze

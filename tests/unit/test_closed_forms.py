@@ -12,7 +12,7 @@ import bh
 import meshes
 from bh import Displace, Fold, Force, Model, Sheet, trace
 from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.mechanics.bars_and_hinges.stiffness import (
     bar_stiffness,
     bending_hinge_stiffness,
@@ -37,7 +37,7 @@ def reached(model: Model) -> bh.State:
 
 def linear_energy(model: Model) -> float:
     """Quadratic part of the potential of the first step, N mm."""
-    system = formulation(model.formulation).system(model, program(model)[0], None)
+    system = formulation(model.formulation).system(model, load_steps(model)[0], None)
     return linear_response(system, system.start()).energy
 
 
@@ -367,7 +367,7 @@ def test_dead_loads_and_folds_superpose_when_small() -> None:
 
     def response(*step: Fold | Force) -> np.ndarray:
         loaded = model.step(*step)
-        system = formulation(loaded.formulation).system(loaded, program(loaded)[0], None)
+        system = formulation(loaded.formulation).system(loaded, load_steps(loaded)[0], None)
         return linear_response(system, system.start()).dq
 
     assert response(a, b) == pytest.approx(response(a) + response(b), rel=1e-9, abs=1e-9)

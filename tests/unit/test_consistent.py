@@ -13,9 +13,9 @@ import meshes
 from bh import Fold, Model, Sheet, trace
 from bh.errors import ModelError
 from bh.formulations.registry import formulation, takes_nu
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.mechanics.consistent.patches import bending_matrices, stretching_matrices, triangle_frames
-from bh.model.model import ElementStiffness
+from bh.model.sheet import ElementStiffness
 from meshes.structured import Kind
 from verification.studies.solver import plates
 from verification.studies.solver.patch_tests import (
@@ -173,7 +173,7 @@ def test_held_crease_is_the_limit_of_a_stiff_spring() -> None:
 
 def test_held_angle_is_exact_and_without_multipliers() -> None:
     path = trace(model().fold("crease", to=1.2))
-    system = path._system(0)
+    system = path.system(0)
     assert system.size == system.primal
     assert np.abs(path[-1].dihedral("crease") - 1.2).max() < 1e-14
     # the triangles at the crease turn by other angles: the sheet bends up to it
@@ -256,7 +256,7 @@ def test_moment_on_an_uncreased_sheet_is_refused() -> None:
 def test_clamp_needs_boundary_edges() -> None:
     for place in ("corner:inner-start", "crease:crease", [0, 5]):
         with pytest.raises(ModelError, match="needs edges of the boundary"):
-            program(model().support(place, "xyz", clamp=True).fold("crease", to=2.0))
+            load_steps(model().support(place, "xyz", clamp=True).fold("crease", to=2.0))
 
 
 def test_bars_and_hinges_cannot_clamp() -> None:
@@ -271,7 +271,7 @@ def test_clamped_edge_takes_all_rigid_motions() -> None:
     mesh = meshes.structured(meshes.strip(10.0, 1.0), along=10)
     held = Model(mesh, SHEET, formulation="consistent")
     with pytest.raises(ModelError, match="rigid motions free"):
-        program(held.support("edge:start", "xyz").force("edge:end", total=(0.0, 0.0, 1e-6)))
+        load_steps(held.support("edge:start", "xyz").force("edge:end", total=(0.0, 0.0, 1e-6)))
     path = trace(held.support("edge:start", "xyz", clamp=True).force("edge:end", total=(0.0, 0.0, 1e-6)))
     inertia = SHEET.t**3 / 12.0
     deflection = 1e-6 * 10.0**3 / (3.0 * SHEET.E * inertia)

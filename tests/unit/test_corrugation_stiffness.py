@@ -129,7 +129,7 @@ def test_three_point_bending_of_the_straight_one(azimuth: float, low: float, hig
     assert low < test.stiffness < high
     assert test.displacement[0] == 0.0
     assert test.load[0] == pytest.approx(0.1)
-    end = test.path[-1].pressing
+    end = test.path[-1].contact_forces
     assert sum(end.values())[2] == pytest.approx(0.0, abs=5e-3)  # type: ignore[index]
     assert end["left"][2] > 0.0 < end["right"][2]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bh
 import meshes
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.consistent.system import ConsistentSystem
 from bh.solvers.matrices import BandMatrix
@@ -43,23 +43,23 @@ def test_no_folding_arrays_without_creases() -> None:
     """A plain strip, and a creased one whose crease does nothing, have bending hinges only."""
     for creases in ([], [5.0]):
         model = pulled(creases)
-        system = BarsAndHingesSystem(model, program(model)[0], None)
+        system = BarsAndHingesSystem(model, load_steps(model)[0], None)
         e = system.elements
-        assert (e.spring, e.held, e.bending) == (0, 0, len(model.mesh.topology.hinges))
+        assert (e.spring, e.prescribed, e.bending) == (0, 0, len(model.mesh.topology.hinges))
         assert len(e.penalty) == 0
         assert system.size == system.primal == len(system.displacements.free)
         evaluation = system.evaluate(system.start(), 0.5)
         assert len(evaluation.forces) == len(e.bars) + e.bending
-        assert isinstance(system.tangent(system.start(), 0.5, evaluation.forces), BandMatrix)
-        assert system.touching is None
+        assert isinstance(system.tangent(system.start(), 0.5, evaluation.forces).matrix, BandMatrix)
+        assert system.rigid_contact is None
 
 
 def test_folding_arrays_are_those_of_the_crease() -> None:
     """The other side: the test above can see them."""
     held, spring = pulled([5.0]).fold("crease", to=3.0), pulled([5.0]).fold("crease", rest=3.0, Lstar=10.0)
     for model, count in ((held, (0, 6)), (spring, (6, 0))):
-        system = BarsAndHingesSystem(model, program(model)[-1], None)
-        assert (system.elements.spring, system.elements.held) == count
+        system = BarsAndHingesSystem(model, load_steps(model)[-1], None)
+        assert (system.elements.spring, system.elements.prescribed) == count
         assert system.size == system.primal + count[1]
 
 
@@ -67,7 +67,7 @@ def test_consistent_has_springs_for_springs_only() -> None:
     """Two rotations an edge of a spring crease, one or none of the others; no multipliers for held angles."""
     plain, held = pulled([5.0]), pulled([5.0]).fold("crease", to=3.0)
     spring = pulled([5.0]).fold("crease", rest=3.0, Lstar=10.0)
-    one, two, three = (ConsistentSystem(m, program(m)[-1], None) for m in (plain, held, spring))
+    one, two, three = (ConsistentSystem(m, load_steps(m)[-1], None) for m in (plain, held, spring))
     assert len(one.elements.springs) == len(two.elements.springs) == 0
     assert one.elements.turns.shape == two.elements.turns.shape == (0, 2)
     assert len(three.elements.springs) == 6

@@ -16,7 +16,7 @@ import bh
 import meshes
 from bh.commands.cli import main
 from bh.errors import InputError
-from bh.formulations.remarks import remarks
+from bh.formulations.registry import remarks
 from bh.scene.example import example
 from bh.scene.json_schema import schema
 from bh.scene.load import SECTIONS, load_scene, parse_scene, read_toml
@@ -188,8 +188,8 @@ class TestRemarks:
             f"fix = 'xyz'\n[[steps]]\n{steps}\n"
         )
         model = parse_scene(text).model
-        assert model.remarks == remarks(model)
-        return [remark.code for remark in model.remarks]
+        assert bh.remarks(model) == remarks(model)
+        return [remark.code for remark in bh.remarks(model)]
 
     @pytest.mark.parametrize(
         ("mesh", "codes"),
@@ -235,7 +235,7 @@ class TestRemarks:
         scene = parse_scene(
             example(Path("ruled.svg"), here).replace('kind = "drawn"', 'kind = "gmsh"\nsize = 9.0'), here
         )
-        (remark,) = scene.model.remarks
+        (remark,) = bh.remarks(scene.model)
         assert remark.code == "drawing"
         assert "boundary lines lie inside" in remark.text
         path = bh.trace(scene.model, file=here / "path.bh")

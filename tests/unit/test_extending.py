@@ -1,8 +1,9 @@
-"""docs/extending.md: its module runs, and what it adds works in the API, in scenes and in stored paths."""
+"""docs/extending.md: its module runs, passes the type checker, and works in the API, in scenes and in stored paths."""
 
 from __future__ import annotations
 
 import math
+import subprocess
 import sys
 from collections.abc import Iterator
 from importlib import import_module, invalidate_caches
@@ -19,15 +20,23 @@ from bh.errors import InputError
 from verification.framework import cases
 from verification.framework.run import run
 
-PAGE = (FilePath(__file__).resolve().parents[2] / "docs" / "extending.md").read_text(encoding="utf-8")
+ROOT = FilePath(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 SHEET = bh.Sheet(E=4000.0, t=0.127)
 SECTOR = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), along=12)
 
 
+def write_page(folder: FilePath, text: str = PAGE) -> FilePath:
+    """The page's code as a module."""
+    blocks = [part.split("```")[0] for part in text.split("```python\n")[1:]]
+    file = folder / "mine.py"
+    file.write_text("\n\n".join(blocks), encoding="utf-8")
+    return file
+
+
 @pytest.fixture
 def mine(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    blocks = [part.split("```")[0] for part in PAGE.split("```python\n")[1:]]
-    (tmp_path / "mine.py").write_text("\n\n".join(blocks), encoding="utf-8")
+    write_page(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     invalidate_caches()
     yield import_module("mine")
@@ -98,13 +107,13 @@ def test_actuation_in_every_formulation(mine: ModuleType, formulation: str, tmp_
     assert tip == pytest.approx(exact, rel=0.25 if bars else 0.05)
     weight = path[-1].reactions[:, 2].sum()
     assert weight == pytest.approx(load * 320.0, rel=1e-6)
-    assert bh.Path.load(tmp_path / "path.bh").model.steps == ((mine.Weight(1390.0),),)
+    assert bh.Path.load(tmp_path / "path.bh").model.steps == (bh.Step((mine.Weight(1390.0),)),)
 
 
 def test_actuation_in_a_scene(mine: ModuleType, tmp_path: FilePath) -> None:
     text = SCENE.replace('at = "rigid-body"', 'at = "crease:crease"')
     text = text.replace('fold = { crease = "crease", by = 0.5 }', '"mine:Weight" = { density = 1390.0 }')
-    assert scene(tmp_path, text).model.steps == ((mine.Weight(1390.0),),)
+    assert scene(tmp_path, text).model.steps == (bh.Step((mine.Weight(1390.0),)),)
 
 
 @pytest.mark.usefixtures("mine")
@@ -116,6 +125,46 @@ def test_formulation() -> None:
         energies.append(bh.trace(model)[-1].energy.total)
     assert energies[0] < energies[1]
     assert energies[0] == pytest.approx(energies[1], rel=0.05)
+
+
+FRESH = """
+import mine, math
+import bh, meshes
+mesh = meshes.structured(mine.wave(), along=12)
+model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), formulation="mine:PlainBars")
+model = model.support(mine.Radial("corner:inner-end")).support("rigid-body")
+assert bh.trace(model.fold("crease", by=0.5)).outcome == "reached"
+assert bh.remarks(model) == ()
+"""
+
+
+def test_the_page_needs_nothing_imported_before(tmp_path: FilePath) -> None:
+    """In a fresh interpreter, as a reader runs it."""
+    write_page(tmp_path)
+    done = subprocess.run([sys.executable, "-c", FRESH], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def type_check(file: FilePath) -> tuple[int, str]:
+    options = ["--strict", "--follow-imports=silent", f"--config-file={ROOT / 'pyproject.toml'}"]
+    options.append(f"--cache-dir={ROOT / '.mypy_cache' / 'extending'}")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *options, str(file)], capture_output=True, text=True, cwd=ROOT
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_the_page_passes_the_type_checker(tmp_path: FilePath) -> None:
+    code, said = type_check(write_page(tmp_path))
+    assert code == 0, said
+
+
+def test_the_type_checker_names_a_missing_member(tmp_path: FilePath) -> None:
+    """A formulation whose states are made by another name, and one whose system lacks something."""
+    code, said = type_check(write_page(tmp_path, PAGE.replace("def observe(", "def look(")))
+    assert code == 1
+    assert "PlainBars" in said
+    assert "observe" in said
 
 
 def test_study(mine: ModuleType, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,8 +12,9 @@ import pytest
 import bh
 import meshes
 from bh.errors import InputError
-from bh.model.model import Model, Sheet
-from fem.observables import ShellState
+from bh.model.model import Model
+from bh.model.sheet import Sheet
+from fem.state import ShellState
 
 MYLAR = Sheet(E=4000.0, nu=0.38, t=0.127)
 PATTERN = meshes.annulus_sector(100.0, 10.0, math.pi / 4)

@@ -17,7 +17,7 @@ from bh.solvers.matrices import BandMatrix
 from bh.solvers.modes import factorise_shifted, lowest_mode
 from bh.solvers.newton import Newton, Solution, line_search
 from bh.solvers.stability import leave_saddle
-from bh.solvers.system import Evaluation
+from bh.solvers.system import Evaluation, Tangent
 from bh.solvers.trace import Walk, walk
 from verification.studies.solver.benchmark_systems import Silent
 
@@ -55,11 +55,8 @@ class Toy(Silent):
             energy - lam * float(self.load @ q), residual, float(np.abs(residual).max()) / scale, gradient
         )
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> BandMatrix:
-        return band(self.internal(q)[2])
-
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
-        return forces
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        return Tangent(band(self.internal(q)[2]))
 
     def control_rate(self, q: Array, lam: float) -> Array:
         return -self.load

@@ -10,9 +10,9 @@ import pytest
 
 import meshes
 from bh import Fold, Model, ModelError, Pinch, Sheet, trace
+from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges
-from bh.loading.program import program
-from bh.model.laws import HELD, SPRING
+from bh.model.laws import PRESCRIBED, SPRING
 from bh.model.pinch import Chain, chain, parts
 
 PLATE = Sheet(E=4000.0, t=0.5)
@@ -63,13 +63,13 @@ def test_grip_holds_whole_edges() -> None:
 
 
 def test_zone_is_held_and_the_rest_of_the_crease_is_not() -> None:
-    _, step = program(folded().pinch("crease", to=CLOSED, length=20.0))
+    _, step = load_steps(folded().pinch("crease", to=CLOSED, length=20.0))
     at = crease_hinges(ONE, "crease")
-    assert (step.law[at] == HELD).sum() == 8
+    assert (step.law[at] == PRESCRIBED).sum() == 8
     assert (step.law[at] == SPRING).sum() == 32
     now = np.full(len(step.law), 1.5)  # the sheet is not quite at its rest angle
-    ramp = step.held_angles(now)
-    inside = at[step.law[at] == HELD]
+    ramp = step.prescribed_angles(now)
+    inside = at[step.law[at] == PRESCRIBED]
     mean, _ = parts(chain(ONE, "crease"), 0.5, 20.0, "cosine")
     assert (ramp.start[inside] == 1.5).all()
     assert ramp.end[inside] == pytest.approx(1.5 + mean[mean > 0] * (CLOSED - 1.5))
@@ -77,8 +77,8 @@ def test_zone_is_held_and_the_rest_of_the_crease_is_not() -> None:
 
 
 def test_ends_of_edges_carry_the_profile_itself() -> None:
-    _, step = program(folded().pinch("crease", to=CLOSED, length=20.0))
-    ramp = step.held_angles(np.full((len(step.law), 2), RIGHT))
+    _, step = load_steps(folded().pinch("crease", to=CLOSED, length=20.0))
+    ramp = step.prescribed_angles(np.full((len(step.law), 2), RIGHT))
     at = crease_hinges(ONE, "crease")[16:24]
     assert ramp.end[at[3], 1] == ramp.end[at[4], 0] == pytest.approx(CLOSED)
     assert ramp.end[at[0], 0] == pytest.approx(RIGHT)
@@ -86,9 +86,9 @@ def test_ends_of_edges_carry_the_profile_itself() -> None:
 
 
 def test_an_earlier_pinch_stays() -> None:
-    *_, last = program(folded().pinch("crease", at=0.3, length=20.0).pinch("crease", at=0.7, length=20.0))
+    *_, last = load_steps(folded().pinch("crease", at=0.3, length=20.0).pinch("crease", at=0.7, length=20.0))
     now = np.full(len(last.law), 0.7)
-    held = last.held_angles(now)
+    held = last.prescribed_angles(now)
     first = crease_hinges(ONE, "crease")[8:16]
     assert (held.start[first] == 0.7).all()
     assert (held.end[first] == 0.7).all()
@@ -96,10 +96,10 @@ def test_an_earlier_pinch_stays() -> None:
 
 def test_fold_and_pinch_in_one_step_go_to_the_profile_of_the_fold() -> None:
     together = (Pinch("crease", to=CLOSED, length=20.0), Fold("crease", rest=RIGHT, Lstar=2.0))
-    (step,) = program(Model(ONE, PLATE).step(*together))
+    (step,) = load_steps(Model(ONE, PLATE).step(*together))
     mean, _ = parts(chain(ONE, "crease"), 0.5, 20.0, "cosine")
     inside = crease_hinges(ONE, "crease")[mean > 0]
-    end = step.held_angles(np.full(len(step.law), math.pi)).end
+    end = step.prescribed_angles(np.full(len(step.law), math.pi)).end
     assert end[inside] == pytest.approx(RIGHT + mean[mean > 0] * (CLOSED - RIGHT))
 
 
@@ -171,17 +171,17 @@ def test_couples_close_the_crease_until_the_angle_is_reached(formulation: str) -
     assert 0.0 < last.lam < 1.0
     assert last.dihedral("crease") == pytest.approx(last.dihedral("crease")[::-1], abs=1e-6)
     # nothing is held: the angle goes back smoothly, and every edge is a spring still
-    assert (program(path.model)[1].law[crease_hinges(ONE, "crease")] == SPRING).all()
+    assert (load_steps(path.model)[1].law[crease_hinges(ONE, "crease")] == SPRING).all()
 
 
 def test_couples_of_a_pinch_follow_its_profile() -> None:
-    _, step = program(folded().pinch("crease", to=CLOSED, length=20.0, how="couple", couple=30.0))
+    _, step = load_steps(folded().pinch("crease", to=CLOSED, length=20.0, how="couple", couple=30.0))
     mean, _ = parts(chain(ONE, "crease"), 0.5, 20.0, "cosine")
     at = crease_hinges(ONE, "crease")
     assert step.moment.end[at] == pytest.approx(30.0 * mean)
     assert (step.moment.start == 0.0).all()
     two = Model(TWO, PLATE).fold("all", by=RIGHT, Lstar=2.0)
-    _, step = program(two.pinch("all", length=20.0, how="couple", couple=30.0))
+    _, step = load_steps(two.pinch("all", length=20.0, how="couple", couple=30.0))
     assert step.moment.end[crease_hinges(TWO, "crease-2")].min() == pytest.approx(-30.0)
 
 
@@ -278,7 +278,7 @@ def test_a_scene_says_the_same() -> None:
 )
 def test_bad_pinches_are_told_in_one_line(how: dict, words: list[str]) -> None:
     with pytest.raises(ModelError) as error:
-        program(folded().pinch("crease", **how))
+        load_steps(folded().pinch("crease", **how))
     message = str(error.value)
     assert "\n" not in message
     for word in ["crease 'crease'", *words]:
@@ -287,19 +287,19 @@ def test_bad_pinches_are_told_in_one_line(how: dict, words: list[str]) -> None:
 
 def test_a_crease_that_is_not_folded_cannot_be_pinched() -> None:
     with pytest.raises(ModelError, match="fold it before"):
-        program(Model(ONE, PLATE).pinch("crease"))
+        load_steps(Model(ONE, PLATE).pinch("crease"))
 
 
 def test_rest_angles_need_a_spring() -> None:
     with pytest.raises(ModelError, match="imposed there"):
-        program(Model(ONE, PLATE).fold("crease", to=RIGHT).pinch("crease", how="rest"))
+        load_steps(Model(ONE, PLATE).fold("crease", to=RIGHT).pinch("crease", how="rest"))
 
 
 def test_pinches_that_contradict() -> None:
     zone = [Pinch("crease", at=0.5, length=20.0), Pinch("crease", at=0.55, length=20.0)]
     with pytest.raises(ModelError, match=r"contradict each other \(at 0.5 and 0.55\)"):
-        program(folded().step(*zone))
-    assert program(folded().step(zone[0], zone[0]))  # said twice
+        load_steps(folded().step(*zone))
+    assert load_steps(folded().step(zone[0], zone[0]))  # said twice
 
 
 def test_a_crease_of_many_lines_has_no_way_along_it() -> None:
@@ -310,4 +310,4 @@ def test_a_crease_of_many_lines_has_no_way_along_it() -> None:
     mesh = replace(TWO, edge_sets=sets)
     model = Model(mesh, PLATE).fold("mountains", rest=RIGHT, Lstar=2.0).pinch("mountains")
     with pytest.raises(ModelError, match="not one line"):
-        program(model)
+        load_steps(model)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import skfem
 
-from bh.loading.program import program
-from bh.model.model import Model, Sheet
+from bh.loading.builder import load_steps
+from bh.model.model import Model
+from bh.model.sheet import Sheet
 from bh.solvers.linear import linear_response
 from fem.kirchhoff_love import Shell
 from fem.plate import Deflection, Plate, hhj, morley
@@ -80,7 +81,7 @@ def test_the_shell_at_small_load_is_the_plate(clamped: bool) -> None:
     for edge in edges:
         model = model.support(edge, "z", clamp=clamped)
     model = model.force([centre], each=(0.0, 0.0, 1e-3))
-    system = Shell().system(model, program(model)[0], None)
+    system = Shell().system(model, load_steps(model)[0], None)
     response = linear_response(system, system.start())
     w = system.positions(response.dq, 1.0)[:, 2]
     plate = hhj(triangles_of(mesh), Plate(D=1.0, nu=0.3, clamped=clamped, force=1e-3, at=(0.5, 0.5)))

@@ -10,10 +10,11 @@ import pytest
 
 import bh
 from bh.errors import SceneError
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.model.actuations import Displace, Fold, Force, Moment
-from bh.model.model import CreaseLaw
 from bh.model.serialise import ACTUATIONS as KINDS
+from bh.model.sheet import CreaseLaw
+from bh.model.step import Step
 from bh.model.supports import RigidBody, Support
 from bh.scene.load import Outputs, load_scene, parse_scene
 from bh.scene.tables import ACTUATIONS, CreaseTable
@@ -205,19 +206,21 @@ def test_steps_act_together_and_one_after_another():
     ).model
     assert model.creases == {"crease": CreaseLaw(Lstar=25.0, rest=3.0)}
     assert model.steps == (
-        (
-            Moment("crease", 0.01),
-            Force("corner:outer-end", each=(0.0, 0.0, 1e-3)),
-            Force("edge:outer", total=(0.0, 1e-4, 0.0)),
+        Step(
+            (
+                Moment("crease", 0.01),
+                Force("corner:outer-end", each=(0.0, 0.0, 1e-3)),
+                Force("edge:outer", total=(0.0, 1e-4, 0.0)),
+            )
         ),
-        (Displace("node:12", "z", 0.1), Fold("crease", rest=2.0)),
-        (Displace((12,), (0.0, 0.0, 1.0), 0.2),),
+        Step((Displace("node:12", "z", 0.1), Fold("crease", rest=2.0))),
+        Step((Displace((12,), (0.0, 0.0, 1.0), 0.2),)),
     )
 
 
 def test_angles_an_edge_and_drawn(tmp_path):
     listed = scene(steps='[[steps]]\nfold = { crease = "crease", to = [3.0, 2.9, 2.9, 3.0] }\n').model
-    assert listed.steps[0][0] == Fold("crease", to=(3.0, 2.9, 2.9, 3.0))
+    assert listed.steps[0].actuations[0] == Fold("crease", to=(3.0, 2.9, 2.9, 3.0))
     sheet = {
         "vertices_coords": [[0, 0], [10, 0], [10, 10], [0, 10]],
         "faces_vertices": [[0, 1, 2], [0, 2, 3]],
@@ -232,7 +235,7 @@ def test_angles_an_edge_and_drawn(tmp_path):
         steps='[[steps]]\nfold = { crease = "all", by = "drawn" }\n',
         folder=tmp_path,
     )
-    assert program(drawn.model)[0].held.end.tolist() == pytest.approx([1.25 * math.pi])
+    assert load_steps(drawn.model)[0].prescribed.end.tolist() == pytest.approx([1.25 * math.pi])
 
 
 def test_outputs():

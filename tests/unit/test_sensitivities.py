@@ -22,10 +22,10 @@ from bh.analysis.sensitivities import (
     OfNodes,
     OfPoints,
     Position,
-    Situation,
     Stiffness,
     of,
 )
+from bh.analysis.situation import Situation
 from bh.analysis.stiffness_probe import Probe
 from bh.applications.polish import polish
 from meshes.errors import InputError
@@ -195,17 +195,17 @@ def test_closed_forms(formulation: str) -> None:
 
 def test_an_error_in_the_kernels_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out how the bars' stiffness changes with the design: the check above must fail."""
-    from bh.mechanics.bars_and_hinges.derivatives import BarHingeDesign
+    from bh.mechanics.bars_and_hinges.derivatives import BarHingeDerivatives
 
     build, p = held("bars-and-hinges"), np.array(DESIGNS["held"][1])
     path = bh.trace(build(p), strategy=EXACT)
     whole = of(path, build, p, [Energy("stretching")])[0].gradient
-    kept = BarHingeDesign.residual_to_data
+    kept = BarHingeDerivatives.residual_to_data
 
-    def without(self: BarHingeDesign, v: Array, w: Array) -> dict[str, Array]:
+    def without(self: BarHingeDerivatives, v: Array, w: Array) -> dict[str, Array]:
         return {**kept(self, v, w), "bar_stiffness": np.zeros_like(self.length)}
 
-    monkeypatch.setattr(BarHingeDesign, "residual_to_data", without)
+    monkeypatch.setattr(BarHingeDerivatives, "residual_to_data", without)
     assert np.abs(of(path, build, p, [Energy("stretching")])[0].gradient / whole - 1.0).max() > 1e-3
 
 
@@ -310,8 +310,8 @@ def test_bad_input() -> None:
         of(oblique, turning, [0.3], [Energy()])
 
     def until(q: Array) -> bh.Model:
-        step = bh.Fold("crease", to=1.0), bh.Until("fold_angle", 1.0, "crease")
-        return supported("bars-and-hinges", q[0], q[1], q[2]).step(*step)
+        target = bh.Until("fold_angle", 1.0, "crease")
+        return supported("bars-and-hinges", q[0], q[1], q[2]).fold("crease", to=1.0, until=target)
 
     ended = bh.trace(until(p))
     assert ended.outcome == "reached"

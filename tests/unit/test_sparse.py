@@ -48,14 +48,14 @@ def tangents(request: pytest.FixtureRequest) -> dict[str, SparseMatrix]:
     try:
         path = bh.trace(sheet(request.param).fold("crease", rest=2.0 * math.pi / 3.0, Lstar=25.0))
         assert path.outcome == "reached"
-        system, q = path._system(0), path.records[-1].q
+        system, q = path.system(0), path.records[-1].q
         forces = system.evaluate(q, 1.0).forces
         pressed = forces.copy()
         pressed[: len(system.elements.bars)] -= 2.0  # N in every bar
         made = {
-            "flat": system.tangent(system.start(), 0.0, 0.0 * forces),
-            "folded": system.tangent(q, 1.0, forces),
-            "pressed": system.tangent(q, 1.0, pressed),
+            "flat": system.tangent(system.start(), 0.0, 0.0 * forces).matrix,
+            "folded": system.tangent(q, 1.0, forces).matrix,
+            "pressed": system.tangent(q, 1.0, pressed).matrix,
         }
     finally:
         patch.undo()
@@ -105,7 +105,7 @@ def test_answers_and_inertia(tangents: dict[str, SparseMatrix], state: str, back
 
 
 def test_paths_agree_with_those_of_the_band(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Energies of a folded sheet to 1e-10, held crease and spring crease, whoever factorises."""
+    """Energies of a folded sheet to 1e-10, prescribed crease and spring crease, whoever factorises."""
     for model in (
         sheet("staggered", 12, 3).fold("crease", to=2.2),
         sheet("alternating", 12, 3).fold("crease", rest=2.0, Lstar=25.0),
@@ -115,7 +115,7 @@ def test_paths_agree_with_those_of_the_band(backend: str, monkeypatch: pytest.Mo
             patch.setattr(patterns, "band_is_cheaper", lambda n, bandwidth: False)
             other = bh.trace(model)
             assert isinstance(
-                other._system(0)._pattern.matrix(np.zeros(other._system(0)._pattern.size)), SparseMatrix
+                other.system(0)._pattern.matrix(np.zeros(other.system(0)._pattern.size)), SparseMatrix
             )
         assert banded.outcome == other.outcome == "reached"
         assert banded.iterations == other.iterations

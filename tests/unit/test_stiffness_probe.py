@@ -15,7 +15,8 @@ import bh
 import meshes
 from bh import Model, Path, Sheet, trace
 from bh.analysis.stiffness_probe import Probe, Stiffness, sphere
-from bh.loading.program import program
+from bh.formulations import registry
+from bh.loading.builder import load_steps
 from bh.solvers.linear import linear_response
 
 Array = NDArray[np.float64]
@@ -106,11 +107,11 @@ def test_loaded_and_guided_are_solves_of_the_driver(formulation: str) -> None:
     node = int(mesh.nodes("crease:crease")[-1])
     at = Probe(path).at([node])
     n = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
-    form = bh.formulations.formulation(formulation)
+    form = registry.formulation(formulation)
 
     def energy(*actuations: Any) -> float:
         loaded = model.step(*actuations)
-        system = form.system(loaded, program(loaded)[-1], path[-1])
+        system = form.system(loaded, load_steps(loaded)[-1], path[-1])
         return linear_response(system, system.start()).energy
 
     assert float(at.loaded(n)) == pytest.approx(-0.5 / energy(bh.Force([node], each=tuple(n))), rel=1e-7)

@@ -397,7 +397,7 @@ def test_warm_starts_are_given_up_where_states_differ(monkeypatch: pytest.Monkey
     task, points = pinching([1.8, 1.7, 1.6])
     models = [task.scene(points[i]).model for i in range(3)]
     monkeypatch.setattr(warm, "same", lambda *_: False)
-    from bh.solving.follow import trace
+    from bh.solving.trace import trace
 
     for path, model in zip(warm.line(models), models, strict=True):
         assert path[-1].points.tobytes() == trace(model)[-1].points.tobytes()

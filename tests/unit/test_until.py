@@ -11,7 +11,7 @@ import pytest
 import bh
 import meshes
 from bh import Model, ModelError, Sheet, Until, trace
-from bh.formulations.observables import depth_of
+from bh.formulations.observables import depth_of, measure
 from bh.formulations.state import State
 from bh.scene.load import parse_scene
 
@@ -72,7 +72,7 @@ def test_any_observable_ends_a_step(observable: str, of: str | None, value: floa
     until = Until(observable, value, of, 1e-7)
     path = folded(model, until)
     assert path.outcome == "reached"
-    assert until.measure(path[-1]) == pytest.approx(value, abs=1e-7)
+    assert measure(until, path[-1]) == pytest.approx(value, abs=1e-7)
 
 
 def test_what_is_never_met_fails_with_its_reason() -> None:
@@ -114,9 +114,7 @@ def test_held_angles_and_loads_go_on_from_there() -> None:
         .support((strip.nodes("edge:start") + 1).tolist())
     )
     pulled = beam.displace("edge:end", "z", 8.0)
-    pulled = Model(
-        **{**vars(pulled), "steps": ((*pulled.steps[0], Until("displacement_z", 3.0, "edge:end")),)}
-    )
+    pulled = beam.step(*pulled.steps[0].actuations, until=Until("displacement_z", 3.0, "edge:end"))
     path = trace(pulled.displace("edge:end", "z", 5.0))
     assert path.outcome == "reached"
     assert path[-1].displacement("edge:end")[:, 2] == pytest.approx(5.0, abs=1e-9)
@@ -129,7 +127,10 @@ def test_bad_targets_are_one_line() -> None:
         (lambda: Until("fold_angle", 1.0), "needs `of`, the name of a crease"),
         (lambda: bh.depth(-1.0), "positive length"),
         (lambda: Until(lambda state: 1.0, 1.0), "top of a module"),  # type: ignore[arg-type]
-        (lambda: corrugation().step(bh.depth(1.0)), "at least one actuation"),
+        (lambda: corrugation().step(until=bh.depth(1.0)), "at least one actuation"),
+        (lambda: corrugation().step(bh.depth(1.0)), "give it by name"),  # type: ignore[arg-type]
+        (lambda: corrugation().step("fold"), "takes actuations, not a str"),  # type: ignore[arg-type]
+        (lambda: Model(corrugation().mesh, SHEET, steps=((bh.Fold("a", to=1.0),),)), "give bh.Step"),  # type: ignore
     ):
         with pytest.raises(ModelError, match=message):
             make()

@@ -9,6 +9,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from bh import Path
+from bh.solvers.outcome import Outcome
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Check:
     unknowns: int | None = None
     iterations: int | None = None
     wall_time_s: float | None = None
-    outcome: str = "reached"
+    outcome: str = Outcome.REACHED
 
     @property
     def error(self) -> float | None:
@@ -41,20 +42,20 @@ class Check:
 
     @property
     def passed(self) -> bool | None:
-        if self.outcome != "reached":
+        if self.outcome != Outcome.REACHED:
             return False
         if self.tolerance is None or self.error is None:
             return None
         return bool(math.isfinite(self.error) and self.error <= self.tolerance)
 
     def record(self) -> dict[str, Any]:
-        """The record of DESIGN.md, section 2, as plain JSON data.
+        """The record of a check as plain JSON data.
 
         What did not reach its target has an outcome and no value: nothing of it can enter a table as a figure.
         """
         data = asdict(self)
         data["error"], data["passed"] = self.error, self.passed
-        if self.outcome != "reached":
+        if self.outcome != Outcome.REACHED:
             data["value"] = data["error"] = None
         if not math.isfinite(self.value):
             data["value"] = None
@@ -107,7 +108,7 @@ Case = Callable[[Context], CaseResult]
 
 def reached_energy(path: Path) -> float:
     """Total energy of the last state, N mm; nan where the path did not reach its end: that is no value of a study."""
-    return path[-1].energy.total if path.outcome == "reached" else math.nan
+    return path[-1].energy.total if path.reached else math.nan
 
 
 def cost_of(path: Path) -> dict[str, Any]:

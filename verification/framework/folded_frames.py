@@ -8,6 +8,7 @@ from typing import Any
 from bh import Model, Path, trace
 from bh.plotting.interactive import frames
 from bh.plotting.pictures import picture
+from bh.solvers.outcome import Outcome
 from meshes.structured import Kind
 from verification.framework.checks import CaseResult, Check, Context, cost_of
 from verification.framework.run import write_json
@@ -55,7 +56,7 @@ def compare(
     result: CaseResult, params: dict[str, Any], path: Path, shell: Path, tolerance: float | None
 ) -> None:
     """Energies at the end of a path against the shell's; the total is judged where there is a tolerance."""
-    outcome = path.outcome if path.outcome != "reached" else shell.outcome
+    outcome = path.outcome if not path.reached else shell.outcome
     energy, reference = path[-1].energy.as_dict(), shell[-1].energy.as_dict()
     for kind, value in energy.items():
         if value or reference[kind]:
@@ -71,7 +72,7 @@ def step_ends(path: Path) -> list[Any]:
     last = {record.step: index for index, record in enumerate(path.records)}
     return [
         path[0],
-        *(path[last[step]] for step in range(len(path.steps)) if path.steps[step].outcome == "reached"),
+        *(path[last[step]] for step in range(len(path.steps)) if path.steps[step].outcome == Outcome.REACHED),
     ]
 
 

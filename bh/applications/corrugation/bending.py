@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +13,11 @@ from scipy.optimize import linprog
 from bh.applications.corrugation.folded import moved_to
 from bh.errors import ModelError
 from bh.formulations.observables import crease_nodes, depth_of
-from bh.model.actuations import Bar, Displace, Tether
+from bh.model.actuations import Displace, Indenter, Tether
 from bh.paths.path import Path
 from bh.solvers.continuation import LoadControl
-from bh.solving.follow import trace
+from bh.solvers.outcome import Outcome
+from bh.solving.trace import trace
 
 if TYPE_CHECKING:
     from bh.applications.corrugation.folded import Folded
@@ -39,7 +40,7 @@ class Rig:
         span: between the inner edges of the supports, mm; bar: its width, mm; travel: of the bar, mm.
         tape: 0 is a sheet that lies free, without friction. Else valley creases over the supports are first pulled down
             onto them and stay there, held along x and y by this stiffness, N/mm in all (double-sided tape, 4.5.1).
-        gap, stiffness: of the contact (`bh.model.actuations.Bar`).
+        gap, stiffness: of the contact (`bh.model.actuations.Indenter`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
         largest: displacement between two states, mm.
         offset: of the sheet's middle from the bar, along the span, mm.
@@ -75,7 +76,7 @@ class BendingTest:
         displacement: (k,) of the bar from the trigger load on, mm; load: (k,) on it, N.
         stiffness: slope of the regression over the second stage, N/mm; r2: its coefficient of determination.
         window: displacements where that begins and ends, mm; peak: first peak of the load, N.
-        outcome: "reached" if the bar went all the way; else why not, and the curve ends there.
+        outcome: Outcome.REACHED if the bar went all the way; else why not, and the curve ends there.
     """
 
     azimuth: float
@@ -92,7 +93,7 @@ class BendingTest:
     @property
     def converged(self) -> bool:
         """All states converged, to the end or at least beyond the stage that the stiffness is of."""
-        return self.outcome == "reached" or bool(self.displacement[-1] > self.window[1])
+        return self.outcome == Outcome.REACHED or bool(self.displacement[-1] > self.window[1])
 
 
 def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> BendingTest:
@@ -110,8 +111,8 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     half = 0.5 * rig.span + 0.5 * SUPPORT
     depth = 5.0 + rig.gap
 
-    def bar(name: str, s: float, z: float, width: float, fall: float = 0.0, tilt: float = 0.0) -> Bar:
-        return Bar(
+    def bar(name: str, s: float, z: float, width: float, fall: float = 0.0, tilt: float = 0.0) -> Indenter:
+        return Indenter(
             name, place(s, z), azimuth, width, 10.0, ROUND, (0.0, 0.0, -fall), tilt, rig.stiffness, rig.gap
         )
 
@@ -119,7 +120,7 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
         x, y, z = (s * across + [0.0, 0.0, z]).tolist()
         return x, y, z
 
-    items: list[Bar | Tether] = [
+    items: list[Indenter | Tether] = [
         bar("left", -half, -depth, SUPPORT),
         bar("right", half, -depth, SUPPORT),
         Tether("all", (CRADLE, CRADLE, CRADLE)),
@@ -134,7 +135,7 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
         # flat sheets lie in z = 0, as the supports do
         down = start.model.step(*items, Displace(taped, "z", 0.0))
         start = trace(down, after=start, strategy=LoadControl(work_mismatch=math.inf))
-        if start.outcome != "reached":
+        if not start.reached:
             raise ModelError(f"the corrugation cannot be taped down ({start.outcome}: {start.reason})")
         points = start[-1].points
     slope, height = lid(folded, points, along, across, 0.5 * rig.bar)
@@ -152,7 +153,7 @@ def _evaluate(path: Path, azimuth: float, rig: Rig) -> BendingTest:
     step = len(path.model.steps) - 1
     states = [i for i, record in enumerate(path.records) if record.step == step]
     moved_by = np.array([0.0, *(rig.travel * path.records[i].lam for i in states)])
-    load = np.array([0.0, *(-float(path[i].pressing["bar"][2]) for i in states)])
+    load = np.array([0.0, *(-float(path[i].contact_forces["bar"][2]) for i in states)])
     touched = int(np.argmax(load >= TRIGGER)) if (load >= TRIGGER).any() else len(load) - 1
     if touched > 0:  # where the load passes the trigger
         part = (TRIGGER - load[touched - 1]) / max(load[touched] - load[touched - 1], 1e-300)

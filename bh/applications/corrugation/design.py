@@ -19,7 +19,7 @@ from scipy.stats import qmc
 from bh.applications.corrugation.folding import LSTAR, POLYESTER, Folded, fold
 from bh.applications.corrugation.tangent import Directional, tangent_bending
 from bh.errors import InputError, ModelError
-from bh.model.model import Sheet
+from bh.model.sheet import Sheet
 from meshes import CreasePattern, curved_corrugation
 from meshes.unstructured import sheet_area
 

@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model.model import Sheet
+from bh.errors import ModelError
+from bh.formulations.protocols import NodalUnknowns
+from bh.model.sheet import Sheet
 from bh.paths.path import Path
 from meshes import SheetMesh
 
@@ -45,8 +47,21 @@ class Folded:
 
 
 def moved_to(path: Path, points: Array) -> Path:
-    """The path of a free sheet with its last state moved rigidly to `points` (n, 3)."""
+    """The path of a free sheet with its last state moved rigidly.
+
+    Args:
+        path: solved, of a sheet that nothing holds.
+        points: (n, 3) where the nodes come to lie, mm.
+
+    Raises:
+        ModelError: the formulation has unknowns of other nodes too, whose places are not known.
+    """
     system, record = path.solved()
+    if not isinstance(system, NodalUnknowns):
+        raise ModelError(
+            f"formulation '{path.model.formulation}' has nodes beside those of the mesh, so its sheet cannot be laid "
+            "down; take one without"
+        )
     q = record.q.copy()
     q[: system.moving] = system.loads(points - path.model.mesh.points)[: system.moving]
     other = Path(path.model, path.provenance)

@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from bh.applications.corrugation.folded import Folded, moved_to
 from bh.errors import ModelError
-from bh.formulations.observables import depth, depth_of
-from bh.model.model import Model, Sheet
+from bh.formulations.observables import depth_of
+from bh.model.model import Model
+from bh.model.sheet import Sheet
+from bh.model.until import depth
 from bh.paths.path import Path
 from bh.solvers.trace import Strategy
-from bh.solving.follow import trace
+from bh.solving.trace import trace
 from meshes import CreasePattern, SheetMesh, corrugation, structured
 
 Array = NDArray[np.float64]
@@ -50,7 +52,7 @@ def fold(
         mesh = structured(mesh, along=along, rows=rows)
     model = Model(mesh, sheet, formulation=formulation).support("rigid-body")
     path = trace(model.fold("all", by=SHARPEST, Lstar=Lstar, until=depth(depth_mm)), strategy=strategy)
-    if path.outcome != "reached":
+    if not path.reached:
         raise ModelError(
             f"the corrugation cannot be folded {depth_mm:g} mm deep ({path.outcome}: {path.reason})"
         )

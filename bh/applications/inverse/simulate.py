@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.transforms import angles, frame, relative
 from bh.formulations.state import State
-from bh.model.actuations import Actuation, Pinch
-from bh.model.model import Model, Sheet
+from bh.model.model import Model
+from bh.model.pinch import Pinch
+from bh.model.sheet import Sheet
+from bh.model.step import Actuation
 from bh.paths.path import Path
-from bh.solving.follow import trace
+from bh.solving.trace import trace
 from meshes import SheetMesh, parallel_creases, structured
 
 Array = NDArray[np.float64]
@@ -161,7 +163,7 @@ def simulate(
         DesignError: the path ended early.
     """
     path = trace(model(k0, lengths, pinched, setting))
-    if path.outcome != "reached":
+    if not path.reached:
         raise DesignError(f"the strip cannot be folded and pinched: {path.outcome} ({path.reason})")
     start, end = frames(path[-1])
     t, r = relative(start, end)

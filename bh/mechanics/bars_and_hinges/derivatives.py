@@ -1,6 +1,6 @@
 """How bars and hinges depend on the design: exact derivatives of forces and energies with respect to element data.
 
-With velocities v of the nodes and w of the moments of held creases, and with a dot for rates along them,
+With velocities v of the nodes and w of the moments of prescribed creases, and with a dot for rates along them,
 
     r . (v, w) = sum k_s (l - L) l' + sum [k (phi - phi_R) + couple + lock m(phi)] phi' + sum w (phi - target)
                  - load . v
@@ -11,6 +11,8 @@ positions, are written out below, and those of the energies and of the second va
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,13 +30,25 @@ Array = NDArray[np.float64]
 Data = dict[str, Array]
 
 
-class BarHingeDesign:
+class BarHingeDerivatives:
     """Derivatives of one system at one state. `other` are the unknowns after the displacements: moments, N mm."""
 
+    unfollowed: Mapping[str, str] = MappingProxyType({})
+
     def __init__(self, system: BarsAndHingesSystem, q: Array, lam: float) -> None:
+        """Linearise elements at a state.
+
+        Args:
+            system: of the step.
+            q: (size,) unknowns.
+            lam: control parameter.
+
+        Raises:
+            ModelError: bars measure Green's strain, whose derivatives are not known.
+        """
         if system.elements.green:
             raise ModelError("given element stiffness with Green's strain has no sensitivities; use l - L")
-        self.system, self.q, self.lam = system, q, lam
+        self.system, self.moving, self.q, self.lam = system, system.moving, q, lam
         e = system.elements
         self.x = system.positions(q, lam)
         _, _, _, self.forces, self.turn = system.internal_forces(self.x, q, lam)
@@ -71,7 +85,7 @@ class BarHingeDesign:
             np.add.at(f, e.bars[:, 0], -pull)
         moment = self._kinds(e.hinge_stiffness * self.turn, kinds)
         np.add.at(f, e.hinges, moment[:, None, None] * self.g)
-        return f, np.zeros(e.held)
+        return f, np.zeros(e.prescribed)
 
     def angle_gradient(self, hinges: Ints, weights: Array) -> tuple[Array, Array, Data]:
         """Gradient of the weighted sum of `State.dihedral_angles` of some hinges of the mesh; and to the data."""
@@ -79,17 +93,17 @@ class BarHingeDesign:
         f = np.zeros_like(self.x)
         g = dihedral_gradients(self.x, rows).reshape(-1, 4, 3)
         np.add.at(f, rows, weights[:, None, None] * g)
-        return f, np.zeros(self.system.elements.held), {}
+        return f, np.zeros(self.system.elements.prescribed), {}
 
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the other unknowns, along v (n, 3) and w."""
         system, e = self.system, self.system.elements
-        f = system._tangent_times(self.x, v, self.forces)
+        f = system.tangent_times(self.x, v, self.forces)
         turned = self._rate(v)
-        if e.held:
-            held = slice(len(e.hinges) - e.held, None)
-            np.add.at(f, e.hinges[held], w[:, None, None] * self.g[held])
-            return f, turned[held] - system._compliance * w
+        if e.prescribed:
+            prescribed = slice(len(e.hinges) - e.prescribed, None)
+            np.add.at(f, e.hinges[prescribed], w[:, None, None] * self.g[prescribed])
+            return f, turned[prescribed] - system.compliance * w
         return f, np.zeros(0)
 
     def support(self) -> dict[str, Ints]:
@@ -107,8 +121,8 @@ class BarHingeDesign:
         """(m,) derivatives to the imposed angles of hinges of the mesh, of derivatives to the data; zero elsewhere."""
         e = self.system.elements
         out = np.zeros(len(self.system.mesh.topology.hinges))
-        if e.held:
-            out[e.source[-e.held :]] = by_data["rest"][-e.held :]
+        if e.prescribed:
+            out[e.source[-e.prescribed :]] = by_data["rest"][-e.prescribed :]
         return out
 
     # ------------------------------------------------------------------------------- derivatives to data
@@ -119,8 +133,8 @@ class BarHingeDesign:
         l1, p1 = self._stretching(v), self._rate(v)
         rest = -e.hinge_stiffness * p1
         couple = p1.copy()
-        if e.held:
-            rest[-e.held :], couple[-e.held :] = -w, 0.0
+        if e.prescribed:
+            rest[-e.prescribed :], couple[-e.prescribed :] = -w, 0.0
         return {
             "bar_length": -e.bar_stiffness * l1,
             "bar_stiffness": self.stretch * l1,
@@ -151,8 +165,8 @@ class BarHingeDesign:
         turning = v[e.hinges].reshape(-1, 12)
         p2 = np.einsum("hi,hij,hj->h", turning, dihedral_hessians(self.x, e.hinges), turning)
         couple = p2.copy()
-        if e.held:
-            couple[-e.held :] = 0.0
+        if e.prescribed:
+            couple[-e.prescribed :] = 0.0
         return {
             "bar_length": -e.bar_stiffness * l2,
             "bar_stiffness": l1**2 + self.stretch * l2,

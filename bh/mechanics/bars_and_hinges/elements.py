@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.mechanics.bars_and_hinges.stiffness import (
     bending_hinge_stiffness,
     folding_hinge_stiffness,
@@ -15,21 +15,21 @@ from bh.mechanics.bars_and_hinges.stiffness import (
 )
 from bh.mechanics.shared.hinge_lock import ZONE, lock_terms, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.model.actuations import Ramp
-from bh.model.laws import HELD, SHEET, SPRING
+from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
-PENALTY = 300.0  # of a held crease, in parts of E t h^2 with h the height of its wings
+PENALTY = 300.0  # of a prescribed crease, in parts of E t h^2 with h the height of its wings
 
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """Element arrays of one step. Hinges are ordered: bending, spring creases, held creases.
+    """Element arrays of one step. Hinges are ordered: bending, spring creases, prescribed creases.
 
     `source` (h,) is the row of `mesh.topology.hinges` of each hinge, `lock` (h,) the stiffness of its lock. Held
-    creases have no stiffness (their moment is a multiplier); `penalty` (held,) is their weight in the tangent,
+    creases have no stiffness (their moment is a multiplier); `penalty` (prescribed,) is their weight in the tangent,
     N mm / rad.
     """
 
@@ -44,13 +44,15 @@ class Elements:
     couple: Ramp
     bending: int
     spring: int
-    held: int
+    prescribed: int
     penalty: Array
     green: bool = False
 
 
-def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment_start: Array) -> Elements:
-    """Element stiffness of a model in one step; `held_start` and `moment_start` (m,) are what it begins with.
+def sheet_elements(
+    model: Model, load_step: LoadStep, prescribed_start: Array, moment_start: Array
+) -> Elements:
+    """Element stiffness of a model in one step; `prescribed_start` and `moment_start` (m,) are what it begins with.
 
     Dihedral angles (rad) and total moments (N mm) of all hinges; moments are zero off creases.
     """
@@ -64,43 +66,47 @@ def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment
     k_bar = sheet_bars(sheet.E, sheet.t, lengths, areas, mesh.spans)
 
     hinge_length, hinge_area = lengths[topology.hinge_edges], areas[topology.hinge_edges]
-    groups = [np.flatnonzero(program.law == law) for law in (SHEET, SPRING, HELD)]
+    groups = [np.flatnonzero(load_step.law == law) for law in (SHEET, SPRING, PRESCRIBED)]
     source = np.concatenate(groups)
     reference = dihedral_angles(points, topology.hinges)
     k_bend = bending_hinge_stiffness(sheet.E, sheet.t, hinge_length, hinge_area)
-    k_fold = folding_hinge_stiffness(program.stiffness, hinge_length)
+    k_fold = folding_hinge_stiffness(load_step.stiffness, hinge_length)
     if model.stiffness is not None:
         k_bar = model.stiffness.bars
         k_bend = k_fold = model.stiffness.hinges
     # augmentation well above what the bars give a wing
     gamma = PENALTY * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
-    stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], 0.0)
-    lock = _lock_stiffness(model, program, stiffness, k_bend, reference)
-    imposed = program.held_angles(held_start)
-    law = program.law[source]
+    stiffness = np.select([load_step.law == SHEET, load_step.law == SPRING], [k_bend, k_fold], 0.0)
+    lock = _lock_stiffness(model, load_step, stiffness, k_bend, reference)
+    imposed = load_step.prescribed_angles(prescribed_start)
+    law = load_step.law[source]
 
-    def ramp(bend: Array, spring: Array, held: Array) -> Array:
-        return np.where(law == SHEET, bend[source], np.where(law == SPRING, spring[source], held[source]))
+    def ramp(bend: Array, spring: Array, prescribed: Array) -> Array:
+        return np.where(
+            law == SHEET, bend[source], np.where(law == SPRING, spring[source], prescribed[source])
+        )
 
     # a released crease begins with the moment that it has; what its lock and its couple take of it is not the spring's
-    of_spring = moment_start - lock_terms(held_start, lock)[:, 1] - program.moment.start * hinge_length
-    rest_from = np.where(
-        np.isnan(program.rest.start), held_start - of_spring / _nonzero(k_fold), program.rest.start
+    of_spring = (
+        moment_start - lock_terms(prescribed_start, lock)[:, 1] - load_step.moment.start * hinge_length
     )
-    rest = Ramp(ramp(reference, rest_from, imposed.start), ramp(reference, program.rest.end, imposed.end))
-    scale = np.where(law == HELD, 0.0, hinge_length[source])
-    couple = Ramp(program.moment.start[source] * scale, program.moment.end[source] * scale)
+    rest_from = np.where(
+        np.isnan(load_step.rest.start), prescribed_start - of_spring / _nonzero(k_fold), load_step.rest.start
+    )
+    rest = Ramp(ramp(reference, rest_from, imposed.start), ramp(reference, load_step.rest.end, imposed.end))
+    scale = np.where(law == PRESCRIBED, 0.0, hinge_length[source])
+    couple = Ramp(load_step.moment.start[source] * scale, load_step.moment.end[source] * scale)
     return Elements(
         bars=topology.edges, bar_length=lengths, bar_stiffness=k_bar,
         hinges=np.ascontiguousarray(topology.hinges[source]), source=source,
         hinge_stiffness=stiffness[source], lock=lock[source], rest=rest, couple=couple,
-        bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]), penalty=gamma[groups[2]],
+        bending=len(groups[0]), spring=len(groups[1]), prescribed=len(groups[2]), penalty=gamma[groups[2]],
         green=model.stiffness is not None and model.stiffness.green,
     )  # fmt: skip
 
 
 def _lock_stiffness(
-    model: Model, program: StepProgram, stiffness: Array, sheet: Array, reference: Array
+    model: Model, load_step: LoadStep, stiffness: Array, sheet: Array, reference: Array
 ) -> Array:
     """(m,) stiffness of the locks, N mm / rad: the hinge's own, or the sheet's at that edge where it is larger.
 
@@ -112,7 +118,7 @@ def _lock_stiffness(
         return np.zeros_like(stiffness)
     if model.stiffness is not None:
         sheet = np.full_like(stiffness, model.stiffness.hinges.mean())
-    without = (program.law == HELD) | (until_closed(reference) < ZONE)
+    without = (load_step.law == PRESCRIBED) | (until_closed(reference) < ZONE)
     return np.where(without, 0.0, np.maximum(stiffness, sheet))
 
 

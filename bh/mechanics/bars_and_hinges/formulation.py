@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.formulations.remarks import Remark
 from bh.formulations.state import Energy, State
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
+from bh.mechanics.bars_and_hinges import remarks
+from bh.mechanics.bars_and_hinges.derivatives import BarHingeDerivatives
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.model.model import Model
-from meshes.topology import Ints
 
 if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
@@ -29,16 +32,17 @@ class BarsAndHinges:
     """Formulation "bars-and-hinges"; Poisson's ratio of the sheet is taken as 0, as in the source (3.3.2)."""
 
     name = "bars-and-hinges"
+    takes_nu = False
 
-    def system(self, model: Model, program: StepProgram, start: State | None) -> BarsAndHingesSystem:
+    def system(self, model: Model, load_step: LoadStep, start: State | None) -> BarsAndHingesSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
-        return BarsAndHingesSystem(model, program, start)
+        return BarsAndHingesSystem(model, load_step, start)
 
     def half(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror
+        self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror
     ) -> BarsAndHingesSystem:
         """The system of the kept half of a symmetric sheet; `start` is a state of the whole."""
-        return BarsAndHingesSystem(model, program, start, plane)
+        return BarsAndHingesSystem(model, load_step, start, plane)
 
     def whole(
         self, whole: BarsAndHingesSystem, half: BarsAndHingesSystem, plane: Mirror, q: Array, lam: float
@@ -46,12 +50,12 @@ class BarsAndHinges:
         """Unknowns of the whole sheet from those of its half."""
         out = np.empty(whole.size)
         out[: whole.primal] = whole.displacements.unknowns(half.positions(q, lam))
-        if whole.elements.held:
+        if whole.elements.prescribed:
             at = np.full(len(plane.hinge), np.nan)
-            kept = half.elements.source[-half.elements.held :]
+            kept = half.elements.source[-half.elements.prescribed :]
             at[kept] = q[half.primal :] / plane.hinge_weight[kept]
             at = np.where(np.isnan(at), at[plane.hinge], at)
-            out[whole.primal :] = at[whole.elements.source[-whole.elements.held :]]
+            out[whole.primal :] = at[whole.elements.source[-whole.elements.prescribed :]]
         return out
 
     def part(
@@ -60,12 +64,24 @@ class BarsAndHinges:
         """Unknowns of the half from those of the whole sheet."""
         out = np.empty(half.size)
         out[: half.primal] = half.displacements.unknowns(whole.positions(q, lam))
-        if half.elements.held:
+        if half.elements.prescribed:
             at = np.zeros(len(plane.hinge))
-            at[whole.elements.source[-whole.elements.held :]] = q[whole.primal :]
-            kept = half.elements.source[-half.elements.held :]
+            at[whole.elements.source[-whole.elements.prescribed :]] = q[whole.primal :]
+            kept = half.elements.source[-half.elements.prescribed :]
             out[half.primal :] = plane.hinge_weight[kept] * at[kept]
         return out
+
+    def derivatives(self, system: BarsAndHingesSystem, q: Array, lam: float) -> BarHingeDerivatives:
+        """Derivatives of a system by its element data at unknowns q (size,).
+
+        Raises:
+            ModelError: bars measure Green's strain, of which there are none.
+        """
+        return BarHingeDerivatives(system, q, lam)
+
+    def remarks(self, model: Model) -> tuple[Remark, ...]:
+        """What to know of the mesh and the loads of a model; empty where there is nothing to say."""
+        return remarks.remarks(model)
 
     def observe(
         self,
@@ -88,9 +104,9 @@ class BarsAndHinges:
         by_hinge = 0.5 * e.hinge_stiffness * turn**2
         by_lock = lock_terms(phi, e.lock)[:, 0].sum()
         density = {
-            "stretching": to_triangles(model, stretch, np.arange(len(e.bars))),
-            "bending": to_triangles(model, by_hinge[bend], mesh.topology.hinge_edges[e.source[bend]]),
-            "folding": to_triangles(model, by_hinge[spring], mesh.topology.hinge_edges[e.source[spring]]),
+            "stretching": to_triangles(mesh, stretch, np.arange(len(e.bars))),
+            "bending": to_triangles(mesh, by_hinge[bend], mesh.topology.hinge_edges[e.source[bend]]),
+            "folding": to_triangles(mesh, by_hinge[spring], mesh.topology.hinge_edges[e.source[spring]]),
         }
         angles = np.empty(len(e.hinges))
         angles[e.source] = phi
@@ -107,18 +123,5 @@ class BarsAndHinges:
             ),
             dihedral_angles=angles, energy_density=density, reactions=reactions,
             crease_moments=moments, stable=stable,
-            pressing={} if system.touching is None else system.touching.pressing(x, lam),
+            contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
         )  # fmt: skip
-
-
-def to_triangles(model: Model, energy: Array, edges: Ints) -> Array:
-    """Energy of edges shared by area among their triangles, as a density (t,), N mm / mm^2."""
-    mesh = model.mesh
-    sides = mesh.topology.edge_triangles[edges]
-    areas = np.where(sides >= 0, mesh.areas[np.maximum(sides, 0)], 0.0)
-    share = energy / areas.sum(axis=1)
-    density = np.zeros(len(mesh.triangles))
-    for side in range(2):
-        inside = sides[:, side] >= 0
-        np.add.at(density, sides[inside, side], share[inside])
-    return density

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations.state import State
-from bh.loading.load_step import StepProgram
-from bh.mechanics.bars_and_hinges.derivatives import BarHingeDesign
+from bh.loading.load_step import LoadStep
 from bh.mechanics.bars_and_hinges.elements import sheet_elements
 from bh.mechanics.shared.assembly import (
     Pattern,
@@ -26,90 +25,115 @@ from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.model.model import Model
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
-from bh.solvers.system import Evaluation
+from bh.solvers.system import Evaluation, Tangent
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
 
 Array = NDArray[np.float64]
-COMPLIANCE = 1e-9  # of a held crease, in parts of 1 / gamma
+COMPLIANCE = 1e-9  # of a prescribed crease, in parts of 1 / gamma
 ROUNDING = 8.0 * np.finfo(float).eps
 
 
+class Linearised(NamedTuple):
+    """Elements linearised at a state, which predicts their forces beside it.
+
+    Attributes:
+        directions: (b, 3) derivatives of the elongations of bars by the positions of their second ends.
+        turns: (h, 12) derivatives of the dihedral angles by the positions of the four nodes, rad / mm.
+        stiffness: (h,) of hinges with their locks there, N mm / rad.
+    """
+
+    directions: Array
+    turns: Array
+    stiffness: Array
+
+
 class BarsAndHingesSystem(SupportedSheet):
-    """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then held moments (N mm).
+    """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then prescribed moments (N mm).
 
     With a `plane` it is that of the half of a symmetric sheet (`bh.mechanics.shared.mirrored`).
     """
 
     def __init__(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+        self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
     ) -> None:
+        """Elements, unknowns and supports of the step.
+
+        Args:
+            model: the whole sheet.
+            load_step: what is prescribed.
+            start: the state that the step begins at; None for the stress-free sheet.
+            plane: of the half, or None for the whole sheet.
+
+        Raises:
+            ModelError: an edge is clamped, which has no meaning without slopes, or supports leave nothing to move.
+        """
         mesh = model.mesh
-        if len(program.constraints.clamped):
+        if len(load_step.constraints.clamped):
             raise ModelError(
                 "bars and hinges have no slope at an edge to clamp; take formulation consistent, or hold the next row"
             )
         self.reference = mesh.points
         start_points = mesh.points if start is None else start.points
-        held_start = dihedral_angles(start_points, mesh.topology.hinges)
+        prescribed_start = dihedral_angles(start_points, mesh.topology.hinges)
         edges = mesh.points[mesh.topology.hinges[:, 1:3]]
-        moments = np.zeros(len(held_start)) if start is None else np.nan_to_num(start.crease_moments)
+        moments = np.zeros(len(prescribed_start)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-        self.elements = sheet_elements(model, program, held_start, moments)
+        self.elements = sheet_elements(model, load_step, prescribed_start, moments)
         if plane is not None:
-            from bh.mechanics.shared.mirrored import half_elements, half_program
+            from bh.mechanics.shared.mirrored import half_elements, half_load_step
 
             self.elements = half_elements(self.elements, plane)
-            program, moments = half_program(program, plane), plane.hinge_weight * moments
-        super().__init__(model, program, start, plane)
+            load_step, moments = half_load_step(load_step, plane), plane.hinge_weight * moments
+        super().__init__(model, load_step, start, plane)
         self.primal = self.moving
-        self.size = self.primal + self.elements.held
+        self.size = self.primal + self.elements.prescribed
         self._bar_scale = model.sheet.E * model.sheet.t
         self._moments_start = moments
-        self._d_bar = np.empty((len(self.elements.bars), 3))
-        self._g_hinge = np.empty((len(self.elements.hinges), 12))
-        self._k_hinge = np.empty(len(self.elements.hinges))  # with the locks, as of the last tangent
 
     # ------------------------------------------------------------------------------- unknowns and positions
 
     @cached_property
     def energy_scale(self) -> float:
+        """Stiffness of all hinges times one radian squared, N mm."""
         return 0.5 * float(self.elements.hinge_stiffness.sum())
 
     def start(self) -> Array:
         """Unknowns of the state that the step begins with."""
         q = np.zeros(self.size)
         q[: self.primal] = self.displacements.start()
-        if self.elements.held:
-            q[self.primal :] = self._moments_start[self.elements.source[-self.elements.held :]]
+        if self.elements.prescribed:
+            q[self.primal :] = self._moments_start[self.elements.source[-self.elements.prescribed :]]
         return q
 
     @cached_property
     def hinge_lengths(self) -> Array:
+        """(h,) stress-free lengths of the edges of the hinges, mm."""
         ends = self.reference[self.elements.hinges[:, 1:3]]
-        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     # ------------------------------------------------------------------------------- the System protocol
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
+        """Energy, residual (size,) and element forces at q (size,): forces of bars, N, then moments of hinges, N mm."""
         x = self.positions(q, lam)
         energy, size, f, forces, turn = self.internal_forces(x, q, lam)
         load = (1.0 - lam) * self.force.start + lam * self.force.end
         energy -= float(np.vdot(load, x - self.reference))
         f -= load
-        if self.touching is not None:
-            energy += self.touching.forces(x, lam, f)
+        if self.rigid_contact is not None:
+            energy += self.rigid_contact.forces(x, lam, f)
         residual = np.empty(self.size)
         residual[: self.primal] = self.displacements.components(f)
         gap = penalty = 0.0
-        if self.elements.held:
-            missed = turn[-self.elements.held :]
-            residual[self.primal :] = missed - self._compliance * q[self.primal :]
-            energy -= 0.5 * float(self._compliance @ q[self.primal :] ** 2)
+        if self.elements.prescribed:
+            missed = turn[-self.elements.prescribed :]
+            residual[self.primal :] = missed - self.compliance * q[self.primal :]
+            energy -= 0.5 * float(self.compliance @ q[self.primal :] ** 2)
             penalty = 0.5 * float(self.elements.penalty @ missed**2)
-            # a held angle is to be met to 1e-12 rad: what is left of it, times the stiffness of the bars, is a moment
+            # a prescribed angle is to be met to 1e-12 rad: what is left of it, times the bars' stiffness, is a moment
             gap = 1e4 * max(float(np.abs(residual[self.primal :]).max()) - ROUNDING, 0.0)
             # the compliance is no excuse for an angle that is not met
             gap = max(gap, 10.0 * float(np.abs(missed).max()))
@@ -151,25 +175,27 @@ class BarsAndHingesSystem(SupportedSheet):
         return energy, size, f, forces, turn
 
     def couple(self, q: Array, lam: float) -> Array:
-        """(h,) couples on the hinges, N mm: applied moments, and the multipliers of held creases."""
+        """(h,) couples on the hinges, N mm: applied moments, and the multipliers of prescribed creases."""
         couple = self.elements.couple.at(lam)
-        if self.elements.held:
-            couple[-self.elements.held :] = q[self.primal :]
+        if self.elements.prescribed:
+            couple[-self.elements.prescribed :] = q[self.primal :]
         return couple
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, pattern = self.elements, self._pattern
         bars = len(e.bars)
         x = self.positions(q, lam)
         data = np.zeros(pattern.size)
+        linear = Linearised(np.empty((bars, 3)), np.empty((len(e.hinges), 12)), np.empty(len(e.hinges)))
         tangent_values(
             x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0],
             e.hinges, self._augmented_stiffness, e.lock, forces[bars:], pattern.slots[1],
-            self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge, self._k_hinge,
+            self.constraints.frame_of, self.constraints.frames, data, *linear,
         )  # fmt: skip
         matrix: Matrix
-        if self.touching is not None:
-            self.touching.tangent(
+        if self.rigid_contact is not None:
+            self.rigid_contact.tangent(
                 x, lam, self.constraints.frame_of, self.constraints.frames, pattern.slots[-1], data
             )
         if self.constraints.rigid_body:
@@ -178,23 +204,25 @@ class BarsAndHingesSystem(SupportedSheet):
             matrix = FreeBodyMatrix(pattern.matrix(data), Z, *ground, self.displacements.weight)
         else:
             matrix = pattern.matrix(data)
-        if not e.held:
-            return matrix
-        return MultiplierMatrix(matrix, self._constraint_rows(), e.penalty, self._compliance)
+        if e.prescribed:
+            matrix = MultiplierMatrix(matrix, self._constraint_rows(linear.turns), e.penalty, self.compliance)
+        return Tangent(matrix, partial(self._predicted_forces, linear))
 
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
+    def _predicted_forces(self, linear: Linearised, forces: Array, dq: Array) -> Array:
+        """Element forces after an increment dq (size,) from where elements were linearised with `forces`."""
         e = self.elements
         bars = len(e.bars)
         out = np.empty_like(forces)
         predicted_forces(
-            e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, self._k_hinge, forces[bars:],
-            self._g_hinge, self.displacements.vectors(dq[: self.primal]), out[:bars], out[bars:],
+            e.bars, e.bar_stiffness, forces[:bars], linear.directions, e.hinges, linear.stiffness, forces[bars:],
+            linear.turns, self.displacements.vectors(dq[: self.primal]), out[:bars], out[bars:],
         )  # fmt: skip
-        if e.held:
-            out[-e.held :] = forces[-e.held :] + dq[self.primal :]
+        if e.prescribed:
+            out[-e.prescribed :] = forces[-e.prescribed :] + dq[self.primal :]
         return out
 
     def control_rate(self, q: Array, lam: float) -> Array:
+        """(size,) d residual / d lambda at fixed q: N for displacements, rad for multipliers."""
         e = self.elements
         x = self.positions(q, lam)
         _, _, _, forces, _ = self.internal_forces(x, q, lam)
@@ -204,48 +232,45 @@ class BarsAndHingesSystem(SupportedSheet):
         np.add.at(out, e.hinges, (moment_rate[:, None] * g).reshape(-1, 4, 3))
         moving = self.displacements.prescribed_motion
         if moving.any():
-            out += self._tangent_times(x, moving, forces)
-        if self.touching is not None:
-            self.touching.force_rates(x, moving, lam, 1.0, out)
+            out += self.tangent_times(x, moving, forces)
+        if self.rigid_contact is not None:
+            self.rigid_contact.force_rates(x, moving, lam, 1.0, out)
         rate = np.empty(self.size)
         rate[: self.primal] = self.displacements.components(out)
-        if e.held:
+        if e.prescribed:
             turn = np.einsum("hpc,hpc->h", g.reshape(-1, 4, 3), moving[e.hinges]) - e.rest.rate
-            rate[self.primal :] = turn[-e.held :]
+            rate[self.primal :] = turn[-e.prescribed :]
         return rate
 
     def power(self, q: Array, lam: float) -> float:
+        """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
         e = self.elements
         x = self.positions(q, lam)
         _, _, f, _, turn = self.internal_forces(x, q, lam)
         moment = e.hinge_stiffness * turn + self.couple(q, lam)  # without the lock, which knows no rest angle
         total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.reference))
-        if self.touching is not None:
-            total += self.touching.power(x, lam)
-            self.touching.forces(x, lam, f)
+        if self.rigid_contact is not None:
+            total += self.rigid_contact.power(x, lam)
+            self.rigid_contact.forces(x, lam, f)
         return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         e = self.elements
         x = self.positions(q, lam)
         total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
         moving = self.displacements.prescribed_motion
         if moving.any():
             _, _, _, forces, _ = self.internal_forces(x, q, lam)
-            out = self._tangent_times(x, moving, forces)
+            out = self.tangent_times(x, moving, forces)
             g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
             turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
             total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
             total += 2.0 * float((e.couple.rate - e.hinge_stiffness * e.rest.rate) @ turn)
-        return total if self.touching is None else total + self.touching.control_stiffness(x, lam)
+        return total if self.rigid_contact is None else total + self.rigid_contact.control_stiffness(x, lam)
 
-    def design(self, q: Array, lam: float) -> BarHingeDesign:
-        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
-        return BarHingeDesign(self, q, lam)
-
-    def _tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
+    def tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
         """Tangent of all elements times v (n, 3), in global axes and with no support left out."""
         e, bars = self.elements, len(self.elements.bars)
         out = np.zeros_like(x)
@@ -262,13 +287,13 @@ class BarsAndHingesSystem(SupportedSheet):
         groups: tuple[Ints, ...] = (self.elements.bars, self.elements.hinges)
         if self.constraints.rigid_body:
             groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
-        if self.touching is not None:
+        if self.rigid_contact is not None:
             groups += (self.mesh.triangles,)
         number, groups = self.displacements.pattern_nodes(groups)
         return build_pattern(number, groups, self.reference)
 
     @cached_property
-    def _compliance(self) -> Array:
+    def compliance(self) -> Array:
         """Compliance of held creases, rad / (N mm): far below rounding of the angles at ordinary moments.
 
         Where panels are rigid, a straight crease can carry moments that balance each other at no cost; it picks the
@@ -279,19 +304,20 @@ class BarsAndHingesSystem(SupportedSheet):
     @cached_property
     def _augmented_stiffness(self) -> Array:
         e = self.elements
-        return np.concatenate((e.hinge_stiffness[: len(e.hinges) - e.held], e.penalty))
+        return np.concatenate((e.hinge_stiffness[: len(e.hinges) - e.prescribed], e.penalty))
 
     @cached_property
     def _held_columns(self) -> Ints:
-        return self.displacements.number[self.elements.hinges[-self.elements.held :]].reshape(-1, 12)
+        return self.displacements.number[self.elements.hinges[-self.elements.prescribed :]].reshape(-1, 12)
 
-    def _constraint_rows(self) -> ConstraintRows:
-        g = self._g_hinge[-self.elements.held :]
+    def _constraint_rows(self, turns: Array) -> ConstraintRows:
+        """Gradients of the held angles, in local axes, from those of all hinges (h, 12)."""
+        g = turns[-self.elements.prescribed :]
         if len(self.displacements.turned):
-            index = self.constraints.frame_of[self.elements.hinges[-self.elements.held :]]
+            index = self.constraints.frame_of[self.elements.hinges[-self.elements.prescribed :]]
             axes = np.where((index >= 0)[..., None, None], self.constraints.frames[index], np.eye(3))
             g = np.einsum("hpij,hpj->hpi", axes, g.reshape(-1, 4, 3)).reshape(-1, 12)
-        return ConstraintRows(g.copy(), self._held_columns, self.primal)
+        return ConstraintRows(g, self._held_columns, self.primal)
 
     def _ground(self, Z: Array, data: Array) -> tuple[Ints, Array]:
         """Add a stiffness against the rigid motions of one triangle; returns its unknowns and its matrix."""

@@ -1,4 +1,4 @@
-"""How the consistent formulation depends on the design: the counterpart of `bar_hinge_design`.
+"""How the consistent formulation depends on the design: the counterpart of `bars_and_hinges.derivatives`.
 
 Triangles have gamma_k = (l_k^2 - L_k^2) / 2 and the energy 1/2 gamma.K.gamma, patches angles theta (phi - rest less the
 rotations) and 1/2 theta.B.theta, spring creases 1/2 k turn^2. With velocities v of the nodes and w of the rotations,
@@ -8,6 +8,8 @@ rotations) and 1/2 theta.B.theta, spring creases 1/2 k turn^2. With velocities v
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,13 +26,23 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Data = dict[str, Array]
+CLAMPED = "sensitivities to geometry do not know clamped edges; hold their nodes, or keep the geometry"
 
 
-class ConsistentDesign:
+class ConsistentDerivatives:
     """Derivatives of one system at one state. `other` are the unknowns after the displacements: rotations, rad."""
 
+    unfollowed: Mapping[str, str] = MappingProxyType({"ghost": CLAMPED})
+
     def __init__(self, system: ConsistentSystem, q: Array, lam: float) -> None:
-        self.system, self.q, self.lam = system, q, lam
+        """Linearise elements at a state.
+
+        Args:
+            system: of the step.
+            q: (size,) unknowns.
+            lam: control parameter.
+        """
+        self.system, self.moving, self.q, self.lam = system, system.moving, q, lam
         e = system.elements
         self.alpha = q[system.moving :]
         self.x = system.positions(q, lam)
@@ -46,8 +58,8 @@ class ConsistentDesign:
     def data(self) -> Data:
         """What the residual is made of. `places` (n, 3) are positions along supports, the rest element data.
 
-        `held` (m,) are imposed angles: of the residual they are part of `rest`, but states show them. `ghost` is where
-        the sheet would go on beyond clamped edges.
+        `prescribed` (m,) are imposed angles: of the residual they are part of `rest`, but states show them. `ghost` is
+        where the sheet would go on beyond clamped edges.
         """
         e, lam = self.system.elements, self.lam
         return {
@@ -60,7 +72,7 @@ class ConsistentDesign:
             "spring_stiffness": e.spring_stiffness,
             "spring_rest": e.spring_rest.at(lam),
             "couple": e.couple.at(lam),
-            "held": np.nan_to_num(e.held.at(lam)),
+            "prescribed": np.nan_to_num(e.prescribed.at(lam)),
             "lock": e.lock,
             "load": self.system.force.at(lam),
         }
@@ -88,24 +100,24 @@ class ConsistentDesign:
     def angle_gradient(self, hinges: Ints, weights: Array) -> tuple[Array, Array, Data]:
         """Gradient of the weighted sum of `State.dihedral_angles` of some hinges of the mesh; and to the data."""
         e = self.system.elements
-        free = np.isnan(e.held.end[hinges])
-        held = np.zeros(len(e.held.end))
-        held[hinges[~free]] = weights[~free]
+        free = np.isnan(e.prescribed.end[hinges])
+        prescribed = np.zeros(len(e.prescribed.end))
+        prescribed[hinges[~free]] = weights[~free]
         quads = self.system.hinges[hinges[free]]
         f, r = np.zeros_like(self.x), np.zeros(e.rotations)
         g = dihedral_gradients(self.x, quads).reshape(-1, 4, 3)
         np.add.at(f, quads, weights[free][:, None, None] * g)
-        row = np.full(len(held), -1)
+        row = np.full(len(prescribed), -1)
         row[e.springs] = np.arange(len(e.springs))
         of_spring = row[hinges] >= 0
         for side in range(2):
             np.add.at(r, e.turns[row[hinges[of_spring]], side], -weights[of_spring])
-        return f, r, {"held": held}
+        return f, r, {"prescribed": prescribed}
 
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the rotations, along v (n, 3) and w."""
         system, e, x = self.system, self.system.elements, self.x
-        rates, _ = system._force_rates(x, v, w, closing=bool(self.L.any()), controlled=False)
+        rates, _ = system.force_rates(x, v, w, closing=bool(self.L.any()), controlled=False)
         dN, dM, dS, _ = system.split(rates)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         kernels.stretching_force_rates(x, v, e.triangles, self.N, dN, f)
@@ -136,10 +148,10 @@ class ConsistentDesign:
     def imposed(self, by_data: Data) -> Array:
         """(m,) derivatives to the imposed angles of hinges of the mesh, of derivatives to the data; zero elsewhere."""
         e = self.system.elements
-        out = np.array(by_data.get("held", np.zeros(len(e.held.end))))
+        out = np.array(by_data.get("prescribed", np.zeros(len(e.prescribed.end))))
         here = self.turning & (e.patches.hinge >= 0)
         np.add.at(out, e.patches.hinge[here], by_data["rest"][here])
-        return np.where(np.isnan(e.held.end), 0.0, out)
+        return np.where(np.isnan(e.prescribed.end), 0.0, out)
 
     # ------------------------------------------------------------------------------- derivatives to data
 

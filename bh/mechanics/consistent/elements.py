@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.patches import (
@@ -21,9 +21,9 @@ from bh.mechanics.consistent.patches import (
 )
 from bh.mechanics.shared.hinge_lock import ZONE, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.model.actuations import Ramp
-from bh.model.laws import HELD, SHEET, SPRING
+from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
+from bh.model.ramp import Ramp
 from bh.solvers.matrices import reverse_cuthill_mckee
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -50,8 +50,8 @@ class ConsistentElements:
         nodes: (c, p) nodes of the matrix of a patch, then -1; `width` (c,) its number of rows, rotations included.
         springs: (h,) rows of `mesh.topology.hinges`; `hinges` (h, 4) their nodes, `turns` (h, 2) their rotations.
         spring_stiffness: (h,) N mm / rad; spring_rest, couple: (h,) rest angles (rad) and applied couples (N mm).
-        held: (m,) held dihedral angles at every hinge, rad; nan where it is not held.
-        lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at held ones.
+        prescribed: (m,) prescribed dihedral angles at every hinge, rad; nan where it is not prescribed.
+        lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at prescribed ones.
         rotations: how many there are.
     """
 
@@ -75,15 +75,19 @@ class ConsistentElements:
     spring_stiffness: Array
     spring_rest: Ramp
     couple: Ramp
-    held: Ramp
+    prescribed: Ramp
     lock: Array
     rotations: int
 
 
 def consistent_elements(
-    model: Model, program: StepProgram, held_start: Array, moment_start: Array, plane: Mirror | None = None
+    model: Model,
+    load_step: LoadStep,
+    prescribed_start: Array,
+    moment_start: Array,
+    plane: Mirror | None = None,
 ) -> ConsistentElements:
-    """Element arrays of a model in one step; `held_start` and `moment_start` (m,) are what its creases begin with.
+    """Element arrays of a model in one step; `prescribed_start` and `moment_start` (m,) are what creases begin with.
 
     Dihedral angles (rad) and total moments (N mm) of all hinges. With a `plane` they are those of the half of a
     symmetric sheet (`bh.mechanics.shared.mirrored`).
@@ -93,18 +97,18 @@ def consistent_elements(
     """
     if model.stiffness is not None:
         raise ModelError("given bar and hinge stiffness is of bars-and-hinges only; use that formulation")
-    mesh, sheet, law = model.mesh, model.sheet, program.law
-    _check_moments(mesh, program)
+    mesh, sheet, law = model.mesh, model.sheet, load_step.law
+    _check_moments(mesh, load_step)
     topology = mesh.topology
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
     B = bending_matrices(edges, areas, sheet.bending_stiffness(), sheet.nu)
     clamped = np.zeros(len(topology.edges), dtype=bool)
-    clamped[topology.find_edges(program.constraints.clamped)] = True
+    clamped[topology.find_edges(load_step.constraints.clamped)] = True
     spring = law == SPRING
     part = None if plane is None else plane.triangle_weight
     joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part)
     if plane is not None:
-        from bh.mechanics.consistent.half import half_consistent, half_patches
+        from bh.mechanics.consistent.half import half_patches
 
         joined = half_patches(joined, spring, plane)
     rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
@@ -118,33 +122,34 @@ def consistent_elements(
     nodes = np.pad(nodes, ((0, 0), (0, -(-int(width.max()) // 3) - nodes.shape[1])), constant_values=-1)
 
     reference = dihedral_angles(mesh.points, topology.hinges)
-    held = program.held_angles(held_start)
+    prescribed = load_step.prescribed_angles(prescribed_start)
     rest = [
-        np.append(np.where(law == HELD, at, reference), np.pi)[joined.hinge] for at in (held.start, held.end)
+        np.append(np.where(law == PRESCRIBED, at, reference), np.pi)[joined.hinge]
+        for at in (prescribed.start, prescribed.end)
     ]
     springs = np.flatnonzero(spring)
     ends = mesh.points[topology.hinges[:, 1:3]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    k_fold = folding_hinge_stiffness(program.stiffness, length)[springs]
-    couple = Ramp((program.moment.start * length)[springs], (program.moment.end * length)[springs])
+    k_fold = folding_hinge_stiffness(load_step.stiffness, length)[springs]
+    couple = Ramp((load_step.moment.start * length)[springs], (load_step.moment.end * length)[springs])
     # a released crease goes on with its moment, of which the couple carries its part
     carried = moment_start[springs] - couple.start
-    begin = held_start[springs] - carried / np.where(k_fold == 0.0, np.inf, k_fold)
-    begin = np.where(np.isnan(program.rest.start[springs]), begin, program.rest.start[springs])
+    begin = prescribed_start[springs] - carried / np.where(k_fold == 0.0, np.inf, k_fold)
+    begin = np.where(np.isnan(load_step.rest.start[springs]), begin, load_step.rest.start[springs])
     whole = ConsistentElements(
         members=np.arange(len(mesh.triangles)), triangles=mesh.triangles, rest_square=(edges**2).sum(axis=2),
         K=stretching_matrices(edges, areas, sheet.E, sheet.t, sheet.nu), B_triangle=B, patches=joined,
         quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
         width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
-        spring_stiffness=k_fold, spring_rest=Ramp(begin, program.rest.end[springs]),
+        spring_stiffness=k_fold, spring_rest=Ramp(begin, load_step.rest.end[springs]),
         couple=couple,
-        held=Ramp(*(np.where(law == HELD, at, np.nan) for at in (held.start, held.end))),
-        lock=lock_stiffness(model, program), rotations=rotations,
+        prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
+        lock=lock_stiffness(model, load_step), rotations=rotations,
     )  # fmt: skip
-    return whole if plane is None else half_consistent(whole, plane)
+    return whole if plane is None else _half(whole, plane)
 
 
-def lock_stiffness(model: Model, program: StepProgram) -> Array:
+def lock_stiffness(model: Model, load_step: LoadStep) -> Array:
     """(m,) stiffness of the locks, N mm / rad: the spring's own or that of uncreased sheet (Eq. 3.11), the larger one.
 
     Held creases follow their angle and have none, nor have hinges that are made closed.
@@ -156,14 +161,16 @@ def lock_stiffness(model: Model, program: StepProgram) -> Array:
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     areas = mesh.areas[topology.edge_triangles[topology.hinge_edges]].sum(axis=1)
     sheet = bending_hinge_stiffness(model.sheet.E, model.sheet.t, length, areas)
-    spring = np.where(program.law == SPRING, folding_hinge_stiffness(program.stiffness, length), 0.0)
-    without = (program.law == HELD) | (until_closed(dihedral_angles(mesh.points, topology.hinges)) < ZONE)
+    spring = np.where(load_step.law == SPRING, folding_hinge_stiffness(load_step.stiffness, length), 0.0)
+    without = (load_step.law == PRESCRIBED) | (
+        until_closed(dihedral_angles(mesh.points, topology.hinges)) < ZONE
+    )
     return np.where(without, 0.0, np.maximum(spring, sheet))
 
 
-def _check_moments(mesh: SheetMesh, program: StepProgram) -> None:
+def _check_moments(mesh: SheetMesh, load_step: LoadStep) -> None:
     """Opposite couples on the two sides of an uncreased sheet do no work: its sides turn together."""
-    idle = (program.law == SHEET) & ((program.moment.start != 0.0) | (program.moment.end != 0.0))
+    idle = (load_step.law == SHEET) & ((load_step.moment.start != 0.0) | (load_step.moment.end != 0.0))
     if idle.any():
         edge = mesh.topology.hinges[int(np.argmax(idle)), 1:3].tolist()
         raise ModelError(
@@ -239,3 +246,21 @@ def _rows(joined: Patches, quad: Ints) -> tuple[Ints, Ints]:
     nodes = nodes[:, : max(int((nodes < past).sum(axis=1).max()), 1)]
     place = (used[:, :, None] == nodes[:, None, :]).argmax(axis=2)
     return np.where(nodes < past, nodes, -1), place.reshape(quad.shape)
+
+
+def _half(e: ConsistentElements, plane: Mirror) -> ConsistentElements:
+    """Triangles, springs and locks of the half; patches and rotations are those of the half already."""
+    weight = plane.triangle_weight
+    triangle = weight > 0.0
+    by = plane.hinge_weight[e.springs]
+    spring = by > 0.0
+    by = by[spring]
+    return replace(
+        e, members=e.members[triangle], triangles=np.ascontiguousarray(e.triangles[triangle]),
+        rest_square=e.rest_square[triangle], K=(weight[:, None, None] * e.K)[triangle],
+        B_triangle=(weight[:, None, None] * e.B_triangle)[triangle], springs=e.springs[spring],
+        hinges=np.ascontiguousarray(e.hinges[spring]), turns=e.turns[spring],
+        spring_stiffness=by * e.spring_stiffness[spring],
+        spring_rest=Ramp(e.spring_rest.start[spring], e.spring_rest.end[spring]),
+        couple=Ramp(by * e.couple.start[spring], by * e.couple.end[spring]), lock=plane.hinge_weight * e.lock,
+    )  # fmt: skip

@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.formulations.remarks import Remark
 from bh.formulations.state import Energy, State
-from bh.loading.load_step import StepProgram
-from bh.mechanics.bars_and_hinges.formulation import to_triangles
+from bh.loading.load_step import LoadStep
+from bh.mechanics.consistent import remarks
+from bh.mechanics.consistent.derivatives import ConsistentDerivatives
 from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.system import ConsistentSystem
+from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.model.model import Model
 from bh.model.refinement import Refinement
@@ -34,15 +37,13 @@ class Consistent:
     takes_nu = True
     refinement = Refinement("staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9)
 
-    def system(self, model: Model, program: StepProgram, start: State | None) -> ConsistentSystem:
+    def system(self, model: Model, load_step: LoadStep, start: State | None) -> ConsistentSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
-        return ConsistentSystem(model, program, start)
+        return ConsistentSystem(model, load_step, start)
 
-    def half(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror
-    ) -> ConsistentSystem:
+    def half(self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror) -> ConsistentSystem:
         """The system of the kept half of a symmetric sheet; `start` is a state of the whole."""
-        return ConsistentSystem(model, program, start, plane)
+        return ConsistentSystem(model, load_step, start, plane)
 
     def whole(
         self, whole: ConsistentSystem, half: ConsistentSystem, plane: Mirror, q: Array, lam: float
@@ -55,6 +56,14 @@ class Consistent:
     ) -> Array:
         """Unknowns of the half from those of the whole sheet."""
         return _unknowns(half, whole.positions(q, lam), lam)
+
+    def derivatives(self, system: ConsistentSystem, q: Array, lam: float) -> ConsistentDerivatives:
+        """Derivatives of a system by its element data at unknowns q (size,)."""
+        return ConsistentDerivatives(system, q, lam)
+
+    def remarks(self, model: Model) -> tuple[Remark, ...]:
+        """What to know of the mesh and the loads of a model; empty where there is nothing to say."""
+        return remarks.remarks(model)
 
     def observe(
         self,
@@ -79,8 +88,8 @@ class Consistent:
         folding = 0.5 * e.spring_stiffness * now.turns**2
 
         angles = dihedral_angles(x, topology.hinges)
-        held = ~np.isnan(e.held.end)
-        angles[held] = e.held.at(lam)[held]
+        prescribed = ~np.isnan(e.prescribed.end)
+        angles[prescribed] = e.prescribed.at(lam)[prescribed]
         angles[e.springs] = e.spring_rest.at(lam) + now.turns
         moments = np.full(len(angles), np.nan)
         ends = mesh.points[topology.hinges[:, 1:3]]
@@ -89,7 +98,7 @@ class Consistent:
         turning = (e.patches.kind == TURN) & (e.patches.hinge >= 0)
         by_hinge = np.zeros(len(angles))
         by_hinge[e.patches.hinge[turning]] = M[turning]
-        moments[held] = (by_hinge / lengths)[held]
+        moments[prescribed] = (by_hinge / lengths)[prescribed]
         return State(
             mesh=mesh, step=step, lam=lam, points=x,
             energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock),
@@ -97,11 +106,11 @@ class Consistent:
             energy_density={
                 "stretching": stretching / mesh.areas,
                 "bending": bending / mesh.areas,
-                "folding": to_triangles(model, folding, topology.hinge_edges[e.springs]),
+                "folding": to_triangles(mesh, folding, topology.hinge_edges[e.springs]),
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable,
-            pressing={} if system.touching is None else system.touching.pressing(x, lam),
+            contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
         )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Half of a mirror-symmetric sheet of the consistent formulation: its patches, and its element arrays.
+"""The patches of one half of a mirror-symmetric sheet of the consistent formulation.
 
 - A triangle that is its own image counts half, and its angles at two edges that are images of each other are one.
 - An edge in the plane turns by as much on either side: theta = (phi - phi_rest) / 2, and has no rotation. A spring
@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,6 @@ from numpy.typing import NDArray
 from bh.loading.symmetry import Mirror
 from bh.mechanics.consistent.kernels import NONE, TURN
 from bh.mechanics.consistent.patches import Patches
-from bh.model.actuations import Ramp
-
-if TYPE_CHECKING:
-    from bh.mechanics.consistent.elements import ConsistentElements
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -55,22 +50,4 @@ def half_patches(joined: Patches, spring: Bools, plane: Mirror) -> Patches:
     return replace(
         joined, members=joined.members[keep], kind=kind, hinge=np.where(twice, -1, hinge),
         half_edge=np.where(twice, -1, half_edge), inner=inner & ~twice, B=B, shares=joined.shares[keep],
-    )  # fmt: skip
-
-
-def half_consistent(e: ConsistentElements, plane: Mirror) -> ConsistentElements:
-    """Triangles, springs and locks of the half; patches and rotations are those of the half already."""
-    weight = plane.triangle_weight
-    triangle = weight > 0.0
-    by = plane.hinge_weight[e.springs]
-    spring = by > 0.0
-    by = by[spring]
-    return replace(
-        e, members=e.members[triangle], triangles=np.ascontiguousarray(e.triangles[triangle]),
-        rest_square=e.rest_square[triangle], K=(weight[:, None, None] * e.K)[triangle],
-        B_triangle=(weight[:, None, None] * e.B_triangle)[triangle], springs=e.springs[spring],
-        hinges=np.ascontiguousarray(e.hinges[spring]), turns=e.turns[spring],
-        spring_stiffness=by * e.spring_stiffness[spring],
-        spring_rest=Ramp(e.spring_rest.start[spring], e.spring_rest.end[spring]),
-        couple=Ramp(by * e.couple.start[spring], by * e.couple.end[spring]), lock=plane.hinge_weight * e.lock,
     )  # fmt: skip

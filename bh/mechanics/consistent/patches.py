@@ -53,7 +53,7 @@ def bending_matrices(edges: Array, areas: Array, D: float, nu: float) -> Array:
         "tki,tli->tkl", tangent, tangent
     )  # of the normals too, which are turned by a right angle
     weight = lengths[:, :, None] * lengths[:, None, :] * (D / areas)[:, None, None]
-    return weight * ((1.0 - nu) * cosine**2 + nu)
+    return np.asarray(weight * ((1.0 - nu) * cosine**2 + nu))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +93,7 @@ def patches(
     """Patches of a mesh.
 
     Args:
+        mesh: the stress-free sheet.
         B: (t, 3, 3) bending matrices of the triangles.
         spring: (m,) hinges that are spring creases: they have two rotations and lie in no patch.
         clamped: (e,) edges that keep their slope.

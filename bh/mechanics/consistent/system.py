@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from bh.formulations.state import State
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.mechanics.consistent import kernels, setup
-from bh.mechanics.consistent.derivatives import ConsistentDesign
 from bh.mechanics.consistent.elements import consistent_elements, lock_stiffness
 from bh.mechanics.consistent.sparsity import rotation_pattern
 from bh.mechanics.shared import penetration as closings
@@ -22,7 +21,7 @@ from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.mechanics.shared.sparsity import Pattern
 from bh.model.model import Model
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
-from bh.solvers.system import Evaluation
+from bh.solvers.system import Evaluation, Tangent
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
@@ -30,6 +29,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ROUNDING = 8.0 * np.finfo(float).eps
+
+
+class Solver(Protocol):
+    """A factorised matrix."""
+
+    def solve(self, b: Array) -> Array:
+        """Solution x of A x = b, both (n,)."""
+        ...
 
 
 class ElementForces(NamedTuple):
@@ -66,13 +73,24 @@ class ConsistentSystem(SupportedSheet):
     """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then edge rotations (rad)."""
 
     def __init__(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+        self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
     ) -> None:
-        of_half = program
-        if plane is not None:
-            from bh.mechanics.shared.mirrored import half_program
+        """Elements, unknowns and supports of the step.
 
-            of_half = half_program(program, plane)
+        Args:
+            model: the whole sheet.
+            load_step: what is prescribed.
+            start: the state that the step begins at; None for the stress-free sheet.
+            plane: of the half, or None for the whole sheet.
+
+        Raises:
+            ModelError: supports leave nothing to move, or a load that the formulation does not take.
+        """
+        of_half = load_step
+        if plane is not None:
+            from bh.mechanics.shared.mirrored import half_load_step
+
+            of_half = half_load_step(load_step, plane)
         super().__init__(model, of_half, start, plane)
         mesh = self.mesh
         self.hinges = hinges = mesh.topology.hinges
@@ -82,25 +100,24 @@ class ConsistentSystem(SupportedSheet):
         moments = np.zeros(len(hinges)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         # a released crease begins with the moment that it has; what its lock takes of it is not the spring's
-        moments -= lock_terms(dihedral_angles(start_points, hinges), lock_stiffness(model, program))[:, 1]
+        moments -= lock_terms(dihedral_angles(start_points, hinges), lock_stiffness(model, load_step))[:, 1]
         # a crease that was ordinary sheet up to here is smooth, whatever its triangles do
         angles = (
             reference
             if start is None
             else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
         )
-        self.elements = consistent_elements(model, program, angles, moments, plane)
+        self.elements = consistent_elements(model, load_step, angles, moments, plane)
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
-        self._tangent_at = mesh.points
-        self._closing = False
         self._frame_of = np.append(self.constraints.frame_of, -1)
 
     # ------------------------------------------------------------------------------- unknowns and positions
 
     @cached_property
     def energy_scale(self) -> float:
+        """Bending stiffness of all triangles and stiffness of all springs, times one radian squared, N mm."""
         e = self.elements
         return 0.5 * float(np.trace(e.B_triangle, axis1=1, axis2=2).sum() + e.spring_stiffness.sum())
 
@@ -117,8 +134,9 @@ class ConsistentSystem(SupportedSheet):
         return np.asarray(-self._rotation_factor.solve(r)) if np.abs(r).max(initial=0.0) > 0.0 else r
 
     @cached_property
-    def _rotation_factor(self) -> Any:
-        return sp.linalg.splu(self.rotation_stiffness())
+    def _rotation_factor(self) -> Solver:
+        factor: Solver = sp.linalg.splu(self.rotation_stiffness())
+        return factor
 
     def rotation_stiffness(self) -> sp.csc_matrix:
         """Hessian of the energy in the rotations alone, which does not depend on anything."""
@@ -176,10 +194,11 @@ class ConsistentSystem(SupportedSheet):
         return out
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
+        """Energy, residual (size,) and element forces (`split`) at q (size,)."""
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
-        touched = 0.0 if self.touching is None else self.touching.forces(x, lam, now.f)
+        touched = 0.0 if self.rigid_contact is None else self.rigid_contact.forces(x, lam, now.f)
         energy = (
             float(now.stretching.sum())
             + now.bending
@@ -222,7 +241,8 @@ class ConsistentSystem(SupportedSheet):
         spring = (e.spring_stiffness / height.min()).max(initial=0.0)
         return float(stretch), float(max(bend, spring))
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, joined, pattern = self.elements, self.elements.patches, self._pattern
         x = self.positions(q, lam)
         N, M, S, L = self.split(forces)
@@ -236,14 +256,18 @@ class ConsistentSystem(SupportedSheet):
         closing |= kernels.spring_tangent(
             x, e.hinges, e.spring_stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
         )
-        if self.touching is not None:
-            self.touching.tangent(x, lam, *axes, pattern.slots[0], data)
+        if self.rigid_contact is not None:
+            self.rigid_contact.tangent(x, lam, *axes, pattern.slots[0], data)
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
-        self._closing = bool(closing)
-        self._tangent_at = x
-        if not self.constraints.rigid_body:
-            return pattern.matrix(data)
+        matrix: Matrix = pattern.matrix(data)
+        if self.constraints.rigid_body:
+            matrix = self._free_body(x, data)
+        return Tangent(matrix, partial(self._predicted_forces, x, bool(closing)))
+
+    def _free_body(self, x: Array, data: Array) -> FreeBodyMatrix:
+        """The matrix of `data` where rigid motions are left free at positions x; grounds one triangle in `data`."""
+        pattern = self._pattern
         rigid = self.displacements.rigid(x)
         Z = np.vstack((rigid, np.zeros((self.size - self.moving, rigid.shape[1]))))
         block = self.displacements.grounding(rigid, self._scale)
@@ -265,12 +289,12 @@ class ConsistentSystem(SupportedSheet):
         ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
         return rotation_pattern(self.mesh, self.elements, self.displacements, ground)
 
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
-        v = self.vectors(dq)
-        rates, _ = self._force_rates(self._tangent_at, v, dq[self.moving :], self._closing, controlled=False)
+    def _predicted_forces(self, x: Array, closing: bool, forces: Array, dq: Array) -> Array:
+        """Element forces after an increment dq (size,) from positions x with `forces`, linear in dq."""
+        rates, _ = self.force_rates(x, self.vectors(dq), dq[self.moving :], closing, controlled=False)
         return forces + rates
 
-    def _force_rates(
+    def force_rates(
         self, x: Array, v: Array, w: Array, closing: bool, controlled: bool
     ) -> tuple[Array, Array]:
         """Rates of the element forces and of the springs' turns for velocities v (n, 3) and w (rotations,) at x.
@@ -312,7 +336,7 @@ class ConsistentSystem(SupportedSheet):
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         v = self.displacements.prescribed_motion
-        rates, turns = self._force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
+        rates, turns = self.force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
         kernels.stretching_force_rates(x, v, e.triangles, N, dN, f)
@@ -320,8 +344,8 @@ class ConsistentSystem(SupportedSheet):
         kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
         if L.any():
             closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
-        if self.touching is not None:
-            self.touching.force_rates(x, v, lam, 1.0, f)
+        if self.rigid_contact is not None:
+            self.rigid_contact.force_rates(x, v, lam, 1.0, f)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         return f, r, second
 
@@ -332,27 +356,29 @@ class ConsistentSystem(SupportedSheet):
         return float(np.vdot(M[turning], e.rest.rate[turning])) + float(S @ e.spring_rest.rate)
 
     def control_rate(self, q: Array, lam: float) -> Array:
+        """(size,) d residual / d lambda at fixed q: N for displacements, N mm / rad for rotations."""
         f, r, _ = self._gradient_rates(q, lam)
         return np.concatenate((self.displacements.components(f - self.force.rate), r))
 
     def power(self, q: Array, lam: float) -> float:
+        """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         _, M, S, _ = self.split(now.forces)
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
         total -= float(np.vdot(self.force.rate, x - self.mesh.points))
-        if self.touching is not None:
-            total += self.touching.power(x, lam)
-            self.touching.forces(x, lam, now.f)
+        if self.rigid_contact is not None:
+            total += self.rigid_contact.power(x, lam)
+            self.rigid_contact.forces(x, lam, now.f)
         unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         v = self.displacements.prescribed_motion
-        more = 0.0 if self.touching is None else self.touching.control_stiffness(self.positions(q, lam), lam)
+        more = (
+            0.0
+            if self.rigid_contact is None
+            else self.rigid_contact.control_stiffness(self.positions(q, lam), lam)
+        )
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more
-
-    def design(self, q: Array, lam: float) -> ConsistentDesign:
-        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
-        return ConsistentDesign(self, q, lam)

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @njit(inline="always", **OPTIONS)
 def elongation(length, rest_length, green):  # type: ignore[no-untyped-def]
-    """l - L (Eq. 3.1), or with Green's strain (l^2 - L^2) / (2 L); both in mm, alike to first order."""
+    """Elongation l - L (Eq. 3.1), or with Green's strain (l^2 - L^2) / (2 L); both in mm, alike to first order."""
     if green:
         return 0.5 * (length * length - rest_length * rest_length) / rest_length
     return length - rest_length
@@ -108,6 +108,7 @@ def rotate(H, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def add_lower(H, n, slots, data):  # type: ignore[no-untyped-def]
+    """Add the lower triangle of an element matrix H (n, n) to the values `data`; see `Pattern.slots`."""
     at = 0
     for i in range(n):
         for j in range(i + 1):
@@ -121,7 +122,7 @@ def add_lower(H, n, slots, data):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def _bar_matrix(x, a, b, rest_length, k, s, green, H):  # type: ignore[no-untyped-def]
-    """k g g^T + s Hessian of one bar into the lower triangle of H (6, 6); returns the gradient g of its elongation.
+    """Write k g g^T + s Hessian of one bar into the lower half of H (6, 6); returns the gradient g of its elongation.
 
     With d the unit vector along the bar: g = d and Hessian (1 - d d^T) / l; with Green's strain g = d l / L and 1 / L.
     """
@@ -216,6 +217,7 @@ def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge,
 
 @njit(**OPTIONS)
 def add_product(H, nodes, v, out):  # type: ignore[no-untyped-def]
+    """Add a symmetric element matrix, whose lower triangle is in H, times v (n, 3) to out (n, 3)."""
     n = 3 * len(nodes)
     for p in range(n):
         value = 0.0
@@ -226,7 +228,7 @@ def add_product(H, nodes, v, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def predicted_forces(bars, k_bar, s_bar, d_bar, hinges, k_tangent, s_hinge, g_hinge, u, out_bar, out_hinge):  # type: ignore[no-untyped-def]
-    """Element forces that the last tangent predicts for the displacement increment u (n, 3).
+    """Element forces that a tangent predicts for the displacement increment u (n, 3).
 
     `d_bar`, `g_hinge` and `k_tangent` are what `tangent_values` wrote.
     """

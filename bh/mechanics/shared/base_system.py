@@ -8,16 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.formulations.state import State
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep, crease_hinges
 from bh.mechanics.shared import penetration as closing
-from bh.mechanics.shared.contact import Touching
+from bh.mechanics.shared.contact import RigidContact
 from bh.mechanics.shared.displacements import Displacements
-from bh.mechanics.shared.kinematics import dihedral_angles
-from bh.mechanics.shared.motions import describe_motion
-from bh.model.laws import HELD
+from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
+from bh.model.laws import PRESCRIBED
 from bh.model.model import Model
-from bh.model.supports import TURNED
+from bh.model.supports import MOTIONS, TURNED, rigid_motions
+from bh.solvers.outcome import Outcome
 from bh.solvers.system import System, grows_ahead
+from meshes import SheetMesh
 
 if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
@@ -34,27 +35,41 @@ class SupportedSheet:
     size: int
 
     def __init__(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+        self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
     ) -> None:
+        """Unknowns, loads and bodies that press of the step.
+
+        Args:
+            model: the whole sheet.
+            load_step: what is prescribed.
+            start: the state that the step begins at; None for the stress-free sheet.
+            plane: of the half, or None for the whole sheet.
+
+        Raises:
+            ModelError: supports leave nothing to move, or forces push a free sheet.
+        """
         self.mesh = model.mesh
-        self.program = program
-        self.force = program.force
+        self.load_step = load_step
+        self.force = load_step.force
         start_points = self.mesh.points if start is None else start.points
         if plane is None:
-            self.displacements = Displacements(self.mesh, program.constraints, start_points)
+            self.displacements = Displacements(self.mesh, load_step.constraints, start_points)
         else:
             from bh.mechanics.shared.mirrored import MirroredDisplacements
 
-            self.displacements = MirroredDisplacements(self.mesh, program.constraints, start_points, plane)
+            self.displacements = MirroredDisplacements(self.mesh, load_step.constraints, start_points, plane)
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
         if self.constraints.rigid_body:
             self.displacements.check_balance(self.force)
-        self.touching = Touching(self.mesh, program.bodies, start_points) if program.bodies else None
+        self.rigid_contact = (
+            RigidContact(self.mesh, load_step.bodies, start_points) if load_step.bodies else None
+        )
 
     @property
     def rotation(self) -> float:
-        return self.program.rotation
+        """Largest change of an imposed or rest angle in the step, rad."""
+        return self.load_step.rotation
 
     def positions(self, q: Array, lam: float) -> Array:
         """(n, 3) node positions, mm."""
@@ -75,30 +90,61 @@ class SupportedSheet:
         return dihedral_angles(self.positions(q, lam), self.mesh.topology.hinges)
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Why an increment between two states is not to be trusted, or an empty string."""
         return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Which panels passed through each other between two states, or an empty string."""
         return closing.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def contact(self, q: Array, lam: float) -> str:
-        """Which panels have met at a hinge that is not held, or an empty string."""
+        """Which panels have met at a hinge that is not prescribed, or an empty string."""
         reference = dihedral_angles(self.mesh.points, self.mesh.topology.hinges)
-        return closing.touching(self.mesh, self.angles(q, lam), reference, self.program.law != HELD)
+        return closing.panels_in_contact(
+            self.mesh, self.angles(q, lam), reference, self.load_step.law != PRESCRIBED
+        )
 
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
+    def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        """Outcome and reason where panels have met or loads turn a free sheet; None where nothing is in the way."""
         touching = self.contact(q, lam)
         if touching:
-            return "contact", touching
+            return Outcome.CONTACT, touching
         loaded = self.force.start.any() or self.force.end.any()
         turned = (
             self.constraints.rigid_body
             and loaded
             and grows_ahead(cast(System, self), q, lam, self._unbalanced)
         )
-        return ("mechanism", TURNED) if turned else ("", "")
+        return (Outcome.MECHANISM, TURNED) if turned else None
 
     def _unbalanced(self, q: Array, lam: float) -> float:
         return self.displacements.unbalanced(self.positions(q, lam), self.force.at(lam))
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
+        """A motion (size,) of the unknowns in words."""
         return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))
+
+
+def describe_motion(mesh: SheetMesh, x: Array, motion: Array) -> str:
+    """What moves in `motion` (n, 3) at positions x (n, 3): the whole sheet, a crease, or a few nodes.
+
+    A clause such as "crease 'a' turns" to be followed by how.
+    """
+    size = float(np.linalg.norm(motion))
+    if size == 0.0:
+        return "nothing moves"
+    rigid = rigid_motions(x)
+    rigid /= np.linalg.norm(rigid, axis=0)
+    share, *_ = np.linalg.lstsq(rigid, motion.ravel() / size, rcond=None)
+    if float(np.linalg.norm(rigid @ share)) > 0.99:
+        named = " and ".join(MOTIONS[k] for k in np.flatnonzero(np.abs(share) > 0.3 * np.abs(share).max()))
+        return f"the whole sheet moves ({named})"
+    hinges = mesh.topology.hinges
+    turn = np.einsum("hk,hk->h", dihedral_gradients(x, hinges), motion[hinges].reshape(-1, 12))
+    total = float(turn @ turn)
+    for crease in mesh.creases:
+        if float((turn[crease_hinges(mesh, crease)] ** 2).sum()) > 0.5 * total:
+            return f"crease '{crease}' turns"
+    node = int(np.argmax(np.linalg.norm(motion, axis=1)))
+    at = ", ".join(f"{c:.4g}" for c in x[node])
+    return f"node {node} at ({at}) moves with its neighbours"

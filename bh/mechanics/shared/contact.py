@@ -1,14 +1,14 @@
-"""Rigid bars that a sheet touches without friction, and soft springs to where its nodes were. Compiled.
+"""Rigid indenters that a sheet touches without friction, and soft springs to where its nodes were. Compiled.
 
-A bar is a rounded rectangle along an axis. With g the distance of a point of the sheet from its surface (mm, negative
-inside), d its `gap` and k its stiffness (N/mm for every mm of edge of the mesh), the potential a length is
+An indenter is a rounded rectangle along an axis. With g the distance of a point of the sheet from its surface (mm,
+negative inside), d its `gap` and k its stiffness (N/mm for every mm of edge of the mesh), the potential a length is
 
     k (d - g)^3 / (6 d)               for 0 < g < d
     k (d^2 / 6 - d g / 2 + g^2 / 2)   for g <= 0
 
 and nothing beyond: a smooth barrier with two continuous derivatives, whose force grows to k d / 2 where the surfaces
-meet. Only pressing is possible. Points are spread evenly over all edges of the mesh, so that the edge of a bar may lie
-anywhere between nodes.
+meet. Only pressing is possible. Points are spread evenly over all edges of the mesh, so that the edge of an indenter
+may lie anywhere between nodes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from bh.mechanics.shared.assembly import add_lower, rotate
 from bh.mechanics.shared.kinematics import OPTIONS
 from bh.mechanics.shared.sparsity import Slots
-from bh.model.actuations import Bar, Tether
+from bh.model.actuations import Indenter, Tether
+from bh.model.step import Body
 from bh.model.supports import select
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -31,12 +32,19 @@ Array = NDArray[np.float64]
 POINTS = 4  # on every edge
 
 
-class Touching:
-    """The bars and tethers of one step on a mesh; positions x are (n, 3), mm."""
+class RigidContact:
+    """The indenters and tethers of one step on a mesh; positions x are (n, 3), mm."""
 
-    def __init__(self, mesh: SheetMesh, items: tuple[Bar | Tether, ...], start: Array) -> None:
+    def __init__(self, mesh: SheetMesh, items: tuple[Body, ...], start: Array) -> None:
+        """Points of the sheet that can touch, and the springs of tethers.
+
+        Args:
+            mesh: the stress-free sheet.
+            items: indenters and tethers of the step.
+            start: (n, 3) positions that tethers hold to, mm.
+        """
         self.triangles = mesh.triangles
-        self.bars = tuple(item for item in items if isinstance(item, Bar))
+        self.indenters = tuple(item for item in items if isinstance(item, Indenter))
         topology = mesh.topology
         lengths = np.linalg.norm(np.diff(mesh.points[topology.edges], axis=1)[:, 0], axis=1)
         owner = topology.edge_triangles[:, 0]
@@ -58,11 +66,11 @@ class Touching:
         for corner in range(3):
             self.home[mesh.triangles[:, corner], 0] = np.arange(len(mesh.triangles))
             self.home[mesh.triangles[:, corner], 1] = corner
-        self._shape = np.array([[b.half[0], b.half[1], b.radius, b.stiffness, b.gap] for b in self.bars])
+        self._shape = np.array([[b.half[0], b.half[1], b.radius, b.stiffness, b.gap] for b in self.indenters])
         self._shape = self._shape.reshape(-1, 5)
-        self._axes = np.array([(b.across, b.up) for b in self.bars]).reshape(-1, 2, 3)
-        self._from = np.array([b.at for b in self.bars], dtype=float).reshape(-1, 3)
-        self.velocity: Array = np.array([b.by for b in self.bars], dtype=float).reshape(-1, 3)
+        self._axes = np.array([(b.across, b.up) for b in self.indenters]).reshape(-1, 2, 3)
+        self._from = np.array([b.at for b in self.indenters], dtype=float).reshape(-1, 3)
+        self.velocity: Array = np.array([b.by for b in self.indenters], dtype=float).reshape(-1, 3)
 
     def _centres(self, lam: float) -> Array:
         return self._from + lam * self.velocity
@@ -71,21 +79,21 @@ class Touching:
         """Adds the gradient to f (n, 3), N, and returns the energy, N mm."""
         moved = x - self.anchor
         f += self.spring * moved
-        total = np.zeros((len(self.bars), 3))
+        total = np.zeros((len(self.indenters), 3))
         energy = _forces(
             x, self.triangles, self.owner, self.weights, self.share, self._centres(lam), self._axes,
             self._shape, f, total,
         )  # fmt: skip
         return float(energy + 0.5 * np.vdot(self.spring, moved**2))
 
-    def pressing(self, x: Array, lam: float) -> dict[str, Array]:
-        """(3,) force of every bar on the sheet, N."""
-        total = np.zeros((len(self.bars), 3))
+    def contact_forces(self, x: Array, lam: float) -> dict[str, Array]:
+        """(3,) force of every indenter on the sheet, N."""
+        total = np.zeros((len(self.indenters), 3))
         _forces(
             x, self.triangles, self.owner, self.weights, self.share, self._centres(lam), self._axes,
             self._shape, np.zeros_like(x), total,
         )  # fmt: skip
-        return {bar.name: -force for bar, force in zip(self.bars, total, strict=True)}
+        return {indenter.name: -force for indenter, force in zip(self.indenters, total, strict=True)}
 
     def tangent(self, x: Array, lam: float, frame_of: Ints, frames: Array, slots: Slots, data: Array) -> None:
         """Adds the Hessian; `slots` are those of the triangles."""
@@ -95,7 +103,7 @@ class Touching:
         )  # fmt: skip
 
     def force_rates(self, x: Array, v: Array, lam: float, moving: float, out: Array) -> None:
-        """Adds the rate of the gradient for velocities v (n, 3) and bars that move at `moving` times their speed."""
+        """Adds the rate of the gradient for velocities v (n, 3), indenters moving at `moving` times their speed."""
         out += self.spring * v
         _force_rates(
             x, v, self.triangles, self.owner, self.weights, self.share, self._centres(lam),
@@ -103,20 +111,23 @@ class Touching:
         )  # fmt: skip
 
     def power(self, x: Array, lam: float) -> float:
-        """d energy / d lambda at fixed x, N mm: work of the moving bars on the sheet."""
+        """Rate of energy with lambda at fixed x, N mm: work of the moving indenters on the sheet."""
         return float(
-            sum(force @ bar.by for force, bar in zip(self.pressing(x, lam).values(), self.bars, strict=True))
+            sum(
+                force @ indenter.by
+                for force, indenter in zip(self.contact_forces(x, lam).values(), self.indenters, strict=True)
+            )
         )
 
     def control_stiffness(self, x: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed x, N mm."""
+        """Second derivative of the energy by lambda at fixed x, N mm."""
         ahead = 1e-6
         return (self.power(x, lam + ahead) - self.power(x, lam - ahead)) / (2.0 * ahead)
 
 
 @njit(inline="always", **OPTIONS)
 def _measure(p, centre, axes, shape, n, H):  # type: ignore[no-untyped-def]
-    """Distance g of a point from the surface of a bar, its gradient n (3,) and Hessian H (3, 3)."""
+    """Distance g of a point from the surface of an indenter, its gradient n (3,) and Hessian H (3, 3)."""
     s = z = 0.0
     for c in range(3):
         s += (p[c] - centre[c]) * axes[0, c]

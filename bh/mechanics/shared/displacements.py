@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.model.actuations import Ramp
+from bh.model.ramp import Ramp
 from bh.model.supports import UNBALANCED, Constraints, free_motions, rigid_motions
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -31,6 +31,16 @@ class Displacements:
     weight: Array | None = None  # (k,) how many nodes an unknown stands for, if not one each
 
     def __init__(self, mesh: SheetMesh, constraints: Constraints, start_points: Array) -> None:
+        """Number the unknowns.
+
+        Args:
+            mesh: the stress-free sheet.
+            constraints: of the step; a start that is not given is that of `start_points`.
+            start_points: (n, 3) positions that the step begins with, mm.
+
+        Raises:
+            ModelError: supports hold every node.
+        """
         self.mesh = mesh
         self.reference = mesh.points
         self.turned = np.flatnonzero(constraints.frame_of >= 0)
@@ -82,6 +92,7 @@ class Displacements:
         return self.to_global(np.where(self.constraints.fixed, local, 0.0))
 
     def to_global(self, local: Array) -> Array:
+        """(n, 3) vectors in global axes, from their components along the axes of the supports."""
         if len(self.turned) == 0:
             return local
         out = local.copy()
@@ -89,6 +100,7 @@ class Displacements:
         return out
 
     def to_local(self, vectors: Array) -> Array:
+        """(n, 3) components along the axes of the supports, from vectors in global axes."""
         if len(self.turned) == 0:
             return vectors
         out = vectors.copy()
@@ -115,7 +127,7 @@ class Displacements:
     @cached_property
     def ground_numbers(self) -> Ints:
         """(9,) unknowns of that triangle, -1 where prescribed."""
-        return self.number[self.mesh.triangles[self.ground_triangle]].ravel()
+        return np.asarray(self.number[self.mesh.triangles[self.ground_triangle]].ravel())
 
     def grounding(self, Z: Array, stiffness: float) -> Array:
         """(9, 9) stiffness (N/mm) of that triangle against the rigid motions Z and nothing else."""

@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.mechanics.shared.kinematics import OPTIONS
+from bh.mechanics.shared.kinematics import OPTIONS, compiled
 
 Array = NDArray[np.float64]
 ZONE = math.radians(2.0)  # rad next to 0 and 2 pi
@@ -55,7 +55,7 @@ def lock(phi, k):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(**OPTIONS)
+@compiled
 def lock_terms(phi: Array, k: Array) -> Array:
     """(h, 3) energy, moment and stiffness of the locks of hinges at dihedral angles phi (h,), zero off the zone."""
     out = np.zeros((len(phi), 3))

@@ -27,6 +27,8 @@ Grinspun (2013) and Liu and Paulino (2017), in a form that needs no case for the
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -34,6 +36,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def compiled(function: F) -> F:
+    """A kernel that Python calls, compiled when it is first used; it keeps its signature for type checkers."""
+    return cast(F, njit(**OPTIONS)(function))
 
 
 @njit(inline="never", **OPTIONS)
@@ -101,7 +109,7 @@ def add_hinge_hessian(geometry, factor, H):  # type: ignore[no-untyped-def]
                     H[6 + i, 6 + k] -= (s * s * hh + ll) * S - s * hl * (me + em)
 
 
-@njit(**OPTIONS)
+@compiled
 def dihedral_angles(x: Array, hinges: NDArray[np.int64]) -> Array:
     """(m,) dihedral angles in [0, 2 pi], rad, of (m, 4) hinges at node positions x (n, 3).
 
@@ -114,7 +122,7 @@ def dihedral_angles(x: Array, hinges: NDArray[np.int64]) -> Array:
     return phi
 
 
-@njit(**OPTIONS)
+@compiled
 def dihedral_gradients(x: Array, hinges: NDArray[np.int64]) -> Array:
     """(m, 12) gradients of the dihedral angles with respect to (wing, edge, edge, wing), rad / mm."""
     g = np.empty((len(hinges), 12))
@@ -123,7 +131,7 @@ def dihedral_gradients(x: Array, hinges: NDArray[np.int64]) -> Array:
     return g
 
 
-@njit(**OPTIONS)
+@compiled
 def dihedral_hessians(x: Array, hinges: NDArray[np.int64]) -> Array:
     """(m, 12, 12) symmetric Hessians of the dihedral angles, rad / mm^2."""
     H = np.zeros((len(hinges), 12, 12))
@@ -136,7 +144,7 @@ def dihedral_hessians(x: Array, hinges: NDArray[np.int64]) -> Array:
     return H
 
 
-@njit(**OPTIONS)
+@compiled
 def bar_lengths(x: Array, bars: NDArray[np.int64]) -> Array:
     """(b,) lengths of (b, 2) bars, mm."""
     length = np.empty(len(bars))

@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.loading.load_step import StepProgram
+from bh.loading.load_step import LoadStep
 from bh.loading.symmetry import Mirror
 from bh.mechanics.bars_and_hinges.elements import Elements
 from bh.mechanics.shared.displacements import Displacements
-from bh.model.actuations import Ramp
+from bh.model.ramp import Ramp
 from bh.model.supports import Constraints
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -29,6 +29,14 @@ class MirroredDisplacements(Displacements):
     """Displacements of a sheet whose images move alike: the unknowns are those of the kept half."""
 
     def __init__(self, mesh: SheetMesh, constraints: Constraints, start_points: Array, plane: Mirror) -> None:
+        """Number the unknowns of the kept half.
+
+        Args:
+            mesh: the whole sheet.
+            constraints: of the whole sheet.
+            start_points: (n, 3) positions of the whole sheet that the step begins with, mm.
+            plane: the mirror.
+        """
         super().__init__(mesh, _reflected(constraints, plane), start_points)
         self.plane = plane
         kept = (plane.side <= 0)[:, None] & ~self.constraints.fixed
@@ -57,18 +65,21 @@ class MirroredDisplacements(Displacements):
         )
 
     def positions(self, u: Array, lam: float) -> Array:
+        """(n, 3) positions of all nodes, images too, mm, for unknowns u (k,)."""
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
         local.ravel()[self.free] = u
         local.ravel()[self._images] = u[self._of]
         return np.asarray(self.reference + self.to_global(local))
 
     def vectors(self, u: Array) -> Array:
+        """(n, 3) changes of positions for changes u (k,) of the unknowns, in the axes of each side."""
         local = np.zeros_like(self.reference)
         local.ravel()[self.free] = u
         local.ravel()[self._images] = u[self._of]
         return self.to_global(local)
 
     def components(self, vectors: Array) -> Array:
+        """(k,) sums of the components of nodal vectors (n, 3) over images, along the unknowns."""
         local = self.to_local(vectors).ravel()
         images = np.bincount(self._of, weights=local[self._images], minlength=len(self.free))
         return np.asarray(local[self.free] + images)
@@ -126,10 +137,10 @@ def _reflected(c: Constraints, plane: Mirror) -> Constraints:
     )
 
 
-def half_program(program: StepProgram, plane: Mirror) -> StepProgram:
+def half_load_step(load_step: LoadStep, plane: Mirror) -> LoadStep:
     """The step with the forces on the half."""
     weight = np.where(plane.side < 0, 1.0, np.where(plane.side == 0, 0.5, 0.0))[:, None]
-    return replace(program, force=Ramp(weight * program.force.start, weight * program.force.end))
+    return replace(load_step, force=Ramp(weight * load_step.force.start, weight * load_step.force.end))
 
 
 def half_elements(e: Elements, plane: Mirror) -> Elements:
@@ -138,7 +149,7 @@ def half_elements(e: Elements, plane: Mirror) -> Elements:
     weight = plane.hinge_weight[e.source]
     keep = weight > 0.0
     w = weight[keep]
-    held = keep[len(e.source) - e.held :]
+    prescribed = keep[len(e.source) - e.prescribed :]
 
     def some(ramp: Ramp, factor: Array | float = 1.0) -> Ramp:
         return Ramp(factor * ramp.start[keep], factor * ramp.end[keep])
@@ -148,6 +159,6 @@ def half_elements(e: Elements, plane: Mirror) -> Elements:
         bar_stiffness=(plane.edge_weight * e.bar_stiffness)[bars], hinges=np.ascontiguousarray(e.hinges[keep]),
         source=e.source[keep], hinge_stiffness=w * e.hinge_stiffness[keep], lock=w * e.lock[keep],
         rest=some(e.rest), couple=some(e.couple, w), bending=int(keep[: e.bending].sum()),
-        spring=int(keep[e.bending : e.bending + e.spring].sum()), held=int(held.sum()),
-        penalty=(weight[len(e.source) - e.held :] * e.penalty)[held],
+        spring=int(keep[e.bending : e.bending + e.spring].sum()), prescribed=int(prescribed.sum()),
+        penalty=(weight[len(e.source) - e.prescribed :] * e.penalty)[prescribed],
     )  # fmt: skip

@@ -103,7 +103,7 @@ def objection(mesh: SheetMesh, before: Array, after: Array) -> str:
     return crossing(mesh, before, after) or far
 
 
-def touching(mesh: SheetMesh, angles: Array, reference: Array, asked: NDArray[np.bool_]) -> str:
+def panels_in_contact(mesh: SheetMesh, angles: Array, reference: Array, asked: NDArray[np.bool_]) -> str:
     """Which panels have met at a hinge (within the zone of closed), or an empty string.
 
     Only `asked` (m,) hinges count, and of them those that are not made closed (`reference` angles).

@@ -34,6 +34,7 @@ def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None =
 
     Args:
         number: (nodes, 3) numbers of the unknowns, -1 if prescribed.
+        groups: nodes (elements, k) of every group of elements of one kind.
         places: (nodes, d) positions, which help to find a good order of a wide sheet.
     """
     sizes = (number >= 0).sum(axis=1)

@@ -21,6 +21,7 @@ from bh.analysis.isometric import (
     of_mesh,
     relax,
 )
+from bh.solvers.outcome import Outcome
 from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
 from verification.theory import cone
@@ -235,7 +236,7 @@ def _uniform(result: CaseResult, formulation: str, cells: tuple[int, int]) -> fl
     result.checks.append(
         Check(CASE, "isometric sheet as first guess: energy of the state found", params, guess.state.energy.total,
               "N mm", path[-1].energy.total, "folded from flat", 1e-8, path.unknowns, guess.iterations, spent,
-              "reached" if guess.converged else "stalled")
+              Outcome.REACHED if guess.converged else Outcome.STALLED)
     )  # fmt: skip
     result.checks.append(
         Check(CASE, "iterations from the isometric sheet over those from flat", params,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.observables import ShellState
+from fem.state import ShellState
 from meshes.structured import Kind
 from verification.framework.alignment import aligned, hausdorff
 from verification.framework.checks import CaseResult, Check, Context, line, plot

@@ -10,6 +10,7 @@ import numpy as np
 
 import meshes
 from bh import Model
+from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Check, Context, line, plot
 from verification.framework.richardson import limit
 from verification.studies.app_b import appendix_b
@@ -182,10 +183,10 @@ def _converged(
     A mesh that was not solved spoils the limit: the outcome says so and there is no value.
     """
     finest = solved[-1]
-    outcome = next((s.outcome for s in solved if not s.reached), "reached")
+    outcome = next((s.outcome for s in solved if not s.reached), Outcome.REACHED)
 
     def known(values: list[float]) -> dict[str, Any]:
-        if outcome != "reached":
+        if outcome != Outcome.REACHED:
             return dict(params, formulation="shell")
         found = limit(values)
         return dict(params, formulation="shell", rate=found.rate, error_bar=found.bar, finest=values[-1])

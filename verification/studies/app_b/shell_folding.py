@@ -12,11 +12,12 @@ import numpy as np
 import meshes
 from bh import Model, Sheet, State, trace
 from bh.formulations.registry import formulation as registered
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Point, extrapolate, point
 from bh.solvers.newton import Newton
+from bh.solvers.outcome import Outcome
 from bh.solvers.system import System
 from bh.solvers.trace import Walk, walk
 from meshes.structured import Kind
@@ -50,11 +51,11 @@ class Solved:
     unknowns: int
     iterations: int
     wall_time_s: float
-    outcome: str
+    outcome: Outcome
 
     @property
     def reached(self) -> bool:
-        return self.outcome == "reached"
+        return self.outcome == Outcome.REACHED
 
 
 def sheet_model(
@@ -136,28 +137,28 @@ def load(model: Model, most: float) -> Solved:
 def _load(model: Model, most: float) -> Solved:
     began = time.perf_counter()
     solver = registered(model.formulation)
-    system = solver.system(model, program(model)[0], None)
+    system = solver.system(model, load_steps(model)[0], None)
 
     def mean_fold(at: Point) -> float:
         return float(solver.observe(model, system, at.q, at.lam).fold_angle("crease").mean())
 
     points = [point(system, system.start(), 0.0)]
-    iterations, outcome = 0, "reached"
+    iterations, outcome = 0, Outcome.REACHED
     for increment in walk(Walk(system, LoadControl(), (points[0],))):
         iterations += increment.iterations
         outcome = increment.outcome
-        if outcome == "reached":
+        if outcome == Outcome.REACHED:
             points.append(increment.point)
-        if outcome != "reached" or mean_fold(points[-1]) > ANGLE:
+        if outcome != Outcome.REACHED or mean_fold(points[-1]) > ANGLE:
             break
-    if outcome == "reached" and mean_fold(points[-1]) <= ANGLE:
-        outcome = "stalled"  # the load is not enough
+    if outcome == Outcome.REACHED and mean_fold(points[-1]) <= ANGLE:
+        outcome = Outcome.STALLED  # the load is not enough
     here = points[-1]
-    if outcome == "reached":
+    if outcome == Outcome.REACHED:
         here, more = meet(system, points, mean_fold)
         iterations += more
         if abs(mean_fold(here) - ANGLE) > 1e-6:
-            outcome = "stalled"
+            outcome = Outcome.STALLED
     state = solver.observe(model, system, here.q, here.lam)
     spent = time.perf_counter() - began
     return Solved(state, here.lam * most, system.size, iterations, spent, outcome)

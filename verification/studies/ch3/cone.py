@@ -139,7 +139,7 @@ def _record(result: CaseResult, path: Path, angle: float, alpha: float, kind: st
             **cost,
         )
     )
-    return ratio if path.outcome == "reached" else float("nan")
+    return ratio if path.reached else float("nan")
 
 
 def _notes(result: CaseResult) -> None:

@@ -79,7 +79,7 @@ def curve(formulation: str, increments: int, along: int) -> Curve:
         )
     )
     first = trace(fan.folded, strategy=fine)
-    path = trace(pinched(fan, first[-1], SHARE), strategy=fine) if first.outcome == "reached" else first
+    path = trace(pinched(fan, first[-1], SHARE), strategy=fine) if first.reached else first
     began = time.perf_counter()
     found = np.array([stiffness_of(fan, path, index) for index in range(len(path))])
     spent = time.perf_counter() - began

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh import Path, Sheet, State, trace
+from bh.solvers.outcome import Outcome
 from meshes.structured import Kind
 from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
 from verification.studies.ch3 import cone
@@ -94,7 +95,7 @@ def fold(angle: float, mesh: Mesh) -> Folded:
     """Fold a sector to a right angle."""
     path = trace(cone.cone_model(angle, mesh.alpha, mesh.kind, mesh.rows, mesh.formulation, SHEET))
     state = path[-1]
-    ratio = state.energy.total / cone.energy(angle, SHEET) if path.outcome == "reached" else math.nan
+    ratio = state.energy.total / cone.energy(angle, SHEET) if path.reached else math.nan
     return Folded(path, ratio, density_along(state, angle) if mesh.cell <= 0.5 * BIN else None)
 
 
@@ -134,7 +135,7 @@ def _add(
     source: str, tolerance: float | None = None, path: Path | None = None,
 ) -> None:  # fmt: skip
     cost = {} if path is None else cost_of(path)
-    outcome = "reached" if path is None else path.outcome
+    outcome = Outcome.REACHED if path is None else path.outcome
     result.checks.append(
         Check("fig3_6", quantity, params, value, unit, reference, source, tolerance, outcome=outcome, **cost)
     )

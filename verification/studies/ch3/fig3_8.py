@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Model, Path, Sheet, trace
+from bh.solvers.outcome import Outcome
 from meshes.pattern import CreasePattern
 from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
 from verification.studies.solver.hard_cases.two_creases import rectangle
@@ -155,7 +156,7 @@ def _add(
     tolerance: float | None, path: Path | None = None, **params: Any,
 ) -> None:  # fmt: skip
     cost = {} if path is None else cost_of(path)
-    outcome = "reached" if path is None else path.outcome
+    outcome = Outcome.REACHED if path is None else path.outcome
     result.checks.append(
         Check("fig3_8", quantity, {"sheet": study.name, **params}, float(value), unit, reference, source, tolerance,
               outcome=outcome, **cost)

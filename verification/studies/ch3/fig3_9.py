@@ -62,7 +62,7 @@ def folded(formulation: str, along: int, rows: int, degrees: float, angle: float
     while True:
         path = trace(model.fold("crease", rest=rest, Lstar=LSTAR))
         missed = float(path[-1].dihedral("crease").mean()) - goal
-        if abs(missed) <= 1e-3 * goal or path.outcome != "reached":
+        if abs(missed) <= 1e-3 * goal or not path.reached:
             return path
         rest -= missed
 

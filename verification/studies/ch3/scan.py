@@ -255,7 +255,7 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
     paper = folded(sample.pattern, "consistent", PAPER_LSTAR, size)
     same = folded(sample.pattern, "bars-and-hinges", PAPER_LSTAR, size)
     for path, formulation in ((paper, "consistent"), (same, "bars-and-hinges")):
-        _add(result, "pattern folds with default settings", float(path.outcome == "reached"), "", 1.0,
+        _add(result, "pattern folds with default settings", float(path.reached), "", 1.0,
              "the last rest angle is reached", 0.0, pattern=name, formulation=formulation, size_mm=size)  # fmt: skip
     _same_mesh(result, name, paper[-1], same[-1], size)
     cloud = sampled(paper[-1], 0.2 * DENSITY if context.quick else DENSITY, 1)
@@ -265,7 +265,7 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
         paths = [(folded(sample.pattern, "bars-and-hinges", Lstar, length), Lstar) for Lstar in Lstars]
         tried = []
         for path, Lstar in paths:
-            if path.outcome != "reached":
+            if not path.reached:
                 continue
             try:
                 tried.append((_against(cloud, paper[-1], path[-1]), Lstar))

@@ -11,7 +11,7 @@ import numpy as np
 import meshes
 from bh import Model, Sheet
 from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.solvers.linear import linear_response
 from meshes.structured import Kind
 from verification.framework.checks import CaseResult, Check, Context, line, plot
@@ -88,7 +88,7 @@ def ratio(alpha: float, kind: Kind, load: str) -> Ratio:
     """U_BH / U_Th of one strip at small displacement (one linear solve)."""
     model, expected = loaded(strip_model(alpha, kind), load)
     began = time.perf_counter()
-    system = formulation(model.formulation).system(model, program(model)[0], None)
+    system = formulation(model.formulation).system(model, load_steps(model)[0], None)
     energy = linear_response(system, system.start()).energy
     value = energy / expected
     if expected < 0.0:  # under dead loads the stiffer model stores less

@@ -62,7 +62,7 @@ def against_shell(result: CaseResult, quick: bool) -> None:
             "rows": rows,
         }
         judged = (formulation, along, rows) == finest
-        outcome = judge.path.outcome if judge.path.outcome != "reached" else found.path.outcome
+        outcome = judge.path.outcome if not judge.path.reached else found.path.outcome
         for name, value, exact, unit in (
             ("depth, folded by rest angles of 1 rad", found.depth, judge.depth, "mm"),
             ("energy, folded by rest angles of 1 rad", found.energy, judge.energy, "N mm"),

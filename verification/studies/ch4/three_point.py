@@ -14,6 +14,7 @@ from bh.applications.corrugation import (
     three_point,
     top_down,
 )
+from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Check, Context, line, plot
 from verification.studies.ch4.corrugation_shell import against_shell
 from verification.studies.ch4.corrugations import AZIMUTHS, EDGE, ORDER, POINT, RATIOS, folded, in_order
@@ -84,7 +85,7 @@ def _test(result: CaseResult, sheet: Folded, name: str, support: str, params: di
     where = {**params, "supports": support, "about": name}
     cost: dict[str, Any] = {
         "unknowns": test.path.unknowns, "iterations": test.path.iterations, "wall_time_s": wall,
-        "outcome": "reached" if test.converged else test.outcome,
+        "outcome": Outcome.REACHED if test.converged else test.outcome,
     }  # fmt: skip
     published = PUBLISHED.get((params["kind"], name))
     result.checks.append(

@@ -71,7 +71,7 @@ class Pinched:
 
     @property
     def reached(self) -> bool:
-        return self.path.outcome == "reached"
+        return self.path.reached
 
     @cached_property
     def folded(self) -> State:

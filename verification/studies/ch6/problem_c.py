@@ -18,6 +18,7 @@ from bh.applications.inverse.problems import ReachPoint
 from bh.applications.inverse.reach import Reach
 from bh.applications.inverse.simulate import SETTING, simulate
 from bh.applications.inverse.surrogate import shipped
+from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Check, Context, line, plot
 
 X = Y = tuple(float(v) for v in range(-100, 101, 20))
@@ -112,7 +113,7 @@ def _claims(result: CaseResult, data: Any, seconds: float, quick: bool) -> None:
             )
         )
 
-    reached = data["outcome"].values == "reached"
+    reached = data["outcome"].values == Outcome.REACHED
     mirror = data["y"].values > 0.0
     points = int(reached.sum() + (reached & mirror).sum())
     whole = int(len(reached) + mirror.sum())

@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from bh.solvers.matrices import SparseMatrix
-from bh.solvers.system import Evaluation
+from bh.solvers.outcome import Outcome
+from bh.solvers.system import Evaluation, Tangent
 
 Array = NDArray[np.float64]
 
@@ -24,8 +25,8 @@ class Silent:
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         return ""
 
-    def obstacle(self, q: Array, lam: float) -> tuple[str, str]:
-        return "", ""
+    def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        return None
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         return "the toy moves"
@@ -84,17 +85,14 @@ class VonMisesTruss(Silent):
             residual = np.array([pull - self.spring * stretch, self.spring * stretch - self.force * lam])
         return Evaluation(energy, residual, float(np.abs(residual).max()) / self.force, np.zeros(0))
 
-    def tangent(self, q: Array, lam: float, forces: Array) -> SparseMatrix:
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
         height = self.rise - float(q[0])
         length, rest = math.hypot(height, self.span), math.hypot(self.rise, self.span)
         along = (height / length) ** 2
         k = 2.0 * self.stiffness * (along + (1.0 - rest / length) * (1.0 - along))
         c = self.spring
         K = np.array([[k]]) if c is None else np.array([[k + c, -c], [-c, c]])
-        return SparseMatrix.of(sp.csc_array(K))
-
-    def predicted_forces(self, forces: Array, dq: Array) -> Array:
-        return forces
+        return Tangent(SparseMatrix.of(sp.csc_array(K)))
 
     def control_rate(self, q: Array, lam: float) -> Array:
         rate = np.zeros(self.size)

@@ -21,6 +21,7 @@ import numpy as np
 
 import meshes
 from bh import Automatic, LoadControl, Model, Path, Sheet, trace
+from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Check, Context, line, plot
 from verification.framework.environment import environment
 
@@ -120,9 +121,9 @@ def play(scene: Scene, compare: bool = True) -> Result:
     path = trace(model)
     spent = time.perf_counter() - began
     excess = math.nan
-    if path.outcome == "reached" and compare:
+    if path.reached and compare:
         fine = trace(model, strategy=Automatic(load=FINE))
-        if fine.outcome == "reached":
+        if fine.reached:
             excess = _excess(path, fine)
     return Result(
         scene, path.outcome, path.reason, excess, path.iterations, path.unknowns, spent, path.stable
@@ -130,7 +131,7 @@ def play(scene: Scene, compare: bool = True) -> Result:
 
 
 def _excess(path: Path, fine: Path) -> float:
-    scale = max(fine[-1].energy.total, 1e-15 * path._system(0).energy_scale)
+    scale = max(fine[-1].energy.total, 1e-15 * path.system(0).energy_scale)
     return (path[-1].energy.total - fine[-1].energy.total) / scale
 
 
@@ -204,7 +205,7 @@ def judged(found: Sequence[Result]) -> CaseResult:
         question="Does every scene reach its target with default settings, on the branch that fine steps find?",
         source=SOURCE,
     )
-    reached = [r for r in found if r.outcome == "reached"]
+    reached = [r for r in found if r.outcome == Outcome.REACHED]
     higher = [r for r in reached if r.excess > 0.02]
     unknown = [r for r in reached if math.isnan(r.excess)]
     params = {"scenes": len(found), "seed": SEED}
@@ -236,7 +237,7 @@ def judged(found: Sequence[Result]) -> CaseResult:
         )
     groups = {
         "reached": reached,
-        "not reached": [r for r in found if r.outcome != "reached"],
+        "not reached": [r for r in found if r.outcome != Outcome.REACHED],
     }
     series = [
         line(name, [r.unknowns for r in group], [r.wall_time_s for r in group], "points")
@@ -247,7 +248,7 @@ def judged(found: Sequence[Result]) -> CaseResult:
              "Every scene from flat to its target, default settings, one thread each, all cores busy.", log="xy")
     )  # fmt: skip
     for r in found:
-        if r.outcome != "reached":
+        if r.outcome != Outcome.REACHED:
             result.notes.append(f"Not reached: {r.scene}: {r.outcome}, {r.reason}.")
         elif r.excess > 0.02:
             result.notes.append(f"Higher branch by {100 * r.excess:.1f} %: {r.scene}.")

@@ -14,7 +14,9 @@ import numpy as np
 import meshes
 from bh import Goal, Model, Sheet, trace
 from bh.model.refinement import mesh_at
-from bh.solving.accuracy import Accuracy, reading
+from bh.paths.estimate import Accuracy
+from bh.solvers.outcome import Outcome
+from bh.solving.accuracy import reading
 from meshes.pattern import FoldKind
 from verification.framework.checks import CaseResult, Check, Context, line, plot
 
@@ -91,7 +93,7 @@ def judge(item: Draw, levels: tuple[float, ...] = JUDGES) -> tuple[np.ndarray, f
     for level in levels:
         model = replace(item.model, mesh=mesh_at(pattern, "mirrored", level), formulation="shell")
         path = trace(model)
-        if path.outcome != "reached":
+        if not path.reached:
             return np.array([math.nan]), math.nan
         values.append(reading(path, item.goal))
     size = float(np.linalg.norm(values[-1]))
@@ -111,7 +113,7 @@ class Found:
     @property
     def honest(self) -> bool:
         """The error that was made is at most `ALLOWED` times the one that was told; an early end tells of none."""
-        return self.outcome != "reached" or self.error <= ALLOWED * self.accuracy.estimate
+        return self.outcome != Outcome.REACHED or self.error <= ALLOWED * self.accuracy.estimate
 
 
 def examine(seed: int, number: int) -> Found:
@@ -119,7 +121,7 @@ def examine(seed: int, number: int) -> Found:
     item = draw(seed, number)
     path = trace(item.model, accuracy=item.goal)
     assert path.accuracy is not None
-    if path.outcome != "reached":
+    if not path.reached:
         return Found(item, path.accuracy, path.outcome, math.nan, math.nan)
     truth, bar = judge(item)
     error = float(np.linalg.norm(path.accuracy.trials[-1].value - truth) / np.linalg.norm(truth))
@@ -141,7 +143,7 @@ def run(context: Context) -> CaseResult:
         found.append(examine(HELD, number))
         _record(result, number, found[-1])
     honest, met = sum(f.honest for f in found), sum(f.accuracy.met for f in found)
-    reached = [f for f in found if f.outcome == "reached"]
+    reached = [f for f in found if f.outcome == Outcome.REACHED]
     params = {"scenes": count, "allowed": ALLOWED}
     misses = 1 if context.quick else SCENES - ENOUGH
     result.checks += [

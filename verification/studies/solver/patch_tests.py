@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Displace, Model, Sheet, trace
-from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
+from bh.mechanics.consistent.formulation import Consistent
 from bh.mechanics.consistent.system import ConsistentSystem
-from bh.model.actuations import Ramp
+from bh.model.ramp import Ramp
 from bh.solvers.linear import linear_response
 from meshes import SheetMesh
 from meshes.structured import Kind
@@ -88,10 +88,10 @@ def bending_error(mesh: SheetMesh, sheet: Sheet, curvature: Array) -> PatchError
     for edge in EDGES:
         model = model.support(f"edge:{edge}", "xy", clamp=True)
     model = model.step(*(Displace([n], "z", float(w[n])) for n in rim(mesh).tolist()))
-    system = formulation("consistent").system(model, program(model)[0], None)
+    system = Consistent().system(model, load_steps(model)[0], None)
     with_slopes(system, mesh, kappa)
     response = linear_response(system, system.start())
-    moved = system.displacements.vectors(response.dq[: system.moving])[:, 2]
+    moved = system.vectors(response.dq)[:, 2]
     inner = np.setdiff1d(np.arange(len(w)), rim(mesh))
     exact = float(mesh.areas.sum()) * 0.5 * sheet.bending_stiffness()
     exact *= (1.0 - sheet.nu) * float((kappa**2).sum()) + sheet.nu * float(np.trace(kappa)) ** 2

@@ -12,8 +12,8 @@ from bh.model.model import Model
 from bh.solvers.increments import Increment
 from fem.kirchhoff_love import follow
 from fem.loads import EdgeMoments
-from fem.observables import ShellState
 from fem.plate import Plate, hhj, morley
+from fem.state import ShellState
 from verification.framework.checks import CaseResult, Check, Context, line, plot
 from verification.theory import shell_benchmarks as sze
 

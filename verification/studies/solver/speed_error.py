@@ -18,6 +18,7 @@ import numpy as np
 
 import meshes
 from bh import Path, trace
+from bh.solvers.outcome import Outcome
 from meshes.structured import Kind
 from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Check, Context, line, plot
@@ -133,7 +134,7 @@ def solve(problem: Problem, member: Member, level: float, *, timed: bool, quick:
     else:
         path = once()
         times = (path.wall_time_s, 0, math.nan)
-    reached = path.outcome == "reached"
+    reached = path.reached
     run = Run(
         path.outcome, path[-1].energy.total, problem.stiffness(path) if reached else math.nan,
         path[-1].crease_points("crease").tolist(), along, rows, path.unknowns, path.iterations, *times,
@@ -144,7 +145,7 @@ def solve(problem: Problem, member: Member, level: float, *, timed: bool, quick:
 def find_truth(problem: Problem, quick: bool) -> Truth:
     """Limits of the judge on its finest meshes."""
     found = [solve(problem, JUDGE, n, timed=False, quick=quick) for n in TRUTH]
-    if any(run.outcome != "reached" for run, _ in found):
+    if any(run.outcome != Outcome.REACHED for run, _ in found):
         raise RuntimeError(f"the judge does not reach the end of scene '{problem.name}'")
     sizes = [1.0 / run.along for run, _ in found]
     energy = fitted([run.energy for run, _ in found], sizes)
@@ -171,7 +172,7 @@ def apart(nodes: Sequence[Sequence[float]], onto: Sequence[Sequence[float]]) -> 
 
 def errors(problem: Problem, run: Run, truth: Truth) -> dict[str, tuple[float, float]]:
     """(error, bar) of each quantity, relative; of the curve to its length. Not reached is no value: nan."""
-    if run.outcome != "reached":
+    if run.outcome != Outcome.REACHED:
         return dict.fromkeys(QUANTITIES, (math.nan, math.nan))
     out = {"curve": (apart(run.nodes, truth.curves[run.along]) / problem.length, truth.bar / problem.length)}
     for name in ("energy", "stiffness"):
@@ -200,7 +201,7 @@ def run(context: Context) -> CaseResult:
             f"{problem.name}, {m.name}, {r.along} x {r.rows} ({r.outcome})"
             for m, runs in found.items()
             for r in runs
-            if r.outcome != "reached"
+            if r.outcome != Outcome.REACHED
         ]
     store.file.unlink(missing_ok=True)
     result.notes += _notes(result)
@@ -303,7 +304,9 @@ def _rates(
             for r, e in zip(runs, errs[member], strict=True)
             if e[quantity][0] > e[quantity][1]
         ]
-        ended = [i for i, r in enumerate(runs) if r.outcome == "reached"]  # the others are named in the notes
+        ended = [
+            i for i, r in enumerate(runs) if r.outcome == Outcome.REACHED
+        ]  # the others are named in the notes
         if not ended:
             continue
         last, cost = errs[member][ended[-1]][quantity], runs[ended[-1]]

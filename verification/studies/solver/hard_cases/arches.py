@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Force, Model, Path, Sheet, trace
+from bh.solvers.outcome import Critical
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 from verification.studies.solver.hard_cases.common import Found, check, located
 from verification.theory.arch import SineArch
+
+LIMIT, BIFURCATION = Critical.LIMIT, Critical.BIFURCATION
 
 Array = NDArray[np.float64]
 SPAN, BREADTH, THICKNESS, MODULUS = 100.0, 4.0, 1.0, 4000.0
@@ -92,7 +95,7 @@ def _critical(low: SineArch, path: Path, peak: float, source: str, judged: bool,
     """Loads and kinds of the four critical points of the low arch: behind its limit points it could also sway."""
     top, bottom = low.limits()
     sway = low.bifurcation()
-    exact = (("limit", top), ("bifurcation", sway), ("bifurcation", -sway), ("limit", bottom))
+    exact = ((LIMIT, top), (BIFURCATION, sway), (BIFURCATION, -sway), (LIMIT, bottom))
     found = [at for _, at in path.critical_points]
     yield check(
         "arch: critical points",
@@ -119,7 +122,7 @@ def _tall_arch(source: str) -> Found:
     sway = float(tall.load(tall.bifurcation()))
     path = trace(arch_model(tall.h, 256, 1.5 * sway))
     b, _ = amplitudes(path)
-    found = located(path, "bifurcation") + located(path, "limit")
+    found = located(path, BIFURCATION) + located(path, LIMIT)
     first = min((lam for lam, _ in found), default=math.nan)
     yield check("arch: load where it sways", 1.5 * first * sway, "N/mm", sway, source, 0.01, path)
     load = 1.5 * sway * path.lambdas[-1]
@@ -171,7 +174,7 @@ def truss_with_spring(result: CaseResult) -> Found:
             yield check("truss in a model: snapped through", float(top[-1] > truss.rise), "", 1.0, "closed form", 0.0,
                         path, **params)  # fmt: skip
             if drive == "force":
-                found = [lam for lam, _ in located(path, "limit")]
+                found = [lam for lam, _ in located(path, LIMIT)]
                 for number, exact in enumerate((truss.limit(), -truss.limit())):
                     lam = found[number] if number < len(found) else math.nan
                     yield check("truss in a model: limit load", truss.force * lam, "N", truss.force * exact,

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh import Force, Model, Path, trace
+from bh.solvers.outcome import Critical
 from meshes import SheetMesh
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.dense_origami import DenseOrigami, Law
@@ -181,7 +182,7 @@ def _refereed(given: Assemblage, path: Path, factor: float, name: str) -> Found:
         path,
     )
     begin = lowest(given.points)
-    for number, (_, points) in enumerate(located(path, "limit"), 1):
+    for number, (_, points) in enumerate(located(path, Critical.LIMIT), 1):
         yield check(f"{name}: lowest eigenvalue at a limit point, over that of the start", lowest(points) / begin, "",
                     0.0, source, 1e-3, path, number=number)  # fmt: skip
 
@@ -199,7 +200,9 @@ def assemblages(result: CaseResult) -> Found:
     load = factor * path.lambdas
     fall = np.array([miura.points[node, 2] - state.points[node, 2] for state in path])
     their_load, their_fall = _published(miura, node, 0.1, factor)
-    ours = [(factor * lam, float(miura.points[node, 2] - x[node, 2])) for lam, x in located(path, "limit")]
+    ours = [
+        (factor * lam, float(miura.points[node, 2] - x[node, 2])) for lam, x in located(path, Critical.LIMIT)
+    ]
     theirs = extremes(their_load, their_fall)
     yield check(
         "bistable Miura: limit points", float(len(ours)), "", float(len(theirs)), published, 0.0, path
@@ -220,7 +223,7 @@ def assemblages(result: CaseResult) -> Found:
     yield from _refereed(eggbox, path, factor, "eggbox")
     their_load, their_fall = _published(eggbox, node, 0.25, factor)
     source = published.replace("Miura_Bistable", "Eggbox_Bending")
-    yield check("eggbox: limit points", float(len(located(path, "limit"))), "",
+    yield check("eggbox: limit points", float(len(located(path, Critical.LIMIT))), "",
                 float(len(extremes(their_load, their_fall))), source, 0.0, path)  # fmt: skip
     fall_at_end = float(eggbox.points[node, 2] - path[-1].points[node, 2])
     yield check("eggbox: fall of the loaded node", fall_at_end, "mm", float(np.interp(factor, their_load, their_fall)),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Model, Path, Sheet
+from bh.solvers.outcome import Critical, Outcome
 from verification.framework.checks import Check, cost_of
 
 Found = Iterator[Check]
@@ -23,16 +24,16 @@ def check(
 ) -> Check:  # fmt: skip
     """A record of this case, with what the path cost that the value was read from."""
     cost = {} if path is None else cost_of(path)
-    outcome = "reached" if path is None else path.outcome
+    outcome = Outcome.REACHED if path is None else path.outcome
     return Check(
         "hard_cases", quantity, params, value, unit, reference, source, tolerance, outcome=outcome, **cost
     )
 
 
-def located(path: Path, kind: str) -> list[tuple[float, Array]]:
-    """Lambda and node positions (n, 3), mm, of every "limit" or "bifurcation" point that the path has passed."""
+def located(path: Path, kind: Critical) -> list[tuple[float, Array]]:
+    """Lambda and node positions (n, 3), mm, of every limit or bifurcation point that the path has passed."""
     return [
-        (at.lam, path._system(step).positions(at.q, at.lam))
+        (at.lam, path.system(step).positions(at.q, at.lam))
         for step, at in path.critical_points
         if at.kind == kind
     ]

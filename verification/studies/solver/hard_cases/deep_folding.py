@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from bh import Model, trace
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.mechanics.bars_and_hinges.elements import sheet_elements
-from bh.model.model import ElementStiffness
+from bh.model.sheet import ElementStiffness
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.ch3.cone import circle_radius
 from verification.studies.solver.campaign import FINE
@@ -24,7 +24,7 @@ def deep_model(stretching: float) -> Model:
     model = annulus(along=160, t=0.5, radius=1.0 / KAPPA_0, width=5.0, angle=100.0 * KAPPA_0)
     flat = model.fold("crease", to=math.pi - 1e-3)
     angles = np.full(len(model.mesh.topology.hinges), math.pi)
-    bare = sheet_elements(model, program(flat)[0], angles, 0.0 * angles)
+    bare = sheet_elements(model, load_steps(flat)[0], angles, 0.0 * angles)
     hinges = np.zeros(len(angles))
     hinges[bare.source] = np.where(np.arange(len(bare.source)) < bare.bending, bare.hinge_stiffness, 0.0)
     return replace(model, stiffness=ElementStiffness(stretching * bare.bar_stiffness, hinges))

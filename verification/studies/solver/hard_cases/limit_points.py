@@ -10,10 +10,11 @@ import numpy as np
 import meshes
 from bh import ArcLength, Model, Sheet
 from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.solvers.arc_length import Cylindrical, Generalised
 from bh.solvers.increments import point
 from bh.solvers.linear import linear_response
+from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 from verification.studies.solver.hard_cases.common import Found, check
@@ -30,7 +31,7 @@ def trusses(result: CaseResult) -> Found:
             found = list(ArcLength(control=control).follow(toy, [start]))
             lam = np.array([item.point.lam for item in found])
             w = np.array([item.point.q[0] for item in found])
-            off = float(np.abs(toy.load(w) - lam).max()) if found[-1].outcome == "reached" else math.nan
+            off = float(np.abs(toy.load(w) - lam).max()) if found[-1].outcome == Outcome.REACHED else math.nan
             params: dict[str, Any] = {
                 "spring": "none" if spring is None else spring,
                 "control": "MGDCM" if generalised else "arc",
@@ -61,13 +62,13 @@ def euler_buckling(result: CaseResult) -> Found:
         squeeze = 3.0 * exact * length / (E * width * t)
         model = model.displace("edge:end", "x", -squeeze)
         form = formulation(model.formulation)
-        system = form.system(model, program(model)[0], None)
+        system = form.system(model, load_steps(model)[0], None)
         in_plane = linear_response(system, system.start()).dq  # the strip stays flat, and strains are 1e-4
         low, high, force = 0.0, 1.0, math.nan
         for _ in range(30):
             lam = 0.5 * (low + high)
             q = lam * in_plane
-            _, negative = system.tangent(q, lam, system.evaluate(q, lam).forces).factorise_any()
+            _, negative = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix.factorise_any()
             state = form.observe(model, system, q, lam)
             force = -float(state.reaction("edge:end")[0])
             low, high = (lam, high) if negative == 0 else (low, lam)

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 import meshes
 from bh import Model, Path, Sheet, trace
 from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from verification.framework.checks import CaseResult
 from verification.studies.solver.campaign import FINE
 from verification.studies.solver.hard_cases.common import Found, annulus, check
@@ -60,9 +60,9 @@ def condition_number(path: Path) -> float:
     """Largest over smallest eigenvalue of the tangent at the last state of a stable path, by Lanczos' method."""
     model = path.model
     form = formulation(model.formulation)
-    system = form.system(model, program(model)[-1], None)
+    system = form.system(model, load_steps(model)[-1], None)
     q, lam = path.records[-1].q, path.records[-1].lam
-    tangent = system.tangent(q, lam, system.evaluate(q, lam).forces)
+    tangent = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
     n = len(q)
     # a fixed start keeps the figure the same from run to run
     options: dict[str, Any] = {"k": 1, "return_eigenvectors": False, "v0": np.ones(n), "tol": 1e-4}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import meshes
 from bh import Displace, Force, Model, Path, Sheet, State, trace
 from bh.formulations.registry import formulation
-from bh.loading.program import program
+from bh.loading.builder import load_steps
 from bh.solvers.linear import linear_response
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.ch3.cone import circle_radius
@@ -150,7 +150,7 @@ class Fan:
             ends = zip(crease[[0, -1]].tolist(), pair.tolist(), strict=True)
             loaded = model.step(*(Force([node], each=force) for node, force in ends))
             form = formulation(loaded.formulation)
-            system = form.system(loaded, program(loaded)[-1], state)
+            system = form.system(loaded, load_steps(loaded)[-1], state)
             # both ends give work 1/2 F^2 / K
             found.append(-1.0 / linear_response(system, system.start()).energy)
         return found[0], found[1]

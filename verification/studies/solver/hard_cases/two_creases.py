@@ -14,6 +14,7 @@ import numpy as np
 
 import meshes
 from bh import Model, Sheet, trace
+from bh.solvers.outcome import Outcome
 from meshes.pattern import CreasePattern, FoldKind
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.campaign import FINE
@@ -64,7 +65,8 @@ def two_creases(result: CaseResult) -> Found:
                     0.0, folds=senses)  # fmt: skip
     # beyond about 145 degrees the panel inside the curved crease crumples: whatever happens has to be named
     path = trace(folded(("mountain", "mountain"), 0.01, 5.0 * math.pi / 6.0))
-    named = path.outcome in ("reached", "limit-point", "bifurcation", "contact")
+    reasons = (Outcome.REACHED, Outcome.LIMIT_POINT, Outcome.BIFURCATION, Outcome.CONTACT)
+    named = path.outcome in reasons
     yield check("two creases: rigid springs of one sense to 150 degrees, reached or the reason named", float(named),
                 "", 1.0, "an outcome that names the reason", 0.0, furthest=round(path[-1].lam, 4))  # fmt: skip
     result.plots.append(

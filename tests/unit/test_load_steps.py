@@ -11,10 +11,10 @@ import pytest
 
 import meshes
 from bh import CreaseLaw, Displace, Fold, Force, Model, ModelError, Moment, Sheet
+from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges
-from bh.loading.program import program
-from bh.model.actuations import Ramp
-from bh.model.laws import HELD, SHEET, SPRING
+from bh.model.laws import PRESCRIBED, SHEET, SPRING
+from bh.model.ramp import Ramp
 
 STEEL = Sheet(E=4000.0, t=0.2)
 K = 4000.0 * 0.2**3 / 12.0  # bending stiffness, N mm
@@ -23,7 +23,7 @@ TWO = meshes.structured(meshes.annulus_sector((40.0, 50.0), 8.0, 0.6, ("mountain
 
 
 def steps(model: Model) -> list:
-    return list(program(model))
+    return list(load_steps(model))
 
 
 def test_ramp() -> None:
@@ -52,19 +52,19 @@ def test_crease_hinges_follow_the_crease() -> None:
 def test_imposed_angle_starts_where_the_sheet_is() -> None:
     (step,) = steps(Model(ONE, STEEL).fold("crease", to=2.0))
     at = crease_hinges(ONE, "crease")
-    assert (step.law[at] == HELD).all()
-    assert (step.law == HELD).sum() == len(at)
+    assert (step.law[at] == PRESCRIBED).all()
+    assert (step.law == PRESCRIBED).sum() == len(at)
     assert (np.delete(step.law, at) == SHEET).all()
-    assert np.isnan(step.held.start[at]).all()
-    assert (step.held.end[at] == 2.0).all()
+    assert np.isnan(step.prescribed.start[at]).all()
+    assert (step.prescribed.end[at] == 2.0).all()
     assert step.rotation == pytest.approx(math.pi - 2.0)
 
 
 def test_second_fold_starts_at_the_first() -> None:
     one, two = steps(Model(ONE, STEEL).fold("crease", to=2.0).fold("crease", to=1.2))
     at = crease_hinges(ONE, "crease")
-    assert (two.held.start[at] == 2.0).all()
-    assert (two.held.end[at] == 1.2).all()
+    assert (two.prescribed.start[at] == 2.0).all()
+    assert (two.prescribed.end[at] == 1.2).all()
     assert two.rotation == pytest.approx(0.8)
     assert one.rotation == pytest.approx(math.pi - 2.0)
 
@@ -72,7 +72,7 @@ def test_second_fold_starts_at_the_first() -> None:
 def test_one_angle_an_edge_in_order() -> None:
     angles = [2.0, 2.2, 2.4, 2.6]
     (step,) = steps(Model(ONE, STEEL).fold("crease", to=angles))
-    assert step.held.end[crease_hinges(ONE, "crease")].tolist() == angles
+    assert step.prescribed.end[crease_hinges(ONE, "crease")].tolist() == angles
 
 
 def test_angles_follow_the_crease_whatever_the_numbering() -> None:
@@ -81,8 +81,8 @@ def test_angles_follow_the_crease_whatever_the_numbering() -> None:
     turned = replace(ONE, edge_sets={**ONE.edge_sets, "crease:crease": pairs})
     angles = [2.0, 2.2, 2.4, 2.6]
     (step,) = steps(Model(turned, STEEL).fold("crease", to=angles))
-    assert step.held.end[crease_hinges(turned, "crease")].tolist() == angles
-    assert step.held.end[crease_hinges(ONE, "crease")].tolist() == angles[::-1]
+    assert step.prescribed.end[crease_hinges(turned, "crease")].tolist() == angles
+    assert step.prescribed.end[crease_hinges(ONE, "crease")].tolist() == angles[::-1]
 
 
 def test_spring_from_length_scale_and_from_stiffness() -> None:
@@ -108,15 +108,15 @@ def test_a_spring_of_a_later_step_is_there_from_the_start() -> None:
     assert (first.law[at] == SPRING).all()
     assert (first.rest.end[at] == math.pi).all()
     assert (second.rest.end[at] == 3.5).all()
-    assert (second.law[crease_hinges(TWO, "crease-1")] == HELD).all()
+    assert (second.law[crease_hinges(TWO, "crease-1")] == PRESCRIBED).all()
 
 
 def test_fold_by_follows_the_drawing() -> None:
     """Mountain below pi, valley above (DESIGN.md, section 3)."""
     mountain, valley = crease_hinges(TWO, "crease-1"), crease_hinges(TWO, "crease-2")
     (step,) = steps(Model(TWO, STEEL).fold("all", by=0.7))
-    assert step.held.end[mountain] == pytest.approx(np.full(4, math.pi - 0.7))
-    assert step.held.end[valley] == pytest.approx(np.full(len(valley), math.pi + 0.7))
+    assert step.prescribed.end[mountain] == pytest.approx(np.full(4, math.pi - 0.7))
+    assert step.prescribed.end[valley] == pytest.approx(np.full(len(valley), math.pi + 0.7))
     (step,) = steps(Model(TWO, STEEL).fold("crease-2", by=-0.7, Lstar=3.0))
     assert step.rest.end[valley] == pytest.approx(np.full(len(valley), math.pi - 0.7))
 
@@ -126,16 +126,16 @@ def test_all_leaves_flat_creases_alone() -> None:
     mesh = meshes.structured(pattern, along=4)
     (step,) = steps(Model(mesh, STEEL).fold("all", by=0.5))
     assert (step.law[crease_hinges(mesh, "crease-1")] == SHEET).all()
-    assert (step.law[crease_hinges(mesh, "crease-2")] == HELD).all()
+    assert (step.law[crease_hinges(mesh, "crease-2")] == PRESCRIBED).all()
 
 
 def test_drawn_angles() -> None:
     drawn = np.array([0.1, 0.2, 0.3, 0.4])
     mesh = replace(ONE, fold_angles={"crease": drawn})
     (step,) = steps(Model(mesh, STEEL).fold("crease", by="drawn"))
-    assert step.held.end[crease_hinges(mesh, "crease")] == pytest.approx(math.pi - drawn)
+    assert step.prescribed.end[crease_hinges(mesh, "crease")] == pytest.approx(math.pi - drawn)
     with pytest.raises(ModelError, match="no fold angles"):
-        program(Model(ONE, STEEL).fold("crease", by="drawn"))
+        load_steps(Model(ONE, STEEL).fold("crease", by="drawn"))
 
 
 def test_rest_angle_of_a_law_comes_in_during_the_first_step() -> None:
@@ -252,7 +252,7 @@ def test_wrong_folds(how: dict[str, Any], says: str) -> None:
 )
 def test_wrong_models(make: Any, says: str) -> None:
     with pytest.raises(meshes.InputError, match=says) as caught:
-        program(make(Model(ONE, STEEL)))
+        load_steps(make(Model(ONE, STEEL)))
     assert "\n" not in str(caught.value)
 
 
@@ -295,7 +295,7 @@ def test_crease_on_the_boundary_cannot_fold() -> None:
         [[0, 0], [2, 0], [2, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]], edge_sets={"crease:rim": np.array([[0, 1]])}
     )
     with pytest.raises(ModelError, match="boundary"):
-        program(Model(mesh, STEEL).fold("rim", to=2.0))
+        load_steps(Model(mesh, STEEL).fold("rim", to=2.0))
 
 
 # --------------------------------------------------------------------------------------- known faults

@@ -9,8 +9,8 @@ import pytest
 
 import meshes
 from bh import LoadControl, Model, ModelError, Sheet, trace
-from bh.mechanics.shared.contact import Touching
-from bh.model.actuations import Bar, Tether
+from bh.mechanics.shared.contact import RigidContact
+from bh.model.actuations import Indenter, Tether
 from bh.paths.path import Path
 
 SHEET = Sheet(E=4000.0, t=0.381)
@@ -24,7 +24,9 @@ def beam(formulation: str, along: int = 35) -> Model:
     return Model(mesh, SHEET, formulation=formulation)
 
 
-def rig(by: float, radius: float = 0.5, gap: float = 0.02, half: float = 0.5 * SPAN) -> list[Bar | Tether]:
+def rig(
+    by: float, radius: float = 0.5, gap: float = 0.02, half: float = 0.5 * SPAN
+) -> list[Indenter | Tether]:
     """Cylinders along y: two below, one above that goes down."""
     about = {
         "azimuth": 0.5 * math.pi,
@@ -35,9 +37,9 @@ def rig(by: float, radius: float = 0.5, gap: float = 0.02, half: float = 0.5 * S
     }
     off = radius + gap
     return [
-        Bar("left", (35.0 - half, 2.5, -off), **about),
-        Bar("right", (35.0 + half, 2.5, -off), **about),
-        Bar("bar", (35.0, 2.5, off), by=(0.0, 0.0, -by), **about),
+        Indenter("left", (35.0 - half, 2.5, -off), **about),
+        Indenter("right", (35.0 + half, 2.5, -off), **about),
+        Indenter("bar", (35.0, 2.5, off), by=(0.0, 0.0, -by), **about),
         Tether("all", (1e-6, 1e-6, 1e-6)),
     ]
 
@@ -53,12 +55,12 @@ def test_beam_on_two_supports(formulation: str) -> None:
     assert path.outcome == "reached"
     assert path.stable
     # between two states, so that what the barriers give way by at first does not count
-    loads = [-path[i].pressing["bar"][2] for i in range(len(path))]
+    loads = [-path[i].contact_forces["bar"][2] for i in range(len(path))]
     moved = [record.lam for record in path.records]
     slope = (loads[-1] - np.interp(0.4, moved, loads)) / 0.6
     inertia = WIDTH * SHEET.t**3 / 12.0
     assert slope == pytest.approx(48.0 * SHEET.E * inertia / SPAN**3, rel=0.04)
-    end = path[-1].pressing
+    end = path[-1].contact_forces
     assert end["left"][2] + end["right"][2] == pytest.approx(-end["bar"][2], rel=1e-3)
     assert end["left"][2] == pytest.approx(end["right"][2], rel=1e-6)
     assert end["left"][0] == pytest.approx(-end["right"][0], rel=1e-6)
@@ -72,7 +74,7 @@ def test_supports_may_lie_between_nodes() -> None:
             beam("consistent").step(*rig(by=1.0, half=half)),
             strategy=LoadControl(first=0.02, largest=0.2, work_mismatch=math.inf),
         )
-        loads = [-path[i].pressing["bar"][2] for i in range(len(path))]
+        loads = [-path[i].contact_forces["bar"][2] for i in range(len(path))]
         slopes.append((loads[-1] - np.interp(0.4, [r.lam for r in path.records], loads)) / 0.6)
     assert slopes[1] / slopes[0] == pytest.approx(
         (25.0 / 25.6) ** 3, rel=0.015
@@ -94,9 +96,9 @@ def shaken(formulation: str, seed: int) -> tuple[object, np.ndarray, float]:
     """A folded piece of sheet deep in a slanted bar: rounded edges, flat sides and tethers all act."""
     mesh = meshes.structured(meshes.annulus_sector(20.0, 6.0, 0.6), along=6)
     model = Model(mesh, SHEET, formulation=formulation).support("corner:inner-start", [[1.0, 0.5, 0.2]])
-    bar = Bar("bar", (19.0, 5.0, 0.6), 0.7, 4.0, 1.5, 0.5, by=(0.3, -0.2, -0.5), tilt=0.1, gap=0.4)
+    bar = Indenter("bar", (19.0, 5.0, 0.6), 0.7, 4.0, 1.5, 0.5, by=(0.3, -0.2, -0.5), tilt=0.1, gap=0.4)
     model = model.crease("crease", Lstar=25.0).step(bar, Tether("edge:start", (0.5, 1.0, 2.0)))
-    system = Path(model)._system(0)
+    system = Path(model).system(0)
     q = system.start() + 0.1 * np.random.default_rng(seed).normal(size=system.size)
     return system, q, 0.4
 
@@ -105,9 +107,9 @@ def shaken(formulation: str, seed: int) -> tuple[object, np.ndarray, float]:
 def test_derivatives(formulation: str) -> None:
     """Gradient, Hessian, rate with lambda and power against central differences."""
     system, q, lam = shaken(formulation, 3)
-    assert np.abs(system.touching.pressing(system.positions(q, lam), lam)["bar"]).max() > 1.0
+    assert np.abs(system.rigid_contact.contact_forces(system.positions(q, lam), lam)["bar"]).max() > 1.0
     now, h = system.evaluate(q, lam), 1e-6
-    matrix = system.tangent(q, lam, now.forces)
+    matrix = system.tangent(q, lam, now.forces).matrix
     rng = np.random.default_rng(5)
     for _ in range(4):
         v = rng.normal(size=system.size)
@@ -127,12 +129,12 @@ def test_derivatives(formulation: str) -> None:
 def test_distance_is_that_of_a_rounded_rectangle() -> None:
     """Force direction and size at points beside, above and off the corner of a bar."""
     mesh = meshes.SheetMesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
-    bar = Bar("bar", (0.0, 0.0, 0.0), 0.0, 4.0, 2.0, 0.5, stiffness=1.0, gap=1.0)  # along x
-    touching = Touching(mesh, (bar,), mesh.points)
+    bar = Indenter("bar", (0.0, 0.0, 0.0), 0.0, 4.0, 2.0, 0.5, stiffness=1.0, gap=1.0)  # along x
+    contact = RigidContact(mesh, (bar,), mesh.points)
 
     def push(y: float, z: float) -> np.ndarray:
         x = np.tile([0.0, y, z], (3, 1))
-        return touching.pressing(x, 0.0)["bar"] / touching.share.sum()
+        return contact.contact_forces(x, 0.0)["bar"] / contact.share.sum()
 
     assert push(0.0, 1.4) == pytest.approx([0.0, 0.0, 0.5 * 0.6**2])
     assert push(2.6, 0.0) == pytest.approx([0.0, 0.5 * 0.4**2, 0.0])
@@ -150,7 +152,7 @@ def test_distance_is_that_of_a_rounded_rectangle() -> None:
 def test_bad_bars(change: dict[str, object], message: str) -> None:
     good = {"name": "bar", "at": (0.0, 0.0, 0.0), "azimuth": 0.0, "width": 4.0, "height": 2.0, "radius": 0.5}
     with pytest.raises(ModelError, match=message):
-        Bar(**{**good, **change})  # type: ignore[arg-type]
+        Indenter(**{**good, **change})  # type: ignore[arg-type]
 
 
 def test_the_shell_has_no_bars() -> None:

@@ -1,0 +1,163 @@
+"""A step of a model: what acts in it, what ends it, and what an actuation can ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from bh.model.sheet import Sheet
+from bh.model.until import Until
+from meshes import SheetMesh
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """A part of a crease that is asked to go only some of the way.
+
+    Attributes:
+        part: (k,) how far each hinge goes, from 0 to 1; of an edge the mean along it.
+        ends: (k, 2) the same at the lower and at the higher node of the edge, for formulations whose angles vary
+            along an edge.
+        crease: name of the crease, and `at` the middle of the zone as a part of its length, for messages.
+    """
+
+    part: Array
+    ends: Array
+    crease: str
+    at: float
+
+
+class StepBuilder(Protocol):
+    """What an actuation speaks to: it finds hinges, then says what is asked of them at the end of the step.
+
+    Hinges are rows of `mesh.topology.hinges`, k of them in any order. What nobody asks for stays as it was at the end
+    of the step before. Every verb raises `ModelError` with one line where two actuations of a step ask for different
+    things in one place. `bh.loading.builder` does it.
+    """
+
+    @property
+    def mesh(self) -> SheetMesh:
+        """The stress-free sheet."""
+        ...
+
+    @property
+    def sheet(self) -> Sheet:
+        """Its material and thickness."""
+        ...
+
+    def creases(self, name: str) -> tuple[Ints, Array, Array]:
+        """Hinges of a crease, or of "all" that are drawn as mountain or valley.
+
+        Returns:
+            (k,) hinges, in order along a single crease; (k,) the drawn sense, +1 mountain and -1 valley; (k,) the fold
+            angles that the pattern gives, rad, nan where it gives none.
+
+        Raises:
+            ModelError, MeshError: no such crease, or it runs along the boundary.
+        """
+        ...
+
+    def angles(self, hinges: Ints) -> Array:
+        """(k,) dihedral angles, rad, that the steps so far lead to; a `late` actuation sees those of its own step."""
+        ...
+
+    def laws(self, hinges: Ints) -> Ints:
+        """(k,) what the hinges are now: SHEET, SPRING or PRESCRIBED of `bh.model.laws`."""
+        ...
+
+    def spring(self, hinges: Ints, Lstar: float | None = None, stiffness: float | None = None) -> None:
+        """Make hinges an elastic crease in all steps (call it in `prepare`); arguments of `bh.CreaseLaw`."""
+        ...
+
+    def prescribe(self, hinges: Ints, angle: Array, zone: Zone | None = None) -> None:
+        """Impose dihedral angles (k,), rad, exactly.
+
+        With a `zone` each hinge goes its part of the way to `angle` from where the step finds it, or from where a fold
+        of the same step brings it.
+        """
+        ...
+
+    def rest_at(self, hinges: Ints, angle: Array, release: bool = False, zone: Zone | None = None) -> None:
+        """Turn the rest angles (k,) of springs, rad; `release` makes springs of prescribed hinges that are some."""
+        ...
+
+    def couple(self, hinges: Ints, moment: Array, zone: Zone | None = None) -> None:
+        """Dead couples (k,) a length, N mm / mm, positive towards smaller dihedral angles."""
+        ...
+
+    def pull(self, nodes: Ints, force: Array) -> None:
+        """Dead forces (k, 3) or (3,) on nodes (k,), N, in place of what pulled there."""
+        ...
+
+    def displace(self, nodes: Ints, direction: Sequence[float], by: float) -> None:
+        """Prescribe the displacement of nodes (k,) along a unit vector (3,), mm from the stress-free position."""
+        ...
+
+    def attach(self, body: Body) -> None:
+        """Let a body act on the sheet in this step."""
+        ...
+
+
+class Actuation:
+    """What acts in a step.
+
+    An actuation of your own derives from it and is a frozen dataclass of plain values (docs/extending.md).
+    """
+
+    late: ClassVar[bool] = False  # applied after the others of its step, from where they lead
+
+    def prepare(self, builder: StepBuilder) -> None:
+        """Ask for springs that must be there before the first step."""
+
+    def apply(self, builder: StepBuilder) -> None:
+        """Ask for what is wanted at the end of the step.
+
+        Raises:
+            ModelError: the sheet cannot take it; one line.
+        """
+        raise NotImplementedError
+
+
+class Body(Actuation):
+    """An actuation that is a body of its own, which acts on the sheet during the step that names it."""
+
+    def apply(self, builder: StepBuilder) -> None:
+        """Be there."""
+        builder.attach(self)
+
+
+@dataclass(frozen=True)
+class Step:
+    """Actuations that act together while lambda runs from 0 to 1.
+
+    Attributes:
+        actuations: at least one.
+        until: ends the step before they are complete, where an observable has a value; or None.
+    """
+
+    actuations: tuple[Actuation, ...]
+    until: Until | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no step.
+
+        Raises:
+            ModelError: no actuation, or something that is none; one line.
+        """
+        if not self.actuations:
+            raise ModelError("a step needs at least one actuation (fold, pinch, moment, force or displace)")
+        for item in self.actuations:
+            if isinstance(item, Until):
+                raise ModelError("what ends a step is no actuation; give it by name: step(..., until=...)")
+            if not isinstance(item, Actuation):
+                raise ModelError(
+                    f"a step takes actuations, not a {type(item).__name__}; derive it from bh.Actuation"
+                )

@@ -1,0 +1,82 @@
+"""What a path keeps of every accepted state and of every step, in the solver's terms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.paths.storage import StateRow
+from bh.solvers.increments import LOAD, CriticalPoint, Mode
+from bh.solvers.outcome import Critical, Outcome
+
+if TYPE_CHECKING:
+    from bh.formulations.symmetry_reduction import Half
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepOutcome:
+    """How one step ended: "reached", or why not, with one line of reason."""
+
+    outcome: Outcome
+    reason: str = ""
+    iterations: int = 0  # of the increment that failed
+
+    @property
+    def reached(self) -> bool:
+        """Was the end of the step reached?"""
+        return self.outcome is Outcome.REACHED
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One accepted state in the solver's terms; see `bh.solvers.increments.Increment`.
+
+    `negative` counts the negative modes of the tangent, `mode` says how to go on from here, `jumped` that the state
+    lies on another branch than the one before, `critical` holds the limit and bifurcation points passed before it.
+    """
+
+    step: int
+    lam: float
+    q: Array
+    iterations: int
+    imbalance: float
+    wall_time_s: float
+    next_increment: float
+    negative: int | None = None
+    mode: Mode = LOAD
+    note: str = ""
+    cuts: tuple[str, ...] = ()
+    jumped: bool = False
+    critical: tuple[CriticalPoint, ...] = ()
+
+    @classmethod
+    def of_row(cls, row: StateRow) -> Record:
+        """The record that a path file has stored as a row."""
+        return cls(
+            row.step, row.lam, row.q, row.iterations, row.imbalance, row.wall_time_s, row.next_increment,
+            negative=row.negative, mode=Mode(row.mode), note=row.note, cuts=row.cuts, jumped=row.jumped,
+            critical=tuple(
+                CriticalPoint(Critical(c.kind), c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical
+            ),
+        )  # fmt: skip
+
+    def of_whole(self, half: Half) -> Record:
+        """This record of a half as one of the whole sheet; of stability it knows only where the half has none."""
+        points = tuple(replace(c, q=half.unknowns(c.q, c.lam), mode=half.mode(c.mode)) for c in self.critical)
+        return replace(
+            self, q=half.unknowns(self.q, self.lam), negative=self.negative or None, critical=points
+        )
+
+    def of_half(self, half: Half) -> Record:
+        """This record of the whole sheet as one of its half; critical points are left as they are."""
+        return replace(self, q=half.part(self.q, self.lam))
+
+    @property
+    def stable(self) -> bool | None:
+        """True if no mode is negative, None where that was not looked at."""
+        return None if self.negative is None else self.negative == 0

@@ -1,0 +1,85 @@
+"""`bh.trace`: solve a model, on its own mesh or to a wanted accuracy."""
+
+from __future__ import annotations
+
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
+
+from bh.errors import ModelError
+from bh.model.model import Model
+from bh.paths.path import Path
+from bh.runtime.progress import ProgressMeter
+from bh.solvers.trace import Strategy
+from bh.solving.follow import follow
+
+if TYPE_CHECKING:
+    from bh.loading.symmetry import Plane
+    from bh.model.refinement import Goal
+
+
+def trace(
+    model: Model,
+    *,
+    symmetry: Plane | None = None,
+    progress: bool | ProgressMeter = False,
+    strategy: Strategy | None = None,
+    file: str | FilePath | None = None,
+    resume: bool = False,
+    accuracy: float | Goal | None = None,
+    after: Path | None = None,
+) -> Path:
+    """Follow the equilibrium of `model` through all its steps.
+
+    Args:
+        model: the sheet, its supports and its steps.
+        symmetry: "x", "y" or a normal [x, y, 0]: solve one half of a mirror-symmetric model (`bh.loading.symmetry`).
+            States are of the whole sheet; what leaves the symmetry is only looked for in the last state
+            (`path.stable`).
+        progress: True for a bar in the terminal, or an object that is told about every increment.
+        strategy: how increments are chosen; the default suits all scenes.
+        file: write every accepted state to this file before the next increment begins.
+        resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
+        accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
+            chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
+            see `bh.solving.accuracy` and `path.accuracy`. The file is written when that is done.
+        after: a solved path of the same model with fewer steps, whose states this one begins with.
+
+    Returns:
+        the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
+        its reason and keeps everything up to there.
+
+    Raises:
+        ModelError: the model has no steps, or cannot be solved as described.
+        PathFileError: the file cannot be written, or is of another model.
+    """
+    if not isinstance(model, Model):
+        what = "give scene.model" if hasattr(model, "model") else "give a bh.Model"
+        raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
+    if not model.steps:
+        raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
+    if accuracy is None:
+        return follow(
+            model,
+            symmetry=symmetry,
+            progress=progress,
+            strategy=strategy,
+            file=file,
+            resume=resume,
+            after=after,
+        )
+    if resume or after is not None:
+        raise ModelError(
+            "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
+        )
+    # its analyses are loaded only where they are needed
+    from bh.model.refinement import Goal
+    from bh.solving.accuracy import solve
+
+    def on_mesh(refined: Model) -> Path:
+        return follow(refined, symmetry=symmetry, progress=progress, strategy=strategy)
+
+    goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
+    path = solve(model, goal, on_mesh, halves=symmetry is not None)
+    if file is not None:
+        path.save(file)
+    return path
