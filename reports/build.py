@@ -193,10 +193,15 @@ def _environment(link: Callable[[str, str], str]) -> Any:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "number": words.number, "share": words.share, "seconds": words.seconds, "plain": typeset, "date": words.date,
+        "number": words.number,
+        "share": words.share,
+        "seconds": words.seconds,
+        "plain": typeset,
+        "date": words.date,
         "unlike": lambda params, common: {key: v for key, v in params.items() if key not in common},
-        "text": lambda text: Markup(markup(text)), "params": lambda given: Markup(words.params(given)),
-    }  # fmt: skip
+        "text": lambda text: Markup(markup(text)),
+        "params": lambda given: Markup(words.params(given)),
+    }
     environment.globals["link"] = link
     return environment
 

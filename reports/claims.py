@@ -70,17 +70,46 @@ def claims(cases: Iterable[Case]) -> list[Claim]:
 def claims_csv(found: Iterable[Claim]) -> str:
     """Link to the table as CSV."""
     rows: list[list[Any]] = [
-        ["case", "place", "claim", "quantity", "published", "ours", "error bar", "unit", "error", "tolerance",
-         "verdict", "of records", "unknowns", "wall_time_s", "command"]
-    ]  # fmt: skip
+        [
+            "case",
+            "place",
+            "claim",
+            "quantity",
+            "published",
+            "ours",
+            "error bar",
+            "unit",
+            "error",
+            "tolerance",
+            "verdict",
+            "of records",
+            "unknowns",
+            "wall_time_s",
+            "command",
+        ]
+    ]
     for claim in found:
         check = claim.check
         quick = " --quick" if claim.case.info.quick else ""
         rows.append(
-            [claim.case.name, claim.place, claim.words, check.quantity, check.reference, check.value, check.bar,
-             check.unit, check.error, check.tolerance, claim.verdict, claim.count, check.unknowns,
-             check.wall_time_s, f"bh verify {claim.case.name}{quick}"]
-        )  # fmt: skip
+            [
+                claim.case.name,
+                claim.place,
+                claim.words,
+                check.quantity,
+                check.reference,
+                check.value,
+                check.bar,
+                check.unit,
+                check.error,
+                check.tolerance,
+                claim.verdict,
+                claim.count,
+                check.unknowns,
+                check.wall_time_s,
+                f"bh verify {claim.case.name}{quick}",
+            ]
+        )
     return csv_link(rows)
 
 

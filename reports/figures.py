@@ -93,10 +93,21 @@ def svg(plot: Plot, prefix: str) -> str:
     from matplotlib.figure import Figure
 
     settings: Any = {
-        "svg.fonttype": "none", "svg.hashsalt": prefix, "font.size": 12.0, "text.color": INK, "axes.edgecolor": SOFT,
-        "axes.labelcolor": INK, "axes.linewidth": 0.8, "xtick.color": SOFT, "ytick.color": SOFT, "grid.color": RULE,
-        "xtick.labelcolor": INK, "ytick.labelcolor": INK, "text.parse_math": False, "axes.unicode_minus": True,
-    }  # fmt: skip
+        "svg.fonttype": "none",
+        "svg.hashsalt": prefix,
+        "font.size": 12.0,
+        "text.color": INK,
+        "axes.edgecolor": SOFT,
+        "axes.labelcolor": INK,
+        "axes.linewidth": 0.8,
+        "xtick.color": SOFT,
+        "ytick.color": SOFT,
+        "grid.color": RULE,
+        "xtick.labelcolor": INK,
+        "ytick.labelcolor": INK,
+        "text.parse_math": False,
+        "axes.unicode_minus": True,
+    }
     with rc_context(settings):
         figure = Figure(figsize=(WIDTH / 72.0, HEIGHT / 72.0), layout="constrained")
         axes = figure.subplots()

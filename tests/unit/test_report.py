@@ -410,8 +410,8 @@ def test_numbers_have_sensible_digits() -> None:
 def test_errors_are_shares_of_the_reference(tmp_path: Path) -> None:
     from reports.records import Check
 
-    against_one = Check.model_validate(record("a", "b", 1.0, unit="mm", reference=2.0))
-    against_zero = Check.model_validate(record("a", "b", 1.0, unit="mm", reference=0.0))
+    against_one = Check(**record("a", "b", 1.0, unit="mm", reference=2.0))
+    against_zero = Check(**record("a", "b", 1.0, unit="mm", reference=0.0))
     assert share(0.028, against_one) == "2.8\u00a0%"
     assert share(0.028, against_zero) == "0.028\u00a0mm"
 

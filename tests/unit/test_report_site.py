@@ -29,7 +29,7 @@ from verification.framework.run import RECORDS, run
 
 
 def case(*records: dict[str, Any]) -> Case:
-    checks = [(n, Check.model_validate(r)) for n, r in enumerate(records, start=1)]
+    checks = [(n, Check(**r)) for n, r in enumerate(records, start=1)]
     return Case(CaseInfo(name=records[0]["case"]), checks)
 
 

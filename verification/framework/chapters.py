@@ -66,7 +66,7 @@ CHAPTERS = (
         "Formulations, solver and hard cases",
         "Do the formulations converge, is the shell to be trusted as a judge, and what can stop the solver?",
     ),
-)  # fmt: skip
+)
 OTHER = Chapter("other", "Further cases", "What else has been checked?")
 
 

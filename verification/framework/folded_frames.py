@@ -9,7 +9,7 @@ from bh import Model, Path, trace
 from bh.plotting.interactive import frames
 from bh.plotting.pictures import picture
 from meshes.structured import Kind
-from verification.framework.checks import CaseResult, Check, Context, cost_of
+from verification.framework.checks import CaseResult, Context, Cost
 from verification.framework.run import write_json
 
 # rows of cells a side and mesh pattern that suit each
@@ -55,15 +55,21 @@ def compare(
     result: CaseResult, params: dict[str, Any], path: Path, shell: Path, tolerance: float | None
 ) -> None:
     """Energies at the end of a path against the shell's; the total is judged where there is a tolerance."""
-    outcome = path.outcome if path.outcome != "reached" else shell.outcome
+    took = Cost.of(path, outcome=path.outcome if path.outcome != "reached" else shell.outcome)
     energy, reference = path[-1].energy.as_dict(), shell[-1].energy.as_dict()
     for kind, value in energy.items():
         if value or reference[kind]:
             judged = tolerance if kind == "total" else None
-            result.checks.append(
-                Check(result.name, f"{kind} energy, folded", params, value, "N mm", reference[kind],
-                      "the shell on the same sheet", judged, outcome=outcome, **cost_of(path))
-            )  # fmt: skip
+            result.check(
+                f"{kind} energy, folded",
+                value,
+                unit="N mm",
+                reference=reference[kind],
+                source="the shell on the same sheet",
+                tolerance=judged,
+                params=params,
+                path=took,
+            )
 
 
 def step_ends(path: Path) -> list[Any]:

@@ -17,8 +17,9 @@ from typing import Any
 
 from meshes.errors import InputError
 from verification.framework.cases import BY_NAME, CASES, LONG_CASES, case
-from verification.framework.checks import RECORD, CaseResult, Context
+from verification.framework.checks import CaseResult, Context
 from verification.framework.environment import environment
+from verification.framework.records import KEYS
 
 OF_A_RUN = ("versions", "date", "machine", "quick")  # kept for every case, as cases may be run one by one
 LATER = ("scenes",)  # lists that records of earlier versions have not
@@ -155,7 +156,7 @@ def _stored(file: Path) -> dict[str, Any]:
     names = [info["name"] for info in cases]
     whole = (
         all(set(info) == {*summary, *OF_A_RUN} for info in cases)
-        and all(set(check) >= RECORD and check["case"] in names for check in checks)
+        and all(set(check) >= set(KEYS) and check["case"] in names for check in checks)
         and len(set(names)) == len(names)
     )
     return {"checks": checks, "cases": cases} if whole else nothing

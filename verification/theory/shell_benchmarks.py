@@ -25,8 +25,11 @@ SHEAR = {4.0: (3.286, 6.698)}  # end force: tip -u, w (table 1 of the paper)
 RING = Sheet(E=21.0e6, nu=0.0, t=0.03)
 RING_RADII, RING_LOAD = (6.0, 10.0), 0.8 * 4.0  # line force of 0.8 a length on the lip
 RING_TABLE = {  # share of the load: deflection at the inner and the outer end of the lip
-    0.1: (4.277, 5.876), 0.2: (6.725, 9.160), 0.5: (10.468, 13.768), 1.0: (13.891, 17.528),
-}  # fmt: skip
+    0.1: (4.277, 5.876),
+    0.2: (6.725, 9.160),
+    0.5: (10.468, 13.768),
+    1.0: (13.891, 17.528),
+}
 
 
 def grid(place: Callable[[Array, Array], Array], along: int, across: int, turned: bool = False) -> SheetMesh:
@@ -53,9 +56,11 @@ def grid(place: Callable[[Array, Array], Array], along: int, across: int, turned
     for j in range(across + 1):
         sets[f"edge:rail-{j}"] = np.column_stack((node[j, :-1], node[j, 1:]))
     return SheetMesh(
-        place(u.ravel(), v.ravel()), cells[:, ::-1] if turned else cells, edge_sets=sets,
+        place(u.ravel(), v.ravel()),
+        cells[:, ::-1] if turned else cells,
+        edge_sets=sets,
         corners={"corner:low-end": int(node[0, -1]), "corner:high-end": int(node[-1, -1])},
-    )  # fmt: skip
+    )
 
 
 def rectangle(length: float, width: float, along: int, across: int = 1) -> SheetMesh:

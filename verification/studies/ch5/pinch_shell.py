@@ -13,7 +13,7 @@ from bh.applications.inverse.transforms import frame
 from meshes.curves import arc_lengths
 from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Context, line, plot
-from verification.studies.ch5.pinching import AS_SOURCE, CONVERGED, Pinched, Way, add, pinched
+from verification.studies.ch5.pinching import AS_SOURCE, CONVERGED, Pinched, Way, pinched
 
 Array = NDArray[np.float64]
 SHEETS = ((1, 0.005), (1, 0.01), (1, 0.02), (2, 0.01))  # creases, kappa_0 in 1/mm
@@ -45,9 +45,19 @@ def run(context: Context) -> CaseResult:
             for mesh in way.meshes[:2] if context.quick else way.meshes:
                 found = pinched(way, mesh, k, creases)
                 judged = way is CONSISTENT and mesh == way.meshes[-1] and not context.quick
-                _compare(result, found, judges[-1], judged,
-                         {"formulation": way.name, "along": mesh[0], "rows": mesh[1], "creases": creases,
-                          "kappa_0_per_mm": k})  # fmt: skip
+                _compare(
+                    result,
+                    found,
+                    judges[-1],
+                    judged,
+                    {
+                        "formulation": way.name,
+                        "along": mesh[0],
+                        "rows": mesh[1],
+                        "creases": creases,
+                        "kappa_0_per_mm": k,
+                    },
+                )
                 shown[f"{way.name}, {mesh[0]} x {mesh[1]}"] = found
         _plots(result, shown, creases, k)
     for k in SEGMENTS[:1] if context.quick else SEGMENTS:
@@ -64,25 +74,35 @@ def _segment(result: CaseResult, k: float, finest: tuple[int, int]) -> None:
     for way, mesh in ((BARS, (100, 1)), (AS_SOURCE, (100, 1)), (CONSISTENT, (100, 1)), (CONSISTENT, last)):
         found = pinched(way, mesh, k, sheet=THIN, Lstar=0.5)
         params: dict[str, Any] = {
-            "formulation": way.name, "along": mesh[0], "rows": mesh[1], "kappa_0_per_mm": k, "t_mm": THIN.t,
-        }  # fmt: skip
+            "formulation": way.name,
+            "along": mesh[0],
+            "rows": mesh[1],
+            "kappa_0_per_mm": k,
+            "t_mm": THIN.t,
+        }
         apart = tip(found) - tip(judge)
         source = "shell of the same pinch" if way is not AS_SOURCE else "shell pinched by the raised cosine"
         judged = 1.5 if way is CONSISTENT and mesh == last else None
         away = float(np.linalg.norm(apart))
-        add(
-            result,
-            found,
+        result.check(
             "segment: distance of its end from the shell's",
             away,
-            "mm",
-            0.0,
-            source,
-            judged,
-            **params,
+            unit="mm",
+            reference=0.0,
+            source=source,
+            tolerance=judged,
+            params=params,
+            path=found.path,
         )
-        add(result, found, "segment: height of its end over the plane at its start", float(tip(found)[2]), "mm",
-            float(tip(judge)[2]), source, **params)  # fmt: skip
+        result.check(
+            "segment: height of its end over the plane at its start",
+            tip(found)[2],
+            unit="mm",
+            reference=float(tip(judge)[2]),
+            source=source,
+            params=params,
+            path=found.path,
+        )
 
 
 def tip(p: Pinched) -> Array:
@@ -103,7 +123,16 @@ def _own_error(result: CaseResult, judges: list[Pinched], creases: int, k: float
         ("change of the twist angle", "deg", last.twist, before.twist),
     ):
         small = unit == "deg" and abs(a) < SMALL
-        add(result, last, name, a, unit, b, "coarser mesh of the shell", None if small else 0.1, **params)
+        result.check(
+            name,
+            a,
+            unit=unit,
+            reference=b,
+            source="coarser mesh of the shell",
+            tolerance=None if small else 0.1,
+            params=params,
+            path=last.path,
+        )
 
 
 def _compare(
@@ -112,38 +141,58 @@ def _compare(
     source = "shell, finest mesh of this case"
     mine, its = found.path[-1].energy, judge.path[-1].energy
     for name in ("total", "bending", "stretching", "folding"):
-        add(result, found, f"{name} energy", getattr(mine, name), "N mm", getattr(its, name), source,
-            0.1 if judged and name in ("total", "bending") else None, **params)  # fmt: skip
-    add(
-        result,
-        found,
+        result.check(
+            f"{name} energy",
+            getattr(mine, name),
+            unit="N mm",
+            reference=getattr(its, name),
+            source=source,
+            tolerance=0.1 if judged and name in ("total", "bending") else None,
+            params=params,
+            path=found.path,
+        )
+    result.check(
         "change of the bending angle",
         found.bend,
-        "deg",
-        judge.bend,
-        source,
-        0.03 if judged else None,
-        **params,
+        unit="deg",
+        reference=judge.bend,
+        source=source,
+        tolerance=0.03 if judged else None,
+        params=params,
+        path=found.path,
     )
-    add(
-        result,
-        found,
+    result.check(
         "change of the twist angle",
         found.twist,
-        "deg",
-        judge.twist,
-        source,
-        0.1 if judged and abs(judge.twist) > SMALL else None,
-        **params,
+        unit="deg",
+        reference=judge.twist,
+        source=source,
+        tolerance=0.1 if judged and abs(judge.twist) > SMALL else None,
+        params=params,
+        path=found.path,
     )
     for name in ("curvature", "torsion"):
         a, b = (_profile(p, name) for p in (found, judge))
         apart = float(np.sqrt(np.mean((a - b) ** 2)) / np.abs(b).max())
-        add(result, found, f"{name} along the crease, root mean square difference over the largest", apart, "", 0.0,
-            source, {"curvature": 0.03}.get(name) if judged else None, **params)  # fmt: skip
+        result.check(
+            f"{name} along the crease, root mean square difference over the largest",
+            apart,
+            reference=0.0,
+            source=source,
+            tolerance={"curvature": 0.03}.get(name) if judged else None,
+            params=params,
+            path=found.path,
+        )
     apart = end_distance(found, judge)
-    add(result, found, "distance of the ends of the creases over their length", apart, "", 0.0, source,
-        0.01 if judged else None, **params)  # fmt: skip
+    result.check(
+        "distance of the ends of the creases over their length",
+        apart,
+        reference=0.0,
+        source=source,
+        tolerance=0.01 if judged else None,
+        params=params,
+        path=found.path,
+    )
 
 
 def _profile(p: Pinched, name: str) -> Array:
@@ -180,17 +229,26 @@ def _plots(result: CaseResult, shown: dict[str, Pinched], creases: int, k: float
                 values = np.clip(values, -0.2, 0.2)
             series.append(line(label, u, values.tolist(), "reference" if label == "shell" else "line"))
         result.plots.append(
-            plot(f"pinch-shell-{name}-{creases}-{k:g}", f"{name.capitalize()}, {which}", "u / L", unit, series,
-                 "First crease; pinched to pi / 14 by a raised cosine of 20 mm.")
-        )  # fmt: skip
+            plot(
+                f"pinch-shell-{name}-{creases}-{k:g}",
+                f"{name.capitalize()}, {which}",
+                "u / L",
+                unit,
+                series,
+                "First crease; pinched to pi / 14 by a raised cosine of 20 mm.",
+            )
+        )
 
 
 def _notes(result: CaseResult) -> None:
     ratios = {
-        name: [c.value / c.reference for c in result.checks
-               if c.quantity == "total energy" and c.reference and c.params["formulation"] == name]
+        name: [
+            c.value / c.reference
+            for c in result.checks
+            if c.quantity == "total energy" and c.reference and c.params["formulation"] == name
+        ]
         for name in (BARS.name, CONSISTENT.name)
-    }  # fmt: skip
+    }
 
     def span(name: str, figures: int) -> str:
         return f"{min(ratios[name]):.{figures}f} to {max(ratios[name]):.{figures}f}"

@@ -15,7 +15,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ import bh
 import meshes
 from bh import Model, Path, Sheet, State, trace
 from bh.analysis.midplane import MidPlane, midplane
-from verification.framework.checks import CaseResult, Check, line, plot
+from verification.framework.checks import CaseResult, line, plot
 
 Array = NDArray[np.float64]
 LENGTH, SPACING, LSTAR = 100.0, 5.0, 2.0  # mm (5.3.2)
@@ -149,10 +148,21 @@ def pinched(
 
 def reached(result: CaseResult, every: Sequence[Pinched]) -> None:
     """How many of all simulations ended early, and what they took."""
-    add(result, None, "simulations that did not reach their end", float(sum(not p.reached for p in every)), "", 0.0,
-        "none unconverged with default settings", 0.0, simulations=len(every))  # fmt: skip
-    add(result, None, "time of all of them, one thread", sum(p.path.wall_time_s for p in every), "s", None,
-        "target: all of Chapter 5 in 180 s on two cores", simulations=len(every))  # fmt: skip
+    result.check(
+        "simulations that did not reach their end",
+        sum(not p.reached for p in every),
+        reference=0.0,
+        source="none unconverged with default settings",
+        tolerance=0.0,
+        params={"simulations": len(every)},
+    )
+    result.check(
+        "time of all of them, one thread",
+        sum(p.path.wall_time_s for p in every),
+        unit="s",
+        source="target: all of Chapter 5 in 180 s on two cores",
+        params={"simulations": len(every)},
+    )
 
 
 @dataclass(frozen=True)
@@ -169,30 +179,6 @@ def proportion(x: Sequence[float], y: Sequence[float]) -> Proportion:
     slope = float(a @ b / (a @ a))
     spread = float(((b - b.mean()) ** 2).sum())
     return Proportion(slope, 1.0 - float(((b - slope * a) ** 2).sum()) / max(spread, 1e-300))
-
-
-def add(
-    result: CaseResult,
-    found: Pinched | None,
-    quantity: str,
-    value: float,
-    unit: str,
-    reference: float | None,
-    source: str,
-    tolerance: float | None = None,
-    **params: Any,
-) -> None:
-    """One check; what it took and whether it was reached are those of `found`."""
-    cost: dict[str, Any] = {}
-    if found is not None:
-        path = found.path
-        cost = {
-            "unknowns": path.unknowns, "iterations": path.iterations, "wall_time_s": path.wall_time_s,
-            "outcome": path.outcome,
-        }  # fmt: skip
-    result.checks.append(
-        Check(result.name, quantity, params, value, unit, reference, source, tolerance, **cost)
-    )
 
 
 def angle_plots(

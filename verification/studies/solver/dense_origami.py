@@ -26,8 +26,13 @@ Law = Literal["quadratic", "published"]
 
 
 def _cross(a: NDArray, b: NDArray) -> NDArray:
-    return np.stack([a[..., (i + 1) % 3] * b[..., (i + 2) % 3] - a[..., (i + 2) % 3] * b[..., (i + 1) % 3]
-                     for i in range(3)], axis=-1)  # fmt: skip
+    return np.stack(
+        [
+            a[..., (i + 1) % 3] * b[..., (i + 2) % 3] - a[..., (i + 2) % 3] * b[..., (i + 1) % 3]
+            for i in range(3)
+        ],
+        axis=-1,
+    )
 
 
 def _dot(a: NDArray, b: NDArray) -> NDArray:
