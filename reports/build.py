@@ -17,17 +17,7 @@ from reports import words
 from reports.changes import MOST, changes
 from reports.claims import Claim, claims, claims_csv
 from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
-from reports.records import (
-    Case,
-    CaseInfo,
-    Frames,
-    Results,
-    known_cases,
-    read,
-    schema,
-    shortfall,
-    validated,
-)
+from reports.records import Case, CaseInfo, Frames, Results, known_cases, read, schema, shortfall, validated
 from verification.framework.chapters import CHAPTERS, OTHER, Chapter, chapter_of
 
 SOURCE = (

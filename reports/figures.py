@@ -167,11 +167,7 @@ def picture_link(file: Path) -> tuple[str, int, int]:
         shown = shown.resize((WIDEST, round(shown.height * WIDEST / shown.width)), Image.Resampling.LANCZOS)
     sink = io.BytesIO()
     shown.save(sink, "WEBP", quality=90, method=6)
-    return (
-        "data:image/webp;base64," + base64.b64encode(sink.getvalue()).decode(),
-        shown.width,
-        shown.height,
-    )
+    return ("data:image/webp;base64," + base64.b64encode(sink.getvalue()).decode(), shown.width, shown.height)
 
 
 # --- drawing --------------------------------------------------------------------------------------------------

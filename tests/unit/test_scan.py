@@ -15,8 +15,8 @@ import meshes
 from bh.applications import scan
 from meshes import InputError
 from meshes.errors import FileFormatError
-from verification.studies.ch3.scan import DENSITY, NOISE, corners, folded_sector, sampled, scanned
 from verification.studies.ch3.scan import MOTION as OF_THE_CASE
+from verification.studies.ch3.scan_clouds import DENSITY, NOISE, corners, folded_sector, sampled, scanned
 from verification.theory import cone
 
 Array = NDArray[np.float64]

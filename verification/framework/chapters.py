@@ -36,21 +36,9 @@ CHAPTERS = (
         "Bars and hinges",
         "Does the bar-and-hinge model reproduce the strips, cones, creases, stiffnesses and fans of the source?",
     ),
-    Chapter(
-        "4",
-        "Corrugations",
-        "How stiff are curved-crease corrugations in bending, in every direction?",
-    ),
-    Chapter(
-        "5",
-        "Pinching",
-        "Which shapes does a pinch give a creased sheet, and what do they resist?",
-    ),
-    Chapter(
-        "6",
-        "Inverse design",
-        "Which crease pattern folds to a wanted shape?",
-    ),
+    Chapter("4", "Corrugations", "How stiff are curved-crease corrugations in bending, in every direction?"),
+    Chapter("5", "Pinching", "Which shapes does a pinch give a creased sheet, and what do they resist?"),
+    Chapter("6", "Inverse design", "Which crease pattern folds to a wanted shape?"),
     Chapter(
         "A",
         "Isometric theory",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -147,55 +148,28 @@ def compare(
     params, cost = _common(actuation, along, member, solved, judge)
     one, two = (s.state.fold_angle("crease") for s in (solved, judge))
     source = "the shell on the same sheet"
-    result.check(
-        "mean fold angle",
-        one.mean(),
-        unit="rad",
-        reference=ANGLE,
-        source="B.3",
-        tolerance=1e-6,
-        params=params,
-        path=cost,
-    )
-    result.check(
+    check = partial(result.check, params=params, path=cost)
+    check("mean fold angle", one.mean(), unit="rad", reference=ANGLE, source="B.3", tolerance=1e-6)
+    check(
         "range of the fold angle along the crease",
         np.ptp(one),
         unit="rad",
         reference=float(np.ptp(two)),
         source=source,
-        params=params,
-        path=cost,
     )
-    result.check(
+    check(
         "root mean square difference of fold angles",
         np.sqrt(((one - two) ** 2).mean()),
         unit="rad",
         reference=0.0,
         source=source,
-        params=params,
-        path=cost,
     )
     largest, apart = crease_distance(solved, judge)
     near = 0.1 if member.tolerance is not None and actuation != "c-spring" else None  # mm
-    result.check(
-        "largest distance of crease nodes",
-        largest,
-        unit="mm",
-        reference=0.0,
-        source=source,
-        tolerance=near,
-        params=params,
-        path=cost,
+    check(
+        "largest distance of crease nodes", largest, unit="mm", reference=0.0, source=source, tolerance=near
     )
-    result.check(
-        "Hausdorff distance of the crease",
-        apart,
-        unit="mm",
-        reference=0.0,
-        source=source,
-        params=params,
-        path=cost,
-    )
+    check("Hausdorff distance of the crease", apart, unit="mm", reference=0.0, source=source)
 
 
 def crease_distance(solved: Solved, judge: Solved) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -117,45 +118,38 @@ def _checks(
     result: CaseResult, actuation: str, solved: Solved, grid: Grid | None, mesh: dict[str, Any]
 ) -> None:
     params = {"actuation": actuation, "how": ACTUATIONS[actuation], **mesh, "formulation": "shell"}
+    check = partial(result.check, params=params, path=solved)
     if grid is None:  # not reached: said once, with no figure
-        result.check(
-            "energy fields", math.nan, unit="N mm", source="source Fig. B.5", params=params, path=solved
-        )
+        check("energy fields", math.nan, unit="N mm", source="source Fig. B.5")
         return
     crease = np.abs(grid.r - CREASE) < NEAR
     edges = (grid.r - INNER < NEAR) | (OUTER - grid.r < NEAR)
     for kind, name in KINDS.items():
         held = float((grid.density[kind] * grid.area).sum())
-        result.check(
+        check(
             f"{name} energy of the field",
             held,
             unit="N mm",
             reference=getattr(solved.state.energy, kind),
             source="the state's own total; cells are sectors, triangles flat-edged",
             tolerance=2e-3,
-            params=params,
-            path=solved,
         )
         for rows, where in ((crease, "the crease"), (edges, "the inner and outer edges")):
-            result.check(
+            check(
                 f"part of the {name} energy within {NEAR} mm of {where}",
                 grid.part(kind, rows),
                 unit="1",
                 source="of the area it is 0.25",
-                params=params,
-                path=solved,
             )
     inside = np.abs(grid.r - 95.0) < NEAR
     middle = float((grid.along_r("bending")[inside] / _cone(grid.r[inside])).mean())
-    result.check(
+    check(
         "bending energy over the cone's, middle of the arc, inner panel",
         middle,
         unit="1",
         reference=1.0,
         source="1/2 D cot^2(phi / 2) / r^2, D with nu",
         tolerance=0.15 if actuation != "c-spring" else None,
-        params=params,
-        path=solved,
     )
 
 

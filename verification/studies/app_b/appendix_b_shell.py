@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -109,30 +110,15 @@ def record(
             path=cost,
         )
     angles = finest.state.fold_angle("crease")
-    result.check(
-        "mean fold angle",
-        angles.mean(),
-        unit="rad",
-        reference=ANGLE,
-        source="B.3",
-        tolerance=1e-6,
-        params=params,
-        path=cost,
-    )
+    check = partial(result.check, params=params, path=cost)
+    check("mean fold angle", angles.mean(), unit="rad", reference=ANGLE, source="B.3", tolerance=1e-6)
     moment = float(finest.state.crease_moment("crease").mean())
     if not math.isnan(finest.load):
         what = "couple a length of crease" if actuation == "b" else "force a length of crease"
         unit = "N" if actuation == "b" else "N/mm"
-        result.check(what, finest.load, unit=unit, source="not in the source", params=params, path=cost)
+        check(what, finest.load, unit=unit, source="not in the source")
     else:
-        result.check(
-            "mean moment a length of crease",
-            moment,
-            unit="N",
-            source="not in the source",
-            params=params,
-            path=cost,
-        )
+        check("mean moment a length of crease", moment, unit="N", source="not in the source")
 
 
 def _arcs(result: CaseResult, context: Context) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,28 +179,21 @@ def _claims(result: CaseResult, angle: float, found: Found) -> None:
             "formulation": BARS,
             "t_mm": SHEET.t,
         }
-        result.check(
-            "the coarsest mesh stores more than the cone",
-            curve[0][1] > 1.0,
-            reference=1.0,
-            tolerance=0.0,
-            params=params,
-        )
+        check = partial(result.check, params=params)
+        check("the coarsest mesh stores more than the cone", curve[0][1] > 1.0, reference=1.0, tolerance=0.0)
         near = _first(curve, lambda ratio: abs(ratio - 1.0) <= 0.1)
         below = _first(curve, lambda ratio: ratio < 1.0)
-        result.check(
+        check(
             "aspect ratio from which the energy is within 10 % of the cone",
             near,
             unit="alpha",
             source=SOURCE + ": above 7",
-            params=params,
         )
-        result.check(
+        check(
             "aspect ratio from which the energy is below that of the cone (0: none to 20)",
             below,
             unit="alpha",
             source=SOURCE + ": at sufficiently high ones",
-            params=params,
         )
     result.check(
         "the converged sheet stores less than the cone",
@@ -234,32 +228,27 @@ def _ends(result: CaseResult, sectors: dict[float, Found]) -> None:
                 continue
             params, last = mesh.params(angle), mesh == FINEST
             reference = None if last else lost_length(exact)
-            result.check(
+            check = partial(result.check, params=params, path=item.path)
+            check(
                 "length of cone that each free end lacks",
                 lost_length(item.density),
                 unit="mm",
                 reference=reference,
                 source=CONVERGED,
-                params=params,
-                path=item.path,
             )
-            result.check(
+            check(
                 "reach of a free end",
                 reach_of_end(item.density),
                 unit="mm",
                 reference=None if last else reach_of_end(exact),
                 source=CONVERGED,
-                params=params,
-                path=item.path,
             )
-            result.check(
+            check(
                 "energy density in the middle over that of the cone",
                 np.median(item.density),
                 reference=1.0,
                 source="Eq. 3.13: uniform along the crease",
                 tolerance=0.02 if last else None,
-                params=params,
-                path=item.path,
             )
         if angle != max(sectors):
             result.check(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -270,35 +271,32 @@ def _annulus(result: CaseResult, study: Study, found: Found, lengths: tuple[floa
         params: dict[str, Any] = {"formulation": formulation, "mesh": word}
         real = [k for k, Lstar in enumerate(lengths) if 25.0 <= Lstar <= 100.0]
         over = [k for k, rest in enumerate(study.rests) if rest > 90]
-        result.check(
+        check = partial(result.check, params={"sheet": study.name, **params})
+        check(
             "largest distance from the rest angle, L* 25 to 100 mm, rest angles over 90",
             off[np.ix_(real, over)].max(),
             unit="degrees",
             source=SOURCE + " (a, b): close",
-            params={"sheet": study.name, **params},
         )
-        result.check(
+        check(
             "distance from the rest angle 30 at L* = 1 mm",
             off[lengths.index(1.0), study.rests.index(30)],
             unit="degrees",
             source=SOURCE + " (a, b): the stiffest takes the prescribed angle",
-            params={"sheet": study.name, **params},
         )
-        result.check(
+        check(
             "smallest angle reached at the rest angle 0, L* from 1 mm",
             off[[k for k, Lstar in enumerate(lengths) if Lstar >= 1.0], study.rests.index(0)].min(),
             unit="degrees",
             source=SOURCE + " (a, b): all systems keep a finite distance from 0",
-            params={"sheet": study.name, **params},
         )
         finite = off[:, study.rests.index(0)]
-        result.check(
+        check(
             "every L* keeps a distance from the rest angle 0",
             (finite > 0.0).all(),
             reference=1.0,
             source=SOURCE + " (a, b)",
             tolerance=0.0 if word == "converged" else None,
-            params={"sheet": study.name, **params},
         )
 
 

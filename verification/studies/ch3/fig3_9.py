@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,35 +125,30 @@ def run(context: Context) -> CaseResult:
 
 
 def _claims(result: CaseResult, found: Tip, params: dict[str, object]) -> None:
-    result.check(
+    check = partial(result.check, params=params, path=found.cost)
+    check(
         "stiffest direction, out of the plane of the crease",
         found.elevation,
         unit="deg",
         reference=0.0,
         source=SOURCE + ": phi = 90 degrees",
         tolerance=1.0,
-        params=params,
-        path=found.cost,
     )
-    result.check(
+    check(
         "stiffest direction, azimuth",
         found.azimuth,
         unit="deg",
         reference=STIFFEST,
         source=SOURCE + ": about 80 and 260 degrees, sector angle not printed",
         tolerance=0.125,
-        params=params,
-        path=found.cost,
     )
     K = found.stiffness.matrix
-    result.check(
+    check(
         "asymmetry of the 3 x 3 stiffness",
         np.abs(K - K.T).max() / np.abs(K).max(),
         reference=0.0,
         source="reciprocity (Maxwell, Betti)",
         tolerance=1e-9,
-        params=params,
-        path=found.cost,
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,14 +21,25 @@ from bh.applications import scan
 from bh.errors import InputError
 from meshes.pattern import CreasePattern
 from verification.framework.checks import CaseResult, Context, line, plot
+from verification.studies.ch3.scan_clouds import (
+    DENSITY,
+    DIHEDRAL,
+    HOLES,
+    NOISE,
+    RADIUS,
+    STRAYS,
+    WIDTH,
+    corners,
+    folded_sector,
+    rotation_vector,
+    sampled,
+    scanned,
+    truncated_normal,
+)
 from verification.theory import cone
 
 Array = NDArray[np.float64]
 
-NOISE = 0.127  # mm, the scanner's accuracy, taken as the standard deviation of each coordinate
-DENSITY = 104.0 / 5.0  # points a mm^2: 10,400 a cm^2, of which the source keeps every fifth
-RADIUS, WIDTH, DIHEDRAL = 100.0, 10.0, 0.5 * math.pi
-STRAYS, HOLES = 0.05, (4.0, 5.0, 6.0)  # share of the points; radii in mm
 MOTION = ((0.4, -0.9, 1.3), (30.0, -20.0, 50.0))  # rotation vector, rad, and translation, mm
 SCANNER = "known motion; noise, density and every fifth point of source 3.4.3"
 SAME_MESH = "the consistent formulation on the same mesh and with the same L*"
@@ -57,52 +69,6 @@ def samples() -> tuple[Sample, ...]:
     )
 
 
-# ------------------------------------------------------------------------------------------------- clouds
-
-
-def sampled(state: bh.State, density: float, seed: int) -> Array:
-    """Points (k, 3) spread evenly at random over a sheet, `density` a mm^2."""
-    random = np.random.default_rng(seed)
-    p = state.points[state.mesh.triangles]
-    area = 0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    count = round(density * float(area.sum()))
-    chosen = p[random.choice(len(p), count, p=area / area.sum())]
-    u, v = random.random((2, count, 1))
-    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
-    points: Array = chosen[:, 0] + u * (chosen[:, 1] - chosen[:, 0]) + v * (chosen[:, 2] - chosen[:, 0])
-    return points
-
-
-def scanned(points: Array, seed: int, strays: float = STRAYS, holes: tuple[float, ...] = HOLES) -> Array:
-    """The points as a scanner gives them: noisy, with stray points in and around the sheet's box, and with holes."""
-    random = np.random.default_rng(seed)
-    centres = points[random.choice(len(points), len(holes), replace=False)]
-    seen = points + random.normal(0.0, NOISE, points.shape)
-    low, high = points.min(axis=0) - 10.0, points.max(axis=0) + 10.0
-    seen = np.vstack((seen, random.uniform(low, high, (round(strays * len(points)), 3))))
-    for centre, radius in zip(centres, holes, strict=True):
-        seen = seen[np.linalg.norm(seen - centre, axis=1) > radius]
-    return random.permutation(seen)
-
-
-def folded_sector(formulation: str, angle: float) -> bh.State:
-    """The annulus sector of App. B with its crease in its plane, folded to a right angle.
-
-    The consistent formulation gets four rows a panel: with one the free ends stray from the cones by 0.33 mm, with two
-    by 0.24, with four by 0.21.
-    """
-    rows, alpha = (4, 4.0) if formulation == "consistent" else (1, 8.0)
-    mesh = meshes.structured(meshes.annulus_sector(RADIUS, WIDTH, angle), aspect_ratio=alpha, rows=rows)
-    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), formulation=formulation)
-    model = model.support("crease:crease", "z").support("rigid-body").fold("crease", to=DIHEDRAL)
-    return bh.trace(model)[-1]
-
-
-def corners(state: bh.State) -> Array:
-    """(4, 3) corners of the sheet: what is picked."""
-    return state.points[[state.mesh.corners[name] for name in sorted(state.mesh.corners)]]
-
-
 # ------------------------------------------------------------------------------------------------- the case
 
 
@@ -122,18 +88,6 @@ def run(context: Context) -> CaseResult:
         _pattern(result, context, sample)
     _notes(result)
     return result
-
-
-def truncated_normal() -> tuple[float, float, float]:
-    """Root mean square, mean and median of |N(0, 1)| below `bh.scan`'s trim."""
-    trim = scan.TRIM
-    inside = math.erf(trim / math.sqrt(2.0))
-    density = math.exp(-0.5 * trim * trim)
-    square = 1.0 - math.sqrt(2.0 / math.pi) * trim * density / inside
-    mean = math.sqrt(2.0 / math.pi) * (1.0 - density) / inside
-    from scipy.special import erfinv
-
-    return math.sqrt(square), mean, math.sqrt(2.0) * float(erfinv(0.5 * inside))
 
 
 def _known_motion(result: CaseResult, context: Context, angle: float) -> None:
@@ -156,75 +110,43 @@ def _known_motion(result: CaseResult, context: Context, angle: float) -> None:
             "strays": STRAYS,
             "holes": len(HOLES),
         }
-        error = np.concatenate((left.apply(found.centre) - found.centre, _rotation_vector(left)))
+        error = np.concatenate((left.apply(found.centre) - found.centre, rotation_vector(left)))
         worst = float(np.abs(error / found.standard_error).max())
-        result.check(
-            "motion left, in its standard errors",
-            worst,
-            reference=0.0,
-            source=SCANNER,
-            tolerance=4.0,
-            params=params,
-        )
+        check = partial(result.check, params=params)
+        check("motion left, in its standard errors", worst, reference=0.0, source=SCANNER, tolerance=4.0)
         moved = np.linalg.norm(left.apply(state.points) - state.points, axis=1)
-        result.check(
+        check(
             "motion left, root mean square of the nodes",
             math.sqrt(float((moved**2).mean())),
             unit="mm",
             reference=0.0,
             source=SCANNER + "; half of the noise",
             tolerance=0.5 * NOISE,
-            params=params,
         )
         out = (left.apply(state.points) - state.points)[:, 2].mean()
         across = abs(float(out))
-        result.check(
+        check(
             "motion left across the crease plane",
             across,
             unit="mm",
             reference=0.0,
             source="5 noise / sqrt(n) / sin(phi/2)",
             tolerance=5.0 * NOISE / math.sqrt(len(cloud)) / math.sin(0.5 * DIHEDRAL),
-            params=params,
         )
         kept = scan.distances(found.motion.apply(cloud), state).of(found.kept)
         law = "normal noise, trimmed at 3 standard deviations"
-        result.check(
-            "root mean square distance",
-            found.noise,
-            unit="mm",
-            reference=square,
-            source=law,
-            tolerance=0.03,
-            params=params,
+        check(
+            "root mean square distance", found.noise, unit="mm", reference=square, source=law, tolerance=0.03
         )
-        result.check(
-            "mean distance", kept.mean, unit="mm", reference=mean, source=law, tolerance=0.03, params=params
-        )
-        result.check(
-            "median distance",
-            kept.median,
-            unit="mm",
-            reference=median,
-            source=law,
-            tolerance=0.03,
-            params=params,
-        )
-        result.check(
+        check("mean distance", kept.mean, unit="mm", reference=mean, source=law, tolerance=0.03)
+        check("median distance", kept.median, unit="mm", reference=median, source=law, tolerance=0.03)
+        check(
             "share of the scan that is kept",
             found.kept.mean(),
             reference=1.0 / (1.0 + STRAYS),
             source="all but the strays",
             tolerance=0.01,
-            params=params,
         )
-
-
-def _rotation_vector(motion: scan.Motion) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    vector: Array = Rotation.from_matrix(motion.rotation).as_rotvec()
-    return vector
 
 
 def _exact_cones(result: CaseResult, context: Context, angle: float) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from bh.mechanics.bars_and_hinges.stiffness import diagonal_factor, shear_exact_factor
@@ -34,11 +36,10 @@ def run(context: Context) -> CaseResult:
         slope, offset, r2 = _regression(alphas, ratios)
         judged = name == "cantilever"
         params = {"setting": name, "alpha": "1, 2, ..., 20"}
-        result.check("regression a2", slope, reference=0.5, tolerance=0.01 if judged else None, params=params)
-        result.check(
-            "regression a0", offset, reference=1.25, tolerance=0.02 if judged else None, params=params
-        )
-        result.check("regression R^2", r2, reference=1.0, tolerance=5e-4, params=params)
+        check = partial(result.check, params=params)
+        check("regression a2", slope, reference=0.5, tolerance=0.01 if judged else None)
+        check("regression a0", offset, reference=1.25, tolerance=0.02 if judged else None)
+        check("regression R^2", r2, reference=1.0, tolerance=5e-4)
     exact = np.array([shear_exact_factor(a) for a in alphas])
     worst = float(np.abs(settings["guided"] / exact - 1.0).max())
     result.check("guided ratio over (alpha + 1/alpha)^2/2", 1.0 + worst, reference=1.0, tolerance=1e-9)

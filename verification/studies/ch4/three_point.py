@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 from bh.applications.corrugation import (
@@ -84,11 +85,10 @@ def _test(result: CaseResult, sheet: Folded, name: str, support: str, params: di
     where = {**params, "supports": support, "about": name}
     took = Cost.of(test.path, wall_time_s=wall, outcome="reached" if test.converged else test.outcome)
     published = PUBLISHED.get((params["kind"], name))
-    result.check(
-        "stiffness, second stage", test.stiffness, unit="N/mm", reference=published, params=where, path=took
-    )
-    result.check("R^2 of the regression", test.r2, reference=1.0, params=where, path=took)
-    result.check("first peak of the load", test.peak, unit="N", params=where, path=took)
+    check = partial(result.check, params=where, path=took)
+    check("stiffness, second stage", test.stiffness, unit="N/mm", reference=published)
+    check("R^2 of the regression", test.r2, reference=1.0)
+    check("first peak of the load", test.peak, unit="N")
     went = float(
         test.displacement[-1]
     )  # less than asked where the test stopped before; the stiffness then says so
@@ -137,16 +137,15 @@ def _claims(
     if len(kinds) < len(ORDER):
         return
     lowest = float(all(ratios["straight"] < ratios[kind] for kind in ORDER[1:]))
-    result.check("straight is the least isotropic", lowest, reference=1.0, params=where)
+    check = partial(result.check, params=where)
+    check("straight is the least isotropic", lowest, reference=1.0)
     order = float(in_order(ratios))
-    result.check("pairs of ten in the order of the measured ratios", order, reference=10.0, params=where)
+    check("pairs of ten in the order of the measured ratios", order, reference=10.0)
     for name in ("x", "y"):
         firmest = min(stiffness[kind, support, name] for kind in EDGE) > max(
             stiffness[kind, support, name] for kind in POINT
         )
-        result.check(
-            f"edge patterns stiffer than point patterns about {name}", firmest, reference=1.0, params=where
-        )
+        check(f"edge patterns stiffer than point patterns about {name}", firmest, reference=1.0)
     x = [float(k) for k in range(len(ORDER))]
     result.plots.append(
         plot(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -79,21 +80,19 @@ def run_bottom_up(context: Context) -> CaseResult:
             values = {name: between(sheet, azimuth).about(azimuth) for name, azimuth in AZIMUTHS.items()}
             ratios[kind] = values["x"] / values["y"]
             exact = _unit() if kind == "straight" else None
+            check = partial(result.check, params={**params, "kind": kind})
             for name, value in values.items():
                 wanted = None if exact is None else exact * abs(math.sin(AZIMUTHS[name]))
-                result.check(
+                check(
                     f"I_loc about {name}, between the supports",
                     value,
                     unit="mm^4",
                     reference=wanted,
                     tolerance=None if wanted is None else 1e-3,
-                    params={**params, "kind": kind},
                 )
-            result.check("I_loc,x of the whole sheet", whole.x, unit="mm^4", params={**params, "kind": kind})
-            result.check("I_loc,y of the whole sheet", whole.y, unit="mm^4", params={**params, "kind": kind})
-            result.check(
-                "bars without a valley on both sides", whole.skipped, params={**params, "kind": kind}
-            )
+            check("I_loc,x of the whole sheet", whole.x, unit="mm^4")
+            check("I_loc,y of the whole sheet", whole.y, unit="mm^4")
+            check("bars without a valley on both sides", whole.skipped)
         _order(result, ratios, params, source)
     result.notes.append(
         "Bars of mountain creases whose two nodes lie over the supports of the tests (more than 25 mm from the middle) "
@@ -125,17 +124,17 @@ def _unit() -> float:
 
 
 def _order(result: CaseResult, ratios: dict[str, float], params: dict[str, object], source: str) -> None:
-    result.check(
+    check = partial(result.check, params=params)
+    check(
         "pairs of ten in the order of the measured ratios",
         in_order(ratios),
         reference=10.0,
         source="source 4.5.2",
-        params=params,
     )
     lowest = all(ratios["straight"] < ratios[kind] for kind in ORDER[1:])
-    result.check("straight has the lowest ratio", lowest, reference=1.0, tolerance=0.0, params=params)
+    check("straight has the lowest ratio", lowest, reference=1.0, tolerance=0.0)
     edges = min(ratios[kind] for kind in EDGE) > max(ratios[kind] for kind in POINT)
-    result.check("edge patterns have higher ratios than point patterns", edges, reference=1.0, params=params)
+    check("edge patterns have higher ratios than point patterns", edges, reference=1.0)
 
 
 def _polar(result: CaseResult, count: int) -> None:

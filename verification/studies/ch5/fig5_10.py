@@ -6,16 +6,7 @@ from typing import Any
 
 from bh import Sheet
 from verification.framework.checks import CaseResult, Context
-from verification.studies.ch5.pinching import (
-    NEARLY,
-    SHEET,
-    WAYS,
-    Pinched,
-    Way,
-    angle_plots,
-    pinched,
-    reached,
-)
+from verification.studies.ch5.pinching import NEARLY, SHEET, WAYS, Pinched, Way, angle_plots, pinched, reached
 
 STIFFNESS = (250.0, 500.0, 1000.0, 1500.0, 2000.0, 3000.0, 4000.0)  # E t^3, N mm
 CURVATURES = (0.0, 0.005, 0.01)  # 1/mm

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from verification.framework.checks import CaseResult, Context
@@ -83,30 +84,23 @@ def _claims(result: CaseResult, way: Way, level: int, found: Found) -> None:
         if k == 0.0:
             continue
         bend = proportion(SPACINGS, [at[w].bend for w in SPACINGS])
-        result.check(
+        check = partial(result.check, params=params)
+        check(
             "bend against spacing, R^2 of proportionality",
             bend.r2,
             reference=1.0,
             source=SOURCE + ": proportional",
             tolerance=0.05 if way is SAME_CELLS else None,
-            params=params,
         )
-        result.check("bend over spacing", bend.slope, unit="deg/mm", params=params)
+        check("bend over spacing", bend.slope, unit="deg/mm")
         rising = [at[w].bend for w in SPACINGS]
         judged = 0.0 if way is not CONVERGED and level == 0 else None
-        result.check(
-            "bend grows with spacing",
-            rising == sorted(rising),
-            reference=1.0,
-            tolerance=judged,
-            params=params,
-        )
+        check("bend grows with spacing", rising == sorted(rising), reference=1.0, tolerance=judged)
         twist = [abs(at[w].twist) for w in SPACINGS]
-        result.check(
+        check(
             "twist at 8 mm over that at 2 mm",
             twist[-1] / twist[0],
             source=SOURCE + ": grows less than in proportion (4)",
-            params=params,
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -104,47 +105,38 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: dict[flo
         c = p.crease
         where = {**params, "kappa_0_per_mm": k}
         before = float(np.median(folded_curvature(p)))
-        result.check(
+        check = partial(result.check, params=where, path=p.path)
+        check(
             "smallest dihedral angle",
             p.path[-1].dihedral("crease").min(),
             unit="rad",
             reference=PINCHED,
             source="imposed (5.3.2)",
             tolerance=1e-9,
-            params=where,
-            path=p.path,
         )
-        result.check(
+        check(
             "curvature of the folded crease over that of Eq. 5.3",
             before / (k * math.sqrt(2.0)),
             reference=1.0,
             source="isometric at 90 degrees",
             tolerance=0.1,
-            params=where,
-            path=p.path,
         )
-        result.check(
+        check(
             "largest curvature beyond the pinch over the folded one",
             p.peak(c.curvature)[0] / before,
             source=SOURCE + ": increases drastically",
-            params=where,
-            path=p.path,
         )
         inside = p.inside(c.curvature)
-        result.check(
+        check(
             "curvature in the middle of the pinch over its largest on the crease",
             inside[len(inside) // 2] / max(c.curvature[_off_ends(p)].max(), 1e-300),
             source=SOURCE + ": reduced inside the pinched zone",
-            params=where,
-            path=p.path,
         )
-        result.check(
+        check(
             "distance beyond the zone over which the change of the dihedral angle falls to 1 / e",
             reach(p),
             unit="mm",
             source=SOURCE + ", Fig. 5.5 (a)",
-            params=where,
-            path=p.path,
         )
 
 
@@ -249,32 +241,16 @@ def _grip(result: CaseResult) -> None:
         alpha = mesh[0] / mesh[1] / 20.0
         excess = (alpha + 1.0 / alpha) ** 2
         note = f"consistent with the same grip, 100 x 2; strips in torsion: {excess:.0f} times too stiff"
-        result.check(
+        check = partial(result.check, params=params, path=p.path)
+        check(
             "total energy",
             p.path[-1].energy.total,
             unit="N mm",
             reference=exact.path[-1].energy.total,
             source=note,
-            params=params,
-            path=p.path,
         )
-        result.check(
-            "reach of the pinch along the crease",
-            reach(p),
-            unit="mm",
-            source=note,
-            params=params,
-            path=p.path,
-        )
-        result.check(
-            "change of the bending angle",
-            p.bend,
-            unit="deg",
-            reference=exact.bend,
-            source=note,
-            params=params,
-            path=p.path,
-        )
+        check("reach of the pinch along the crease", reach(p), unit="mm", source=note)
+        check("change of the bending angle", p.bend, unit="deg", reference=exact.bend, source=note)
 
 
 def _couples(result: CaseResult) -> None:
@@ -296,48 +272,19 @@ def _couples(result: CaseResult) -> None:
                 "kappa_0_per_mm": 0.01,
             }
             smallest = float(p.path[-1].dihedral("crease").min())
-            result.check(
+            check = partial(result.check, params=params, path=p.path)
+            check(
                 "smallest dihedral angle",
                 smallest,
                 unit="rad",
                 reference=PINCHED,
                 source="reached by couples",
                 tolerance=1e-3,
-                params=params,
-                path=p.path,
             )
-            result.check(
-                "total energy",
-                p.path[-1].energy.total,
-                unit="N mm",
-                source="by couples",
-                params=params,
-                path=p.path,
-            )
-            result.check(
-                "reach of the pinch along the crease",
-                reach(p),
-                unit="mm",
-                source="by couples",
-                params=params,
-                path=p.path,
-            )
-            result.check(
-                "change of the bending angle",
-                p.bend,
-                unit="deg",
-                source="by couples",
-                params=params,
-                path=p.path,
-            )
-            result.check(
-                "change of the twist angle",
-                p.twist,
-                unit="deg",
-                source="by couples",
-                params=params,
-                path=p.path,
-            )
+            check("total energy", p.path[-1].energy.total, unit="N mm", source="by couples")
+            check("reach of the pinch along the crease", reach(p), unit="mm", source="by couples")
+            check("change of the bending angle", p.bend, unit="deg", source="by couples")
+            check("change of the twist angle", p.twist, unit="deg", source="by couples")
 
 
 def _flattening(result: CaseResult) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from verification.framework.checks import CaseResult, Context
@@ -84,10 +85,12 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
     odd, even = NUMBERS[::2], NUMBERS[1::2]
     judged = 0.0 if mesh == way.judged else None
 
+    check = partial(result.check, params=params)
+
     def claim(quantity: str, holds: bool, of_both: bool = True) -> None:
         """Those that hold with the source's model only are reported of the other one."""
         tolerance = judged if of_both or way is AS_SOURCE else None
-        result.check(quantity, holds, reference=1.0, tolerance=tolerance, params=params)
+        check(quantity, holds, reference=1.0, tolerance=tolerance)
 
     for most in (4, 7):
         claim(
@@ -101,14 +104,13 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
         all(abs(get[n, 0.005].twist) > abs(get[m, 0.005].twist) for n in even for m in (n - 1, n + 1)),
     )
     flat = max(abs(get[n, 0.0].twist) for n in odd)
-    result.check(
+    check(
         "largest twist of an odd number of straight creases",
         flat,
         unit="deg",
         reference=0.0,
         source=SOURCE + ": none",
         tolerance=0.05 if judged is not None else None,
-        params=params,
     )
     for name, numbers in (("odd", odd[1:]), ("even", even)):
         sizes = [abs(get[n, 0.01].twist) for n in numbers]
@@ -126,12 +128,11 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
             params={"kappa_0_per_mm": k, **params},
         )
     ratio = sum(get[n, 0.01].bend / get[n, 0.005].bend for n in NUMBERS) / len(NUMBERS)
-    result.check(
+    check(
         "bend at 0.01 /mm over that at 0.005 /mm, mean",
         ratio,
         reference=2.0,
         source="proportional to kappa_0",
-        params=params,
     )
 
 

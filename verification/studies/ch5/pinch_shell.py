@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -140,58 +141,49 @@ def _compare(
 ) -> None:
     source = "shell, finest mesh of this case"
     mine, its = found.path[-1].energy, judge.path[-1].energy
+    check = partial(result.check, params=params, path=found.path)
     for name in ("total", "bending", "stretching", "folding"):
-        result.check(
+        check(
             f"{name} energy",
             getattr(mine, name),
             unit="N mm",
             reference=getattr(its, name),
             source=source,
             tolerance=0.1 if judged and name in ("total", "bending") else None,
-            params=params,
-            path=found.path,
         )
-    result.check(
+    check(
         "change of the bending angle",
         found.bend,
         unit="deg",
         reference=judge.bend,
         source=source,
         tolerance=0.03 if judged else None,
-        params=params,
-        path=found.path,
     )
-    result.check(
+    check(
         "change of the twist angle",
         found.twist,
         unit="deg",
         reference=judge.twist,
         source=source,
         tolerance=0.1 if judged and abs(judge.twist) > SMALL else None,
-        params=params,
-        path=found.path,
     )
     for name in ("curvature", "torsion"):
         a, b = (_profile(p, name) for p in (found, judge))
         apart = float(np.sqrt(np.mean((a - b) ** 2)) / np.abs(b).max())
-        result.check(
+        check(
             f"{name} along the crease, root mean square difference over the largest",
             apart,
             reference=0.0,
             source=source,
             tolerance={"curvature": 0.03}.get(name) if judged else None,
-            params=params,
-            path=found.path,
         )
     apart = end_distance(found, judge)
-    result.check(
+    check(
         "distance of the ends of the creases over their length",
         apart,
         reference=0.0,
         source=source,
         tolerance=0.01 if judged else None,
-        params=params,
-        path=found.path,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -131,26 +132,18 @@ def _interpolation(result: CaseResult, count: int) -> None:
             )
         )
     seconds = (time.perf_counter() - began) / count
+    check = partial(result.check, params={"segments": count})
     for name, values, unit in (("position", off, "mm"), ("orientation", turned, "deg")):
-        result.check(
+        check(
             f"interpolated {name} off the grid, 95th percentile",
             np.percentile(values, 95),
             unit=unit,
             reference=0.0,
             source="simulation of the segment",
             tolerance=0.3,
-            params={"segments": count},
         )
-        result.check(
-            f"interpolated {name} off the grid, largest", max(values), unit=unit, params={"segments": count}
-        )
-    result.check(
-        "one simulated segment",
-        seconds,
-        unit="s",
-        source="source: 4,131 in a couple of hours",
-        params={"segments": count},
-    )
+        check(f"interpolated {name} off the grid, largest", max(values), unit=unit)
+    check("one simulated segment", seconds, unit="s", source="source: 4,131 in a couple of hours")
 
 
 def _strips(result: CaseResult, count: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,14 +31,14 @@ def run(context: Context) -> CaseResult:
     best: dict[str, Any] = {}
     for name, target in CURVES.items():
         context.tell(f"problem_a: {name}")
-        result.check(
+        check = partial(result.check, params={"curve": name})
+        check(
             "arc length",
             arc_length(target),
             unit="mm",
             reference=300.0,
             source="Eq. 6.17 to 6.19",
             tolerance=3e-4,
-            params={"curve": name},
         )
         began = time.perf_counter()
         found = fit_curve(target, most, Polished(Genetic(60, 20)))
@@ -51,27 +52,19 @@ def run(context: Context) -> CaseResult:
                 params={"curve": name, "n": n},
             )
         falls = float((np.diff(errors[name]) <= 0.0).all())
-        result.check(
-            "errors do not grow with n",
-            falls,
-            reference=1.0,
-            source=CURVES_IN,
-            tolerance=0.0,
-            params={"curve": name},
-        )
+        check("errors do not grow with n", falls, reference=1.0, source=CURVES_IN, tolerance=0.0)
         result.check(
             "two segments over one, error",
             errors[name][1] / errors[name][0],
             source=CURVES_IN + ": one is much worse",
             params={"curve": name, "seconds": time.perf_counter() - began},
         )
-        result.check(
+        check(
             "two segments have less than a quarter of the error of one",
             errors[name][1] < 0.25 * errors[name][0],
             reference=1.0,
             source=CURVES_IN,
             tolerance=0.0,
-            params={"curve": name},
         )
     worse = all(s > c for s, c in zip(errors["spiral"][:3], errors["cosine"][:3], strict=True))
     result.check(
@@ -154,36 +147,26 @@ def run_b(context: Context) -> CaseResult:
                 "pinched": [int(f) for f in design.pinched],
             },
         )
-        result.check(
-            "the rules allow it",
-            top.allowed,
-            reference=1.0,
-            source="Eq. 6.21",
-            tolerance=0.0,
-            params={"n": n},
-        )
+        check = partial(result.check, params={"n": n})
+        check("the rules allow it", top.allowed, reference=1.0, source="Eq. 6.21", tolerance=0.0)
         after, before = (
             simulate(*design.lists()),
             simulate(design.k0.tolist(), design.length.tolist(), [False] * n),
         )
         whole = float(np.linalg.norm(after.t - before.t))
-        result.check(
+        check(
             "the same of the whole simulated strip",
             whole,
             unit="mm",
             reference=moved[n - 1],
             source=TIP,
             tolerance=0.02,
-            params={"n": n},
         )
-        result.check(
-            "the first segment is pinched", design.pinched[0], reference=1.0, source=TIP, params={"n": n}
-        )
-        result.check(
+        check("the first segment is pinched", design.pinched[0], reference=1.0, source=TIP)
+        check(
             "sector angle of the first segment over half a turn",
             abs(problem.surrogate.domain.curvature(design.k0[0])) * design.length[0] / np.pi,
             source=TIP + ": moderately curved, long",
-            params={"n": n},
         )
     steps = np.diff([0.0, *moved])
     result.check(

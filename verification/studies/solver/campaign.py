@@ -229,10 +229,7 @@ def judged(found: Sequence[Result]) -> CaseResult:
             unit="s",
             source="measured",
         )
-    groups = {
-        "reached": reached,
-        "not reached": [r for r in found if r.outcome != "reached"],
-    }
+    groups = {"reached": reached, "not reached": [r for r in found if r.outcome != "reached"]}
     series = [
         line(name, [r.unknowns for r in group], [r.wall_time_s for r in group], "points")
         for name, group in groups.items()

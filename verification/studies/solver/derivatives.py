@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,10 +65,7 @@ def hinge_errors(x: Array) -> tuple[float, float]:
     H = kinematics.dihedral_hessians(x, HINGE)[0]
     g_fd = central_difference(lambda y: kinematics.dihedral_angles(y, HINGE)[0], x, step)
     H_fd = central_difference(lambda y: kinematics.dihedral_gradients(y, HINGE)[0], x, step)
-    return (
-        float(np.abs(g - g_fd).max() / np.abs(g).max()),
-        float(np.abs(H - H_fd).max() / np.abs(H).max()),
-    )
+    return (float(np.abs(g - g_fd).max() / np.abs(g).max()), float(np.abs(H - H_fd).max() / np.abs(H).max()))
 
 
 def random_rotation(rng: np.random.Generator) -> Array:
@@ -193,24 +191,16 @@ def run(context: Context) -> CaseResult:
         change = abs(kinematics.dihedral_angles(x, HINGE)[0] - kinematics.dihedral_angles(moved, HINGE)[0])
         g = kinematics.dihedral_gradients(x, HINGE)[0].reshape(4, 3)
         scale = np.abs(g).max()
-        result.check(
-            "angle under rigid motion, change in rad",
-            change,
-            reference=0.0,
-            tolerance=1e-11,
-            params={"hinge": name},
-        )
-        result.check(
+        check = partial(result.check, params={"hinge": name})
+        check("angle under rigid motion, change in rad", change, reference=0.0, tolerance=1e-11)
+        check(
             "gradient on translations, relative",
             np.abs(g.sum(axis=0)).max() / scale,
             reference=0.0,
             tolerance=1e-12,
-            params={"hinge": name},
         )
         torque = np.abs(np.cross(x, g).sum(axis=0)).max() / (scale * np.abs(x).max())
-        result.check(
-            "gradient on rotations, relative", torque, reference=0.0, tolerance=1e-12, params={"hinge": name}
-        )
+        check("gradient on rotations, relative", torque, reference=0.0, tolerance=1e-12)
     context.tell("derivatives: systems")
     for name, error in system_errors().items():
         result.check(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -144,37 +145,34 @@ def run(context: Context) -> CaseResult:
     reached = [f for f in found if f.outcome == "reached"]
     params = {"scenes": count, "allowed": ALLOWED}
     misses = 1 if context.quick else SCENES - ENOUGH
-    result.check(
+    check = partial(result.check, params=params)
+    check(
         "scenes whose error is at most 1.5 times the estimate",
         honest,
         unit="scenes",
         reference=float(count),
         source="asked: 38 of 40",
         tolerance=misses / count,
-        params=params,
     )
-    result.check(
+    check(
         "scenes whose estimate is within what was asked",
         met,
         unit="scenes",
         reference=float(count),
         source="the others say so",
-        params=params,
     )
-    result.check(
+    check(
         "scenes whose error is within what was asked",
         sum(f.error <= f.item.goal.within for f in reached),
         unit="scenes",
         reference=float(count),
         source=SHELL,
-        params=params,
     )
-    result.check(
+    check(
         "error over estimate, median",
         np.median([f.error / f.accuracy.estimate for f in reached]),
         unit="1",
         source=SHELL,
-        params=params,
     )
     series = [
         line(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -66,44 +67,37 @@ def pinch(result: CaseResult) -> None:
         last = path[-1]
         params = {"kappa_0_per_mm": kappa_0, "L_mm": length, "t_mm": t}
         phi = last.dihedral("crease")
-        result.check(
+        check = partial(result.check, params=params, path=path)
+        check(
             "pinch: total energy",
             last.energy.total,
             unit="N mm",
             reference=fine[-1].energy.total,
             source="four times finer increments",
             tolerance=1e-7,
-            params=params,
-            path=path,
         )
-        result.check(
+        check(
             "pinch: smallest dihedral angle",
             phi.min(),
             unit="rad",
             reference=PINCHED,
             source="imposed (5.3.2)",
             tolerance=1e-9,
-            params=params,
-            path=path,
         )
-        result.check(
+        check(
             "pinch: largest difference between both halves",
             np.abs(phi - phi[::-1]).max(),
             unit="rad",
             reference=0.0,
             source="mirror symmetry",
             tolerance=1e-7,
-            params=params,
-            path=path,
         )
-        result.check(
+        check(
             "pinch: at most 60 iterations",
             path.iterations <= 60,
             reference=1.0,
             source="target",
             tolerance=0.0,
-            params=params,
-            path=path,
         )
         if t == 0.5 and kappa_0 > 0.0:
             curvature = crease_curvature(last.crease_points("crease"))

@@ -9,6 +9,7 @@ is closed.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,45 +94,38 @@ def roll_up(result: CaseResult) -> None:
         exact = [rolled.chord(LENGTH, rolled.curvature(EI, lam * CLOSING)) for lam in path.lambdas]
         found = ends(path)
         errors.append(float(np.abs(found - exact).max() / LENGTH))
-        result.check(
+        check = partial(result.check, params={"along": along}, path=path)
+        check(
             "roll-up: largest distance of the end from the elastica, over the length",
             errors[-1],
             reference=0.0,
             source=source,
             tolerance=0.01 if judged else None,
-            params={"along": along},
-            path=path,
         )
         middle = strip[np.abs(path.model.mesh.points[:-3, 1]) < 1e-9]
-        result.check(
+        check(
             "roll-up: radius of the closed circle",
             circle_radius(middle),
             unit="mm",
             reference=LENGTH / (2.0 * math.pi),
             source=source,
             tolerance=0.01 if judged else None,
-            params={"along": along},
-            path=path,
         )
         turn = path[-1].fold_angle("fold") - path[0].fold_angle("fold")
-        result.check(
+        check(
             "roll-up: turn of both ends",
             turn.sum(),
             unit="rad",
             reference=2.0 * math.pi,
             source=source,
             tolerance=0.01 if judged else None,
-            params={"along": along},
-            path=path,
         )
-        result.check(
+        check(
             "roll-up: stretching over bending energy",
             path[-1].energy.stretching / path[-1].energy.bending,
             reference=0.0,
             source="inextensible",
             tolerance=1e-3 if judged else None,
-            params={"along": along},
-            path=path,
         )
         series.append(
             line(

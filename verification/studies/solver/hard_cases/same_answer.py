@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -105,29 +106,24 @@ def same_answer(result: CaseResult) -> None:
             total = base.energy.total
             apart = [other.energy.as_dict()[k] / view.scale - v for k, v in base.energy.as_dict().items()]
             params = {"seen": view.name, "crease": how}
-            result.check(
+            check = partial(result.check, params=params, path=path)
+            check(
                 "same answer: largest difference of an energy over the total",
                 float(np.abs(apart).max()) / total,
                 reference=0.0,
                 source="invariance",
                 tolerance=SAME,
-                params=params,
-                path=path,
             )
             moved = np.abs(view.back(other.points, new) - base.points).max() / mesh.size
-            result.check(
+            check(
                 "same answer: largest distance of a node over the size",
                 moved,
                 reference=0.0,
                 source="invariance",
                 tolerance=SAME,
-                params=params,
-                path=path,
             )
-            result.check(
+            check(
                 "same answer: iterations more than as drawn",
                 path.iterations - first.iterations,
                 source="reported",
-                params=params,
-                path=path,
             )
