@@ -41,6 +41,7 @@ class Page:
 
     @property
     def file(self) -> str:
+        """Its name beside the other chapters."""
         return f"{self.chapter.page}.html"
 
     @property
@@ -51,6 +52,7 @@ class Page:
 
     @property
     def scenes(self) -> bool:
+        """Whether it has sheets to be turned."""
         return any(case.scenes for case in self.cases)
 
 
@@ -106,6 +108,7 @@ class Site:
     """
 
     def __init__(self, folder: Path, chapters: str, front: str, *, whole: bool = False) -> None:
+        """Read the results of a folder; `ReportError` where they are missing or not valid."""
         self.whole, self.chapters, self.front = whole, chapters, front
         self.results = read(folder / "checks.json")
         self.cases = _cases(self.results, folder)
@@ -118,6 +121,7 @@ class Site:
 
     @property
     def scenes(self) -> bool:
+        """Whether any page has sheets to be turned."""
         return any(page.scenes for page in self.pages)
 
     def _page(self, chapter: Chapter) -> Page:

@@ -29,6 +29,7 @@ class Claim:
 
     @property
     def place(self) -> str:
+        """Where the source says it: chapter, figure, equation."""
         return (self.check.source or "").removeprefix(PREFIX).partition(": ")[0]
 
     @property
@@ -48,6 +49,7 @@ class Claim:
 
     @property
     def verdict(self) -> str:
+        """One of "holds", "differs" and "reported"."""
         return {True: "holds", False: "differs", None: "reported"}[self.check.passed]
 
 

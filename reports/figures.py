@@ -211,7 +211,7 @@ def _draw(axes: Axes, plot: Plot) -> None:
 
 
 def _values(values: Sequence[float | None], log: bool) -> list[float]:
-    """nan where there is nothing to draw."""
+    """Values to draw, nan where there is nothing to draw."""
     return [math.nan if v is None or (log and v <= 0.0) else float(v) for v in values]
 
 
@@ -311,6 +311,7 @@ def markup(text: str) -> str:
 
 
 def superscript(number: int) -> str:
+    """A whole number as superscript characters."""
     return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
@@ -320,7 +321,7 @@ def scientific(mantissa: str, power: int) -> str:
 
 
 def _inline(text: str, plot: Plot, prefix: str) -> str:
-    """matplotlib's file as an element: no prolog, no name spaces, ids of its own, the page's colours and font."""
+    """The file of matplotlib as an element: no prolog, no name spaces, ids of its own, the page's colours and font."""
     body = text[text.index("<svg") :]
     body = body[body.index(">") + 1 :]
     body = re.sub(r"<(metadata|style)\b.*?</\1>|<!--.*?-->", "", body, flags=re.DOTALL)

@@ -38,6 +38,7 @@ class Check(Record):
 
     @property
     def result(self) -> str:
+        """In words: "pass", "failed" with the outcome where that is why, or "reported"."""
         if self.passed is None:
             return "reported"
         if self.passed:
@@ -144,10 +145,12 @@ class Case:
 
     @property
     def name(self) -> str:
+        """As `bh verify` takes it."""
         return self.info.name
 
     @property
     def title(self) -> str:
+        """Its heading; the name where the case says none."""
         return self.info.title or self.name
 
     @property
@@ -156,10 +159,12 @@ class Case:
         return "case-" + "".join(letter if letter.isalnum() else "-" for letter in self.name)
 
     def count(self, passed: bool | None) -> int:
+        """How many records are passed (True), failed (False) or reported only (None)."""
         return sum(check.passed is passed for _, check in self.checks)
 
     @property
     def judged(self) -> int:
+        """How many records have a tolerance or did not reach their target."""
         return self.count(True) + self.count(False)
 
     @property

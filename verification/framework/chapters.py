@@ -1,5 +1,6 @@
-"""The chapters of the source that the cases belong to, and the pages of the report; a case says where it belongs in
-`verification.framework.cases`.
+"""The chapters of the source that the cases belong to, and the pages of the report.
+
+A case says where it belongs in `verification.framework.cases`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ class Chapter:
 
     @property
     def name(self) -> str:
-        """ "Chapter 3", "Appendix B", "Solver"."""
+        """As in "Chapter 3", "Appendix B", "Solver"."""
         if self.key.isdigit():
             return f"Chapter {self.key}"
         return f"Appendix {self.key}" if len(self.key) == 1 else self.key.capitalize()

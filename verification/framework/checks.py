@@ -72,6 +72,7 @@ class Check(Record):
     passed: bool | None = field(init=False)
 
     def __post_init__(self) -> None:
+        """Error and verdict follow from the figures."""
         object.__setattr__(self, "error", self._error())
         object.__setattr__(self, "passed", self._passed())
 
@@ -176,7 +177,7 @@ class CaseResult:
 
     @property
     def verdict(self) -> str:
-        """ "holds" if every check with a tolerance passed, "differs" if one did not, "reported" if none has one."""
+        """One of "holds" (every check with a tolerance passed), "differs" (one did not), "reported" (none has one)."""
         judged = [check.passed for check in self.checks if check.passed is not None]
         if not judged:
             return "reported"

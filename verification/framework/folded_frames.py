@@ -39,8 +39,20 @@ def by_every_formulation(
     params: dict[str, Any],
     tolerance: float,
 ) -> dict[str, Path]:
-    """A sheet folded in frames by every formulation, `model` of its name, rows a side and mesh pattern, and compared
-    with the shell: the consistent one within a tolerance, bars and hinges without."""
+    """A sheet folded in frames by every formulation, and compared with the shell.
+
+    Args:
+        result: where the energies go.
+        context: of the case.
+        name: of the sheet, for the progress.
+        model: the model by the name of a formulation, rows a side and mesh pattern.
+        fold: the model folded by a share of the whole fold.
+        params: of every check.
+        tolerance: relative, on the total energy of the consistent formulation; bars and hinges are reported only.
+
+    Returns:
+        the paths by formulation.
+    """
     paths: dict[str, Path] = {}
     for formulation, (rows, kind) in MESHES.items():
         context.tell(f"{result.name}: {name}, {formulation}")

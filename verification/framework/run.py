@@ -30,7 +30,7 @@ def run(
     cases: Sequence[str] | None,
     folder: Path,
     quick: bool = False,
-    report: Callable[[str], None] = lambda text: None,
+    report: Callable[[str], None] = lambda _text: None,
     jobs: int = 1,
 ) -> dict[str, Any]:
     """Run the named cases (all if None) and write `folder`/checks.json and the pictures, `jobs` cases at a time.
@@ -92,7 +92,7 @@ def _results(
 
 def _silent(name: str, folder: Path, quick: bool) -> CaseResult:
     """A case in a process of its own; what it tells on the way would mix with what others tell."""
-    return _timed(name, Context(folder, quick, lambda text: None))
+    return _timed(name, Context(folder, quick, lambda _text: None))
 
 
 def _timed(name: str, context: Context) -> CaseResult:

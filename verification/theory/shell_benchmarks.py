@@ -37,6 +37,8 @@ def grid(place: Callable[[Array, Array], Array], along: int, across: int, turned
 
     Args:
         place: maps (k,) parameters u along and v across to (k, 2) points.
+        along: cells in the direction of u.
+        across: cells in the direction of v.
         turned: True where `place` reverses the orientation.
 
     Edge sets: "edge:start" (u = 0), "edge:end" (u = 1), "edge:rail-j"; corners "corner:low-end" and "corner:high-end".
@@ -101,9 +103,9 @@ def rolled_strip(along: int, steps: int = 3) -> tuple[Model, list[EdgeMoments]]:
 
 
 def rolled_strip_exact(moment: float = FULL_MOMENT) -> tuple[float, float, float]:
-    """Energy and tip (x, z) of the strip under an end moment, exactly for energies quadratic in Green's strain and in
-    the second fundamental form.
+    """Energy (N mm) and tip x, z (mm) of the strip under an end moment, exactly.
 
+    That is for energies quadratic in Green's strain and in the second fundamental form.
     With stretch s and rotation a length r the form is s r. Stationary energy: E A e s + E I s r^2 = 0 with
     e = (s^2 - 1) / 2, hence e = -(t^2 / 12) r^2, and s^2 E I r = M. The strip shortens by t^2 r^2 / 12, 2e-4 here: the
     error of any theory that takes the sheet as thin.

@@ -54,6 +54,7 @@ class Solved:
 
     @property
     def reached(self) -> bool:
+        """Whether the fold was reached."""
         return self.outcome == "reached"
 
 

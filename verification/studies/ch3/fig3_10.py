@@ -56,7 +56,7 @@ def upward(state: State) -> NDArray[np.float64]:
     """(3,) unit normal of the plane that fits the folded crease best, to the side of +z."""
     points = state.crease_points("crease")
     normal: NDArray[np.float64] = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][-1]
-    return normal * np.sign(normal[2])
+    return normal if normal[2] > 0.0 else -normal
 
 
 def lift(alpha: float, rows: int, kind: Kind, formulation: str, by: float = LIFT) -> Lift:

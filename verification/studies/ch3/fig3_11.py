@@ -37,6 +37,7 @@ class Curve:
 
     @property
     def ratio(self) -> Array:
+        """K_r / K_a, (states,)."""
         return self.turning / self.axial
 
 

@@ -75,7 +75,7 @@ def run(context: Context) -> CaseResult:
 
 
 def formula(kind: str, i: int, x: Array) -> Array:
-    """y of curve i (from 0) by Eq. 4.7-4.16 at x, mm; zero beyond its ends."""
+    """Height y of curve i (from 0) by Eq. 4.7-4.16 at x, mm; zero beyond its ends."""
     c = {name: float(column[i]) for name, column in meshes.corrugation_table(kind).columns.items()}
     if "a" in c:
         return np.full_like(x, c["a"])

@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from bh.applications.corrugation.folding import POLYESTER, Folded
+from bh.applications.corrugation.folded import Folded
+from bh.applications.corrugation.folding import POLYESTER
 from bh.applications.corrugation.sections import BottomUp, bottom_up, section_moments, top_down
 from verification.framework.checks import CaseResult, Context, line, plot
 from verification.studies.ch4.corrugations import AZIMUTHS, EDGE, ORDER, POINT, RATIOS, folded, in_order
@@ -51,7 +52,7 @@ def run(context: Context) -> CaseResult:
                 source="source 4.5.2 (stiffness, measured)",
                 params={**params, "kind": kind},
             )
-        _order(result, ratios, params, source)
+        _order(result, ratios, params)
         if formulation == "bars-and-hinges":
             _polar(result, count)
     result.notes.append(
@@ -93,7 +94,7 @@ def run_bottom_up(context: Context) -> CaseResult:
             check("I_loc,x of the whole sheet", whole.x, unit="mm^4")
             check("I_loc,y of the whole sheet", whole.y, unit="mm^4")
             check("bars without a valley on both sides", whole.skipped)
-        _order(result, ratios, params, source)
+        _order(result, ratios, params)
     result.notes.append(
         "Bars of mountain creases whose two nodes lie over the supports of the tests (more than 25 mm from the middle) "
         "are left out, for each direction of bending; edges of the sheet count as valleys where they come first."
@@ -123,7 +124,7 @@ def _unit() -> float:
     return 2.0 * 20.0 * t / 12.0 * (36.0 + t**2 * (1.0 - 0.3**2))
 
 
-def _order(result: CaseResult, ratios: dict[str, float], params: dict[str, object], source: str) -> None:
+def _order(result: CaseResult, ratios: dict[str, float], params: dict[str, object]) -> None:
     check = partial(result.check, params=params)
     check(
         "pairs of ten in the order of the measured ratios",

@@ -6,7 +6,17 @@ from typing import Any
 
 from bh import Sheet
 from verification.framework.checks import CaseResult, Context
-from verification.studies.ch5.pinching import NEARLY, SHEET, WAYS, Pinched, Way, angle_plots, pinched, reached
+from verification.studies.ch5.pinching import (
+    NEARLY,
+    SHEET,
+    WAYS,
+    Pinched,
+    Stiffness,
+    Way,
+    angle_plots,
+    pinched,
+    reached,
+)
 
 STIFFNESS = (250.0, 500.0, 1000.0, 1500.0, 2000.0, 3000.0, 4000.0)  # E t^3, N mm
 CURVATURES = (0.0, 0.005, 0.01)  # 1/mm
@@ -29,7 +39,9 @@ def run(context: Context) -> CaseResult:
             for s in STIFFNESS:
                 for k in CURVATURES:
                     sheet = Sheet(E=SHEET.E, t=(s / SHEET.E) ** (1.0 / 3.0))
-                    found[way.name, mesh, s, k] = pinched(way, mesh, k, 3, sheet=sheet, left=NEARLY)
+                    found[way.name, mesh, s, k] = pinched(
+                        way, mesh, k, 3, stiffness=Stiffness(sheet), left=NEARLY
+                    )
     reached(result, list(found.values()))
     for way in WAYS:
         for mesh in way.taken(context.quick):

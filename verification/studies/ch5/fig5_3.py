@@ -79,7 +79,7 @@ class Curve:
 
     @property
     def isometric(self) -> Array:
-        """kappa / kappa_0 of Eq. 5.3."""
+        """Ratio kappa / kappa_0 of Eq. 5.3."""
         return folded_curvature(1.0, self.phi)
 
     @property

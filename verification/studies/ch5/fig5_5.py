@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import bh
 from verification.framework.checks import CaseResult, Context, line, plot
@@ -26,8 +28,22 @@ from verification.studies.ch5.pinching import (
 CURVATURES = tuple(0.0025 * i for i in range(21))  # 1/mm: 0 to 0.05
 SHOWN = (0.0, 0.0025, 0.01, 0.02, 0.035, 0.05)
 REFINED = (0.01, 0.02)  # more curved creases overlap themselves, so that their bend means little
+Array = NDArray[Any]
 SOURCE = "source 5.4.1"
 MIDDLE, TOP = "curvature in the middle of the zone over kappa_0", "largest curvature in the zone over kappa_0"
+MEASURES: tuple[tuple[str, str, Callable[[Pinched], float]], ...] = (
+    ("total energy", "N mm", lambda p: p.path[-1].energy.total),
+    ("peak curvature beyond the pinch", "1/mm", lambda p: p.peak(p.crease.curvature)[0]),
+    ("peak torsion beyond the pinch", "1/mm", lambda p: p.peak(p.crease.torsion)[0]),
+    ("change of the bending angle", "deg", lambda p: p.bend),
+    ("change of the twist angle", "deg", lambda p: p.twist),
+)
+PROFILES: tuple[tuple[str, str, str, Callable[[Pinched], Array]], ...] = (
+    ("phi", "Dihedral angle (Fig. 5.5 a)", "phi, degrees", lambda p: np.degrees(p.crease.dihedral)),
+    ("rate", "Fold rate (Fig. 5.5 b)", "phi', rad/mm", lambda p: p.crease.fold_rate),
+    ("kappa", "Curvature (Fig. 5.6 a)", "kappa, 1/mm", lambda p: p.crease.curvature),
+    ("tau", "Torsion (Fig. 5.7 a)", "tau, 1/mm", lambda p: p.crease.torsion),
+)
 Found = dict[tuple[str, tuple[int, int], float], Pinched]
 
 
@@ -140,12 +156,12 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: dict[flo
         )
 
 
-def _off_ends(p: Pinched) -> np.ndarray:
+def _off_ends(p: Pinched) -> Array:
     u = p.crease.u
     return np.asarray((u > 8.0) & (u < u[-1] - 8.0))
 
 
-def folded_curvature(p: Pinched) -> np.ndarray:
+def folded_curvature(p: Pinched) -> Array:
     """Curvature of the folded crease before the pinch, off its ends, 1/mm."""
     c = bh.creases.along(p.folded, "crease")
     return np.asarray(c.curvature[(c.u > 8.0) & (c.u < c.u[-1] - 8.0)])
@@ -205,13 +221,7 @@ def _errors(result: CaseResult, context: Context, found: Found) -> None:
             "along": finest[0],
             "rows": finest[1],
         }
-        for name, unit, read in (
-            ("total energy", "N mm", lambda p: p.path[-1].energy.total),
-            ("peak curvature beyond the pinch", "1/mm", lambda p: p.peak(p.crease.curvature)[0]),
-            ("peak torsion beyond the pinch", "1/mm", lambda p: p.peak(p.crease.torsion)[0]),
-            ("change of the bending angle", "deg", lambda p: p.bend),
-            ("change of the twist angle", "deg", lambda p: p.twist),
-        ):
+        for name, unit, read in MEASURES:
             values = [read(p) for p in levels]
             to = limit(values)
             result.check(name, values[-1], unit=unit, source="finest mesh", params=params, path=best.path)
@@ -323,12 +333,7 @@ def _plots(result: CaseResult, found: Found) -> None:
     for way in WAYS:
         mesh = way.meshes[-1] if way is CONVERGED else way.meshes[0]
         shown = {k: found[way.name, mesh, k] for k in SHOWN if (way.name, mesh, k) in found}
-        for key, title, unit, read in (
-            ("phi", "Dihedral angle (Fig. 5.5 a)", "phi, degrees", lambda p: np.degrees(p.crease.dihedral)),
-            ("rate", "Fold rate (Fig. 5.5 b)", "phi', rad/mm", lambda p: p.crease.fold_rate),
-            ("kappa", "Curvature (Fig. 5.6 a)", "kappa, 1/mm", lambda p: p.crease.curvature),
-            ("tau", "Torsion (Fig. 5.7 a)", "tau, 1/mm", lambda p: p.crease.torsion),
-        ):
+        for key, title, unit, profile in PROFILES:
             series = []
             for k, p in shown.items():
                 keep = _off_ends(p) & (
@@ -340,7 +345,7 @@ def _plots(result: CaseResult, found: Found) -> None:
                     line(
                         f"kappa_0 = {k:g} /mm",
                         (p.crease.u / p.crease.u[-1])[keep].tolist(),
-                        read(p)[keep].tolist(),
+                        profile(p)[keep].tolist(),
                     )
                 )
             result.plots.append(

@@ -14,14 +14,14 @@ from bh.applications.inverse.transforms import frame
 from meshes.curves import arc_lengths
 from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Context, line, plot
-from verification.studies.ch5.pinching import AS_SOURCE, CONVERGED, Pinched, Way, pinched
+from verification.studies.ch5.pinching import AS_SOURCE, CONVERGED, Pinched, Stiffness, Way, pinched
 
 Array = NDArray[np.float64]
 SHEETS = ((1, 0.005), (1, 0.01), (1, 0.02), (2, 0.01))  # creases, kappa_0 in 1/mm
 SHELL = Way("shell", "shell", "cosine", CONVERGED.zone, ((50, 1), (50, 2), (100, 2)))
 BARS = Way("bars and hinges", "bars-and-hinges", "cosine", CONVERGED.zone, ((100, 1), (200, 2)))
 CONSISTENT = Way("consistent", "consistent", "cosine", CONVERGED.zone, ((50, 1), (100, 2), (200, 4)))
-SEGMENTS, THIN = (0.005, 0.015), bh.Sheet(E=4000.0, t=0.1)
+SEGMENTS, THIN = (0.005, 0.015), Stiffness(bh.Sheet(E=4000.0, t=0.1), Lstar=0.5)
 SMALL = 1.0  # degrees of twist that is left where bend and torsion turn the end to opposite sides
 OFF = 8.0  # mm at either end where finite differences are not to be used
 
@@ -70,16 +70,16 @@ def run(context: Context) -> CaseResult:
 
 def _segment(result: CaseResult, k: float, finest: tuple[int, int]) -> None:
     """Where the end of a segment of 100 mm goes, in the frame at its start (source 6.2.4: t = 0.1, L* = 0.5 mm)."""
-    judge = pinched(SHELL, finest, k, sheet=THIN, Lstar=0.5)
+    judge = pinched(SHELL, finest, k, stiffness=THIN)
     last = (100, 2) if finest == (50, 1) else (200, 4)
     for way, mesh in ((BARS, (100, 1)), (AS_SOURCE, (100, 1)), (CONSISTENT, (100, 1)), (CONSISTENT, last)):
-        found = pinched(way, mesh, k, sheet=THIN, Lstar=0.5)
+        found = pinched(way, mesh, k, stiffness=THIN)
         params: dict[str, Any] = {
             "formulation": way.name,
             "along": mesh[0],
             "rows": mesh[1],
             "kappa_0_per_mm": k,
-            "t_mm": THIN.t,
+            "t_mm": THIN.sheet.t,
         }
         apart = tip(found) - tip(judge)
         source = "shell of the same pinch" if way is not AS_SOURCE else "shell pinched by the raised cosine"
@@ -111,7 +111,8 @@ def tip(p: Pinched) -> Array:
     state = p.path[-1]
     places = ("crease:crease", "edge:outer", "edge:inner")
     point, left, right = (state.points[state.mesh.nodes(place)[0]] for place in places)
-    return frame(point, left, right).T @ (state.crease_points("crease")[-1] - point)
+    end: Array = frame(point, left, right).T @ (state.crease_points("crease")[-1] - point)
+    return end
 
 
 def _own_error(result: CaseResult, judges: list[Pinched], creases: int, k: float) -> None:
@@ -191,7 +192,8 @@ def _profile(p: Pinched, name: str) -> Array:
     """Curvature or torsion at every millimetre off the ends."""
     c = bh.creases.along(p.path[-1], p.path.model.mesh.creases[0])
     share = c.u / c.u[-1]
-    return np.interp(np.arange(OFF, 100.0 - OFF + 0.5) / 100.0, share, getattr(c.curve, name))
+    values: Array = np.interp(np.arange(OFF, 100.0 - OFF + 0.5) / 100.0, share, getattr(c.curve, name))
+    return values
 
 
 def end_distance(found: Pinched, judge: Pinched) -> float:

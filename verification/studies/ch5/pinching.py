@@ -47,9 +47,8 @@ class Way:
     zone: float
     meshes: tuple[tuple[int, int], ...]
     judged: tuple[int, int] = (100, 1)  # the source's own mesh, or the finer one of a way that converges
-    couple: float | None = (
-        None  # N mm / mm, more than is needed, where couples close the crease and nothing is held
-    )
+    # N mm / mm, more than is needed, where couples close the crease and nothing is held
+    couple: float | None = None
 
     def taken(self, quick: bool) -> tuple[tuple[int, int], ...]:
         """Meshes of a run."""
@@ -70,6 +69,7 @@ class Pinched:
 
     @property
     def reached(self) -> bool:
+        """Whether it was folded and pinched to the end."""
         return self.path.outcome == "reached"
 
     @cached_property
@@ -104,7 +104,7 @@ class Pinched:
     def beyond(self) -> NDArray[np.bool_]:
         """(k,) nodes of the right half, beyond the pinched zone and off the end."""
         s = self.crease.u - 0.5 * self.crease.u[-1]
-        return (s > 0.5 * self.zone + CLEAR) & (s < 0.5 * self.crease.u[-1] - END)
+        return np.asarray((s > 0.5 * self.zone + CLEAR) & (s < 0.5 * self.crease.u[-1] - END))
 
     def peak(self, values: Array) -> tuple[float, float]:
         """Value of largest size beyond the zone, and its distance from the middle, mm."""
@@ -117,26 +117,45 @@ class Pinched:
         return np.asarray(values[np.abs(self.crease.u - 0.5 * self.crease.u[-1]) <= 0.5 * self.zone])
 
 
+@dataclass(frozen=True)
+class Stiffness:
+    """What a sheet is made of, and the length scale of its creases, mm."""
+
+    sheet: Sheet = SHEET
+    Lstar: float = LSTAR
+
+
+OF_5_3 = Stiffness()
+
+
 def pinched(
     way: Way,
     mesh: tuple[int, int],
     curvature: float,
     creases: int = 1,
     spacing: float = SPACING,
-    sheet: Sheet = SHEET,
+    stiffness: Stiffness = OF_5_3,
     left: float = PINCHED,
     folds: Sequence[str] | None = None,
-    Lstar: float = LSTAR,
 ) -> Pinched:
     """Fold all creases to 90 degrees by the rest angle of their springs, then pinch their middles.
 
     Args:
+        way: formulation, and how the pinch is modelled.
+        mesh: cells along the creases, and rows a panel.
+        curvature: of the flat creases, 1/mm.
+        creases: how many.
+        spacing: of the creases, mm.
+        stiffness: of the sheet and its creases.
         left: dihedral angle that is left until closed, rad.
+        folds: "mountain" or "valley" of every crease; None alternates.
     """
     along, rows = mesh
     pattern = meshes.parallel_creases(curvature, LENGTH, spacing, creases, folds)  # type: ignore[arg-type]
-    model = Model(meshes.structured(pattern, along=along, rows=rows), sheet, formulation=way.formulation)
-    model = model.fold("all", by=FOLDED, Lstar=Lstar)
+    model = Model(
+        meshes.structured(pattern, along=along, rows=rows), stiffness.sheet, formulation=way.formulation
+    )
+    model = model.fold("all", by=FOLDED, Lstar=stiffness.Lstar)
     how = "imposed" if way.couple is None else "couple"
     path = trace(
         model.pinch(
@@ -174,7 +193,7 @@ class Proportion:
 
 
 def proportion(x: Sequence[float], y: Sequence[float]) -> Proportion:
-    """y = slope x; R^2 is one less the squares that are left over those about the mean."""
+    """Fit y = slope x; R^2 is one less the squares that are left over those about the mean."""
     a, b = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     slope = float(a @ b / (a @ a))
     spread = float(((b - b.mean()) ** 2).sum())

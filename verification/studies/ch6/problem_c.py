@@ -39,6 +39,7 @@ class ReachTask:
         return f"reach {self.reach!r} {SETTING.identity}"
 
     def __call__(self, point: Mapping[str, Any]) -> dict[str, Any]:
+        """What was found for the target {"x", "y", "z"} (mm), as values of the data set."""
         target = np.array([point["x"], point["y"], point["z"]], dtype=float)
         found = self.reach(target)
         design, pad = found.design, MOST - found.design.n
@@ -61,6 +62,7 @@ class ReachTask:
 
 
 def cores() -> int:
+    """Of this machine."""
     return os.cpu_count() or 1
 
 

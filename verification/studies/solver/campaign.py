@@ -131,8 +131,8 @@ def play(scene: Scene, compare: bool = True) -> Result:
 
 
 def _excess(path: Path, fine: Path) -> float:
-    scale = max(fine[-1].energy.total, 1e-15 * path._system(0).energy_scale)
-    return (path[-1].energy.total - fine[-1].energy.total) / scale
+    scale = max(fine[-1].energy.total, 1e-15 * path.solved(0)[0].energy_scale)
+    return float((path[-1].energy.total - fine[-1].energy.total) / scale)
 
 
 def _played(job: tuple[int, Scene]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from verification.studies.app_b import appendix_b
 KINDS: tuple[str, ...] = (*get_args(Kind), "gmsh")
 # cells along the crease and rows a side: halved again and again
 LEVELS = ((16, 2), (32, 4), (64, 8), (128, 16))
-DESIGN = ((32, 4, 0.03), (64, 12, 0.005))  # what DESIGN.md says of two meshes
+DESIGN = ((32, 4, 0.03), (64, 12, 0.005))  # tolerances of the two meshes
 BOTH = ("bars-and-hinges", "consistent")
 RING = math.radians(150.0)  # dihedral angle of the full annulus
 

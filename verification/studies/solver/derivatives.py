@@ -72,7 +72,8 @@ def random_rotation(rng: np.random.Generator) -> Array:
     """A random proper rotation (3, 3)."""
     Q, R = np.linalg.qr(rng.normal(size=(3, 3)))
     Q = Q * np.sign(np.diag(R))
-    return Q * np.sign(np.linalg.det(Q))
+    proper: Array = Q * np.sign(np.linalg.det(Q))
+    return proper
 
 
 def small_model() -> Model:
@@ -154,7 +155,7 @@ def work_mismatch(increment: float) -> tuple[float, int]:
     model = Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=math.pi / 2)
     fixed = LoadControl(first_rotation=increment, largest_rotation=increment)
     path = trace(model, strategy=fixed)
-    system = path._system(0)
+    system = path.solved(0)[0]
     lam = np.array([record.lam for record in path.records])
     power = np.array([system.power(record.q, record.lam) for record in path.records])
     from scipy.integrate import simpson

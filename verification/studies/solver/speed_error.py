@@ -39,7 +39,7 @@ SOURCE = "the shell, extrapolated"
 class Member:
     """A model in the race. `levels` refine the sheet: n times a scene's cells along the crease, in n rows a side.
 
-    `rows` fixes the number of rows instead: bars and hinges lock where cells are not long (DESIGN.md, section 5).
+    `rows` fixes the number of rows instead: bars and hinges lock where cells are not long (docs/formulation.md).
     """
 
     formulation: str
@@ -49,6 +49,7 @@ class Member:
 
     @property
     def name(self) -> str:
+        """As in the legends."""
         return f"{self.formulation}, {self.kind}"
 
 
@@ -99,6 +100,7 @@ class Store:
 
     @classmethod
     def open(cls, folder: FilePath, quick: bool) -> Store:
+        """The store in a folder; empty where what is there was made by other versions."""
         file = folder / RUNS
         made_by = {"versions": environment(), "quick": quick}
         try:
@@ -109,6 +111,7 @@ class Store:
         return cls(file, found if same else {"made_by": made_by})
 
     def keep(self, key: str, value: Any) -> None:
+        """Add one run (JSON data) and write the file anew."""
         self.runs[key] = value
         draft = self.file.with_suffix(".part")
         draft.write_text(json.dumps(self.runs), encoding="utf-8")

@@ -64,6 +64,7 @@ class Problem:
 
 
 def is_shell(name: str) -> bool:
+    """Whether a formulation of this name is one of the shells."""
     return name.endswith("shell")
 
 

@@ -61,6 +61,7 @@ class Assemblage:
         return topology.hinges[:, [1, 2, 0, 3]], stiffness, topology.edges
 
     def referee(self, law: Law) -> DenseOrigami:
+        """The same for the independent solver, with its own or the published laws."""
         hinges, stiffness, edges = self._hinges()
         return DenseOrigami(
             self.points, edges, self.EA, hinges, stiffness, self.held, self.load, law, self.linear

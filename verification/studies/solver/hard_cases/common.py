@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 
 def located(path: Path, kind: str) -> list[tuple[float, Array]]:
     """Lambda and node positions (n, 3), mm, of every "limit" or "bifurcation" point that the path has passed."""
+    systems = {record.step: path.solved(index)[0] for index, record in enumerate(path.records)}
     return [
-        (at.lam, path._system(step).positions(at.q, at.lam))
+        (at.lam, systems[step].positions(at.q, at.lam))
         for step, at in path.critical_points
         if at.kind == kind
     ]

@@ -49,7 +49,7 @@ def crease_stiffness(result: CaseResult) -> None:
 
 
 def thickness(result: CaseResult) -> None:
-    """t over two decades at fixed size: bending energy goes with t^3."""
+    """Thickness over two decades at fixed size: bending energy goes with t^3."""
     unit = None
     for t in (0.01, 0.03, 0.1, 0.3, 1.0, 2.0):
         path = trace(annulus(t=t).fold("crease", to=math.pi / 2))
@@ -94,7 +94,7 @@ def condition_number(path: Path) -> float:
 
 
 def slenderness(result: CaseResult) -> None:
-    """alpha from 0.5 to 30: iterations do not grow, though the condition number does."""
+    """Aspect ratio alpha from 0.5 to 30: iterations do not grow, though the condition number does."""
     for alpha in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0):
         mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), aspect_ratio=alpha)
         path = trace(Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=math.pi / 2))

@@ -155,6 +155,7 @@ class Fan:
         radius: float = RADIUS,
         rows: int = 2,
     ) -> None:
+        """A fan of `along` cells and `rows` a pleat; sector angle in rad, thickness and inner radius in mm."""
         radii = [radius + PLEAT * i for i in range(PLEATS)]
         folds = ["mountain" if i % 2 == 0 else "valley" for i in range(PLEATS)]
         pattern = meshes.annulus_sector(radii, PLEAT, angle, folds)  # type: ignore[arg-type]

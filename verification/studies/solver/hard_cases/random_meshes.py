@@ -70,7 +70,8 @@ def _delaunay(flat: Array) -> Ints:
     found = Delaunay(flat).simplices.astype(np.int64)
     a, b, c = (flat[found[:, i]] for i in range(3))
     doubled = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    return found[doubled > 1e-9 * doubled.max()]
+    kept: Ints = found[doubled > 1e-9 * doubled.max()]
+    return kept
 
 
 def _counter_clockwise(xy: Array, triangles: Ints) -> Ints:
