@@ -9,13 +9,14 @@ from __future__ import annotations
 import pytest
 
 import bh
-from benchmarks.cases import array_problem, strip, wide
+from benchmarks.cases import strip, wide
 from bh.formulations.registry import formulation
 from bh.loading.program import program
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.increments import point
 from bh.solvers.trace import Walk, walk
 from verification.studies.app_b.appendix_b import model
+from verification.theory.array_annulus import ENERGIES, array_annulus
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,8 @@ def test_one_iteration(benchmark, annulus, held):
     spring = bh.Model(annulus.mesh, annulus.sheet, annulus.supports).fold("crease", rest=1.6, Lstar=25.0)
     sheet = annulus if held else spring
     path = bh.trace(sheet)
-    system, q = path._system(0), path.records[-1].q
+    system, record = path.solved()
+    q = record.q
 
     def iteration():
         now = system.evaluate(q, 1.0)
@@ -66,13 +68,10 @@ def test_one_iteration(benchmark, annulus, held):
     benchmark(iteration)
 
 
-@pytest.mark.parametrize("name", ["annulus_5x31", "annulus_5x61"])
-def test_array_problem(benchmark, name):
-    """Published arrays from flat to a rest angle of 90 degrees."""
-    problem = array_problem(name)
-    if problem is None:
-        pytest.skip("the array problems are not here")
-    path = benchmark(bh.trace, problem)
+@pytest.mark.parametrize("columns", ENERGIES)
+def test_array_problem(benchmark, columns):
+    """The annulus of plain arrays from flat to a rest angle of 90 degrees."""
+    path = benchmark(bh.trace, array_annulus(columns).model())
     benchmark.extra_info["iterations"] = path.iterations
     assert path.outcome == "reached"
 

@@ -13,7 +13,7 @@ from typing import Any
 from bh.plotting import interactive
 from meshes.errors import FileFormatError
 from meshes.io.export import replacing
-from reports import words
+from reports import formatting
 from reports.changes import MOST, changes
 from reports.claims import Claim, claims, claims_csv
 from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
@@ -143,7 +143,7 @@ class Site:
                 source=SOURCE,
                 shortfall=shortfall(self.results),
                 others=_others(self.results),
-                date=words.date(self.results.date),
+                date=formatting.date(self.results.date),
                 seeds=_seeds(every),
                 machine=_machine(self.results.machine),
                 style=(TEMPLATES / "style.css").read_text(encoding="utf-8") + interactive.style(),
@@ -187,14 +187,14 @@ def _environment(link: Callable[[str, str], str]) -> Any:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "number": words.number,
-        "share": words.share,
-        "seconds": words.seconds,
+        "number": formatting.number,
+        "share": formatting.share,
+        "seconds": formatting.seconds,
         "plain": typeset,
-        "date": words.date,
+        "date": formatting.date,
         "unlike": lambda params, common: {key: v for key, v in params.items() if key not in common},
         "text": lambda text: Markup(markup(text)),
-        "params": lambda given: Markup(words.params(given)),
+        "params": lambda given: Markup(formatting.params(given)),
     }
     environment.globals["link"] = link
     return environment
@@ -220,7 +220,7 @@ def _others(results: Results) -> list[tuple[str, str]]:
     for info in results.cases:
         if info.date in (None, results.date):
             continue
-        told = [words.date(info.date or "")]
+        told = [formatting.date(info.date or "")]
         versions = results.versions if info.versions is None else info.versions
         for key, value in versions.items():
             if results.versions.get(key, value) != value:

@@ -1,4 +1,4 @@
-"""The house of DESIGN.md, section 2: who may import whom, what `import bh` may load, and how long things may get."""
+"""The floor plan of docs/architecture.md: who may import whom, what `import bh` may load, and how long things may get."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_house_is_there() -> None:
 @pytest.mark.parametrize("name", sorted(FILES))
 def test_imports(name: str) -> None:
     wrong = violations(name, imports_of(name))
-    assert not wrong, f"{name} must not import {', '.join(wrong)} (DESIGN.md, section 2)"
+    assert not wrong, f"{name} must not import {', '.join(wrong)} (docs/architecture.md)"
 
 
 @pytest.mark.parametrize(

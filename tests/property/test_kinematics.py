@@ -205,7 +205,7 @@ def test_angle_is_continuous_through_flat() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_closed_hinge_is_inside_the_turn(seed: int) -> None:
-    """Wings on top of each other: 0 or 2 pi by rounding, never outside of [0, 2 pi] (DESIGN.md, section 3)."""
+    """Wings on top of each other: 0 or 2 pi by rounding, never outside of [0, 2 pi]."""
     closed = hinge(0.0, 1.0, (0.7, 0.7), (0.2, 0.2)) @ rotation(seed).T
     phi = angle(closed)
     assert 0.0 <= phi <= 2.0 * math.pi

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -14,32 +12,18 @@ import bh
 import meshes
 from bh.formulations.registry import formulation
 from bh.loading.program import program
-
-PEERS = FilePath(__file__).parents[3] / "shared" / "peer_problems"
-# total, bending and folding energy (N mm) on which six independent codes agree; bars with Green's strain
-PUBLISHED = {
-    "annulus_5x31": (3.270962320, 2.944622668, 0.322118961),
-    "annulus_5x61": (2.773577732, 2.524949397, 0.245239472),
-}
+from verification.theory.array_annulus import ENERGIES, array_annulus
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
-def test_published_energies(name: str) -> None:
-    """The creased annulus of the array problems from flat to a rest angle of 90 degrees."""
-    file = PEERS / f"{name}.json"
-    if not file.is_file():
-        pytest.skip("the array problems are not here")
-    data = json.loads(file.read_text())
-    model = bh.Model.from_arrays(
-        data["nodes"], data["triangles"], data["bars"], data["bar_k"], data["bend_hinges"], data["bend_k"],
-        data["fold_hinges"], data["fold_k"], data["supports"], green=True,
-    )  # fmt: skip
-    path = bh.trace(model.fold("fold", rest=data["fold_rest_end"]))
+@pytest.mark.parametrize("columns", ENERGIES)
+def test_published_energies(columns: int) -> None:
+    """The creased annulus from flat to a rest angle of 90 degrees: energies on which six independent codes agree."""
+    path = bh.trace(array_annulus(columns).model())
     assert path.outcome == "reached"
     assert path.iterations <= 30
     energy = path[-1].energy
-    for value, published in zip((energy.total, energy.bending, energy.folding), PUBLISHED[name], strict=True):
-        assert value == pytest.approx(published, rel=2e-9)
+    for value, agreed in zip((energy.total, energy.bending, energy.folding), ENERGIES[columns], strict=True):
+        assert value == pytest.approx(agreed, rel=2e-9)
 
 
 def own_arrays() -> tuple[bh.Model, dict[str, Any]]:

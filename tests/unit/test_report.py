@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from meshes.errors import InputError
 from reports.build import build, one_page
 from reports.figures import Plot, svg, typeset
-from reports.words import number, seconds, share
+from reports.formatting import number, seconds, share
 from verification.framework.cases import CASES
 from verification.framework.chapters import chapter_of
 

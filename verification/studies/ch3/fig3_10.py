@@ -119,7 +119,7 @@ def run(context: Context) -> CaseResult:
 def _record(
     result: CaseResult, item: Lift, converged: Lift, alpha: float, rows: int, kind: str, formulation: str
 ) -> None:
-    """Force and energies of one mesh against the finest one; judged where the issue asks for convergence."""
+    """Force and energies of one mesh against the finest one; judged where the mesh should have converged."""
     params = {"alpha": alpha, "rows": rows, "mesh": kind, "formulation": formulation, "lift_mm": LIFT}
     judged = formulation == CONSISTENT and rows == ROWS[-1] and item is not converged
     result.check(

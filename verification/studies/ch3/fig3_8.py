@@ -225,7 +225,8 @@ def _records(result: CaseResult, study: Study, found: Found, lengths: tuple[floa
 def _deviations(study: Study, found: Found, formulation: str, word: str, lengths: tuple[float, ...]) -> Array:
     """(L*, creases, rests) reached angle less rest angle, degrees."""
     reached: Array = np.array([found[formulation, word, Lstar].angles for Lstar in lengths])
-    return reached - np.asarray(study.rests, dtype=float)
+    off: Array = reached - np.asarray(study.rests, dtype=float)
+    return off
 
 
 def _order(result: CaseResult, study: Study, found: Found, lengths: tuple[float, ...]) -> None:

@@ -180,7 +180,7 @@ def _tall_arch(result: CaseResult, source: str) -> None:
 
 
 def truss_model(truss: VonMisesTruss) -> Model:
-    """The truss of `toys` as bars of a model in the plane y = 0; its spring is a bar that hangs from the top.
+    """The truss of `benchmark_systems` as bars of a model in the plane y = 0; its spring hangs from the top as a bar.
 
     Nodes 0 and 1 are the feet, 2 the top, 3 the lower end of the spring; 4 and 5, fixed aside, only make triangles
     that stay open. Other edges and all hinges have no stiffness.

@@ -22,14 +22,14 @@ def trusses(result: CaseResult) -> None:
     """Von Mises truss through snap-through and snap-back by arc length, against the exact curve."""
     series = []
     for spring in (None, 0.5, 0.05):
-        toy = VonMisesTruss(spring=spring)
-        start = point(toy, np.zeros(toy.size), 0.0)
+        truss = VonMisesTruss(spring=spring)
+        start = point(truss, np.zeros(truss.size), 0.0)
         for generalised in (False, True):
             control = Generalised() if generalised else Cylindrical()
-            found = list(ArcLength(control=control).follow(toy, [start]))
+            found = list(ArcLength(control=control).follow(truss, [start]))
             lam = np.array([item.point.lam for item in found])
             w = np.array([item.point.q[0] for item in found])
-            off = float(np.abs(toy.load(w) - lam).max()) if found[-1].outcome == "reached" else math.nan
+            off = float(np.abs(truss.load(w) - lam).max()) if found[-1].outcome == "reached" else math.nan
             params: dict[str, Any] = {
                 "spring": "none" if spring is None else spring,
                 "control": "MGDCM" if generalised else "arc",
@@ -42,7 +42,7 @@ def trusses(result: CaseResult) -> None:
                 tolerance=1e-7,
                 params=params,
             )
-            unstable = {item.negative for item in found if toy.limit() < 1.0}
+            unstable = {item.negative for item in found if truss.limit() < 1.0}
             result.check(
                 "truss: unstable states counted",
                 unstable == {0, 1},
