@@ -19,7 +19,7 @@ from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
 from bh.solvers.trace import Strategy, Walk, walk
-from tests.unit.test_newton import Arch, Column, Stiffening, Small
+from tests.unit.test_newton import Arch, Column, Small, Stiffening
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 
 Array = NDArray[np.float64]

@@ -258,7 +258,7 @@ def test_sheets_are_in_the_chapter(path: bh.Path, tmp_path: Path) -> None:
     assert 'src="assets/plotly.min.js"' in text
     assert "assets/plotly" not in (tmp_path / "report" / "solver.html").read_text(encoding="utf-8")
     assert "<script" not in one_page(tmp_path).replace('<script type="application/json"', "")
-    for broken, message in (({**frames, "eye": "up"}, r"eye: .*list"), ({}, "format: field required")):
+    for broken, message in (({**frames, "eye": "up"}, r"eye: .*array"), ({}, "format: field required")):
         (tmp_path / "cone.frames.json").write_text(json.dumps(broken))
         with pytest.raises(InputError, match=message):
             build(tmp_path, tmp_path / "report.html")
