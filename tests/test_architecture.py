@@ -1,4 +1,4 @@
-"""The floor plan of docs/architecture.md: who may import whom, what `import bh` may load, and how long things may get."""
+"""The floor plan of docs/architecture.md: who imports whom, what `import bh` may load, and how long things may get."""
 
 from __future__ import annotations
 

@@ -85,8 +85,10 @@ def test_run_writes_path_and_result(here: Any, capsys: pytest.CaptureFixture[str
     assert data["unknowns"] == path.unknowns > 0
     mesh = path.model.mesh
     assert data["mesh"] == {
-        "nodes": len(mesh.points), "triangles": len(mesh.triangles), "aspect_ratio": mesh.aspect_ratio,
-    }  # fmt: skip
+        "nodes": len(mesh.points),
+        "triangles": len(mesh.triangles),
+        "aspect_ratio": mesh.aspect_ratio,
+    }
     assert {"python", "numpy", "scipy", "curved-crease-workbench"} <= set(data["versions"])
     assert data["input"] == path.provenance["input"]
     assert data["scene"] == "good.toml"

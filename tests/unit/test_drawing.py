@@ -195,10 +195,13 @@ class TestHealing:
     def test_gaps_and_t_junctions(self, tmp_path: Path) -> None:
         """The outline has open corners, one crease stops short of it, another overshoots, two meet in a T."""
         body = (
-            line(0.1, 0, 100, 0, 'stroke="black"') + line(100, 0.1, 100, 60, 'stroke="black"')
-            + line(99.9, 60, 0, 60, 'stroke="black"') + line(0, 59.9, 0, 0, 'stroke="black"')
-            + line(40, 0.1, 40, 60.1) + line(40.1, 30, 100, 30, 'stroke="blue"')
-        )  # fmt: skip
+            line(0.1, 0, 100, 0, 'stroke="black"')
+            + line(100, 0.1, 100, 60, 'stroke="black"')
+            + line(99.9, 60, 0, 60, 'stroke="black"')
+            + line(0, 59.9, 0, 0, 'stroke="black"')
+            + line(40, 0.1, 40, 60.1)
+            + line(40.1, 30, 100, 30, 'stroke="blue"')
+        )
         pattern = read_pattern(svg(tmp_path, body), gap=0.2)
         assert folds(pattern) == {"m1": "mountain", "m2": "mountain", "v1": "valley"}
         mesh = unstructured(pattern, size=10.0)
@@ -407,8 +410,10 @@ class TestWriting:
     def test_what_cannot_be(self, tmp_path: Path) -> None:
         pattern = meshes.strip(100.0, 20.0)
         for name, options, word in (
-            ("a.pdf", {}, "suffix"), ("a.svg", {"perforate": (0.0, 1.0)}, "perforate"), ("no/a.svg", {}, "folder"),
-        ):  # fmt: skip
+            ("a.pdf", {}, "suffix"),
+            ("a.svg", {"perforate": (0.0, 1.0)}, "perforate"),
+            ("no/a.svg", {}, "folder"),
+        ):
             with pytest.raises(FileFormatError, match=word):
                 write_pattern(tmp_path / name, pattern, **options)
 

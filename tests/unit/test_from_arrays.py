@@ -40,11 +40,16 @@ def own_arrays() -> tuple[bh.Model, dict[str, Any]]:
     held[mesh.nodes("edge:end"), 3] = 1
     rows = np.roll(elements.hinges, -1, axis=1)[:, [0, 1, 3, 2]]
     return model, {
-        "points": mesh.points, "triangles": mesh.triangles, "bars": elements.bars,
-        "bar_stiffness": elements.bar_stiffness, "bending_hinges": rows[bend],
-        "bending_stiffness": elements.hinge_stiffness[bend], "folding_hinges": rows[fold],
-        "folding_stiffness": elements.hinge_stiffness[fold], "supports": held,
-    }  # fmt: skip
+        "points": mesh.points,
+        "triangles": mesh.triangles,
+        "bars": elements.bars,
+        "bar_stiffness": elements.bar_stiffness,
+        "bending_hinges": rows[bend],
+        "bending_stiffness": elements.hinge_stiffness[bend],
+        "folding_hinges": rows[fold],
+        "folding_stiffness": elements.hinge_stiffness[fold],
+        "supports": held,
+    }
 
 
 def test_the_same_sheet_as_arrays() -> None:
@@ -73,10 +78,13 @@ def test_greens_strain_differs_by_the_square_of_the_strain() -> None:
         ({"bar_stiffness": lambda a: -a["bar_stiffness"]}, "not negative"),
         ({"bending_stiffness": lambda a: a["bending_stiffness"] * math.nan}, "stiffness"),
         ({"folding_hinges": lambda a: a["folding_hinges"][[0] * len(a["folding_hinges"])]}, "twice"),
-        ({"bending_hinges": lambda a: a["bending_hinges"] * 0 + [0, len(a["points"]) - 1, 0, 0]}, "not joined"),
+        (
+            {"bending_hinges": lambda a: a["bending_hinges"] * 0 + [0, len(a["points"]) - 1, 0, 0]},
+            "not joined",
+        ),
         ({"triangles": lambda a: a["triangles"] + 1}, "outside"),
     ],
-)  # fmt: skip
+)
 def test_arrays_that_do_not_fit(change: dict[str, Any], words: str) -> None:
     _, arrays = own_arrays()
     wrong = {**arrays, **{key: make(arrays) for key, make in change.items()}}

@@ -383,8 +383,11 @@ class TestStructured:
         mesh = structured(annulus_sector(60, 10, 1.5), along=9, rows=rows, kind=kind)
         end = np.array([math.cos(1.5), math.sin(1.5)])
         for name, point in {
-            "inner-start": [50, 0], "outer-start": [70, 0], "inner-end": 50 * end, "outer-end": 70 * end,
-        }.items():  # fmt: skip
+            "inner-start": [50, 0],
+            "outer-start": [70, 0],
+            "inner-end": 50 * end,
+            "outer-end": 70 * end,
+        }.items():
             (node,) = mesh.nodes(f"corner:{name}")
             np.testing.assert_allclose(mesh.points[node, :2], point, atol=1e-12)
         assert not structured(full_annulus(60, 10), along=30, rows=rows, kind=kind).corners

@@ -104,10 +104,18 @@ def test_claims_are_what_the_source_says() -> None:
 
 def test_each_published_value_has_its_row_and_its_error_bar(tmp_path: Path) -> None:
     rows = [
-        record("a", "energy", value, source="source Table B.1", reference=table, error=abs(value / table - 1),
-               unit="N mm", params={"actuation": name, "error_bar": bar})
+        record(
+            "a",
+            "energy",
+            value,
+            source="source Table B.1",
+            reference=table,
+            error=abs(value / table - 1),
+            unit="N mm",
+            params={"actuation": name, "error_bar": bar},
+        )
         for name, value, table, bar in (("a", 0.0537, 0.0547, 2.5e-4), ("d", 0.0504, 0.0513, None))
-    ]  # fmt: skip
+    ]
     assert [claim.check.bar for claim in claims([case(*rows)])] == [2.5e-4, None]
     write(tmp_path, {"checks": rows})
     words = Page(one_page(tmp_path)).text

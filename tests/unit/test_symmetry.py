@@ -132,8 +132,13 @@ def test_half_the_unknowns(name: str) -> None:
 @pytest.mark.parametrize(("kind", "along", "rows"), MESHES[:3])
 def test_derivatives_of_a_half(name: str, kind: Kind, along: int, rows: int) -> None:
     """Gradient and tangent of the half against differences, and its energy against half of the whole's."""
-    path = Path(strip(kind, along, rows, name).support("edge:start", "xyz").support("edge:end", "xyz")
-                .fold("crease", rest=2.0, Lstar=10.0), symmetry="x")  # fmt: skip
+    path = Path(
+        strip(kind, along, rows, name)
+        .support("edge:start", "xyz")
+        .support("edge:end", "xyz")
+        .fold("crease", rest=2.0, Lstar=10.0),
+        symmetry="x",
+    )
     half = path._half(0)
     assert half is not None
     system = half.system
@@ -225,13 +230,19 @@ def unlike(model: bh.Model) -> bh.Model:
         (lambda m: m, "x", "has no image"),
         (unlike, "y", "not its own image; take staggered"),
         (lambda m: m.support("corner:inner-start", "xyz").support("rigid-body"), "y", "supports are not"),
-        (lambda m: m.support("edge:start").support("edge:end").force("corner:outer-end", each=(0, 0, 1)), "y",
-         "step 2: the forces are not"),
-        (lambda m: m.support("edge:start").support("edge:end").fold("crease", to=[2.0] * 7 + [2.1]), "y",
-         "step 2: the creases are not"),
+        (
+            lambda m: m.support("edge:start").support("edge:end").force("corner:outer-end", each=(0, 0, 1)),
+            "y",
+            "step 2: the forces are not",
+        ),
+        (
+            lambda m: m.support("edge:start").support("edge:end").fold("crease", to=[2.0] * 7 + [2.1]),
+            "y",
+            "step 2: the creases are not",
+        ),
         (lambda m: replace(m, formulation="shell"), "y", "take one of: bars-and-hinges, consistent"),
     ],
-)  # fmt: skip
+)
 def test_what_is_not_symmetric_is_named(
     changed: Callable[[bh.Model], bh.Model], plane: str, words: str
 ) -> None:

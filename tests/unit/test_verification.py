@@ -21,9 +21,21 @@ from verification.studies.solver import campaign
 
 # the keys of a stored record
 KEYS = {
-    "case", "quantity", "params", "value", "unit", "reference", "source", "error", "tolerance", "passed", "unknowns",
-    "iterations", "wall_time_s", "outcome",
-}  # fmt: skip
+    "case",
+    "quantity",
+    "params",
+    "value",
+    "unit",
+    "reference",
+    "source",
+    "error",
+    "tolerance",
+    "passed",
+    "unknowns",
+    "iterations",
+    "wall_time_s",
+    "outcome",
+}
 SLOW = {
     "appendix_b",
     "fig3_9",
@@ -44,9 +56,15 @@ SLOW = {
 
 def check(**changes: Any) -> Check:
     given = {
-        "case": "c", "quantity": "q", "params": {"alpha": 2.0}, "value": 1.05, "unit": "mm", "reference": 1.0,
-        "source": "s", "tolerance": 0.1,
-    } | changes  # fmt: skip
+        "case": "c",
+        "quantity": "q",
+        "params": {"alpha": 2.0},
+        "value": 1.05,
+        "unit": "mm",
+        "reference": 1.0,
+        "source": "s",
+        "tolerance": 0.1,
+    } | changes
     return Check(**given)
 
 
