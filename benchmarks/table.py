@@ -17,12 +17,13 @@ from typing import Any
 import numpy as np
 
 import bh
-from benchmarks.cases import SHEETS, STRIPS, array_problem, least, one_iteration, strip, wide
+from benchmarks.cases import SHEETS, STRIPS, least, one_iteration, strip, wide
 from bh.commands.warm_up import warm_up
 from bh.paths.provenance import versions
 from bh.runtime.threads import one_blas_thread
 from bh.solvers import pardiso
 from verification.studies.app_b.appendix_b import model as appendix_b
+from verification.theory.array_annulus import ENERGIES, ROWS, array_annulus
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "performance.md"
@@ -123,10 +124,8 @@ def folds() -> list[str]:
     lines = ["## Whole folds from flat to 90 degrees", ""]
     lines += ["| case | unknowns | iterations | target | time, ms | target |", "|---|---|---|---|---|---|"]
     cases = [("App. B (a), 64 cells, staggered", appendix_b("a"), 22, 10.0)]
-    for name in ("annulus_5x31", "annulus_5x61"):
-        problem = array_problem(name)
-        if problem is not None:
-            cases.append((f"array problem {name}", problem, 30, 25.0))
+    for columns in ENERGIES:
+        cases.append((f"array problem annulus_{ROWS}x{columns}", array_annulus(columns).model(), 30, 25.0))
     for name, model, most, ms in cases:
         path = bh.trace(model)
         took = 1e3 * least(lambda model=model: bh.trace(model), 2.0)  # type: ignore[misc]
@@ -136,7 +135,7 @@ def folds() -> list[str]:
             f"| {name} | {path.unknowns} | {path.iterations} | {most} ({few}) | {took:.1f} | {ms:g} ({quick}) |"
         )
     path = bh.trace(appendix_b("a"))
-    system, record = path.system(0), path.records[-1]
+    system, record = path.solved()
 
     def iteration() -> None:
         now = system.evaluate(record.q, 0.95)  # a residual as in the middle of an increment

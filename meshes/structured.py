@@ -1,7 +1,7 @@
 """Ruling-aligned meshes of patterns that have rails.
 
 Between two neighbouring rails lie `rows` rows of cells; node lines across the sheet are rulings. How the cells
-are cut into triangles decides the accuracy of bars and hinges (DESIGN.md, section 5):
+are cut into triangles decides the accuracy of bars and hinges:
 
 - "staggered": neighbouring node lines are shifted by half a cell, triangles are isosceles;
 - "alternating": right triangles, the diagonal turns from cell to cell and is mirrored across every node line;

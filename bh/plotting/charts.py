@@ -42,7 +42,7 @@ FOLDS = {
     "flat": ("#8a8a8a", (0, (1.2, 1.2))),
 }
 STABLE, UNSTABLE = "#0072b2", "#d55e00"
-CRITICAL = {"limit": "^", Critical.BIFURCATION: "D"}
+CRITICAL = {Critical.LIMIT: "^", Critical.BIFURCATION: "D"}
 FEW_NODES = 12  # whose marks do not hide what they stand on
 MOST_ANGLES = 7  # states of a path that are drawn along a crease
 

@@ -77,10 +77,17 @@ def test_picture_is_the_same_again_and_leaves_nothing_else(path: bh.Path, tmp_pa
 
 
 @needs_opengl
-@pytest.mark.parametrize("options", [
-    {"colour": "total"}, {"colour": "folding"}, {"colour": None}, {"top": 1e-6}, {"camera": (0.3, 0.9)},
-    {"caption": "of $ sorts"},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"colour": "total"},
+        {"colour": "folding"},
+        {"colour": None},
+        {"top": 1e-6},
+        {"camera": (0.3, 0.9)},
+        {"caption": "of $ sorts"},
+    ],
+)
 def test_options_change_the_picture(path: bh.Path, tmp_path: Path, options: dict[str, Any]) -> None:
     plain = pixels(plotting.picture(path[-1], tmp_path / "a.png", size=(240, 180)))
     other = pixels(plotting.picture(path[-1], tmp_path / "b.png", size=(240, 180), **options))
