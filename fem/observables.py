@@ -33,11 +33,12 @@ class ShellState(State):
     Attributes:
         nodes: (n, 3) positions of corners and, with quadratic elements, (n + e, 3) of middle nodes too, mm.
         frames: frames of all edges, turned with them; the next step begins from here.
-        fold_angles: (m, r) beta at the lower and the higher node of each hinge's edge, or one for both, rad; zero off
-            creases.
+        fold_angles: (m, r) beta at the lower and the higher node of each hinge's edge, or one for both, rad;
+            zero off creases.
         crease_couples: (m, r) couples that the crease takes there, conjugate to fold_angles, N mm / rad.
-        membrane_forces, moments: (t, 3) components xx, yy, xy in the flat sheet's axes at the middle of each triangle
-            (second Piola-Kirchhoff), N/mm and N; a moment is positive where it bends the sheet's edges up.
+        membrane_forces: (t, 3) components xx, yy, xy in the flat sheet's axes at the middle of each triangle
+            (second Piola-Kirchhoff), N/mm.
+        moments: (t, 3) the same of the bending moments, N; positive where the sheet's edges bend up.
     """
 
     nodes: Array
@@ -57,7 +58,12 @@ class ShellState(State):
         return out
 
     def crease_curve(self, crease: str, points: int = 5) -> Array:
-        """(k, 3) points on the deformed crease: `points` on every edge, in order, mm."""
+        """(k, 3) points on the deformed crease: `points` on every edge, in order, mm.
+
+        Args:
+            crease: its name.
+            points: how many on every edge, ends included.
+        """
         pairs = self.mesh.crease_edges(crease)
         low, high = self.nodes[pairs[:, 0]], self.nodes[pairs[:, 1]]
         corners = len(self.mesh.points)
@@ -75,7 +81,16 @@ class ShellState(State):
 def observe(
     model: Model, system: ShellSystem, q: Array, lam: float, step: int, stable: bool | None
 ) -> ShellState:
-    """Everything that can be read from the unknowns `q` at `lam`."""
+    """Everything that can be read from the unknowns `q` at `lam`.
+
+    Args:
+        model: the model that `system` was made from.
+        system: of the step.
+        q: (size,) unknowns.
+        lam: how much of the step is applied, 0 to 1.
+        step: number of the step.
+        stable: whether the state is stable, None if that was not asked.
+    """
     here = system.at(q, lam)
     e, mesh, creases = system.elements, model.mesh, system.creases
     strain, curvature = e.measures(here.x, system.side_rotations(here.components), system.frames)
@@ -99,15 +114,27 @@ def observe(
     reactions[system.constraints.fixed] = local[system.constraints.fixed]
     in_plane, bent = stresses(e, model.sheet, moments, strain)
     return ShellState(
-        mesh=mesh, step=step, lam=lam, points=here.x[: len(mesh.points)],
+        mesh=mesh,
+        step=step,
+        lam=lam,
+        points=here.x[: len(mesh.points)],
         energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum())),
         dihedral_angles=angles,
-        energy_density={"stretching": stretching / e.areas, "bending": bending / e.areas, "folding": by_triangle},
+        energy_density={
+            "stretching": stretching / e.areas,
+            "bending": bending / e.areas,
+            "folding": by_triangle,
+        },
         reactions=_to_corners(system, system.components.to_global(reactions)),
-        crease_moments=_crease_moments(system, couples), stable=stable, nodes=here.x,
-        frames=system.carried_frames(here.components), fold_angles=fold_angles, crease_couples=couples,
-        membrane_forces=in_plane, moments=bent,
-    )  # fmt: skip
+        crease_moments=_crease_moments(system, couples),
+        stable=stable,
+        nodes=here.x,
+        frames=system.carried_frames(here.components),
+        fold_angles=fold_angles,
+        crease_couples=couples,
+        membrane_forces=in_plane,
+        moments=bent,
+    )
 
 
 def _to_corners(system: ShellSystem, nodal: Array) -> Array:
@@ -158,7 +185,17 @@ def _jumps(system: ShellSystem, here: Here) -> Array:
 
 
 def stresses(elements: ShellElements, sheet: Sheet, moments: Array, strain: Array) -> tuple[Array, Array]:
-    """Membrane forces and moments (t, 3) at the middle of each triangle, components xx, yy, xy of the flat sheet."""
+    """Membrane forces and moments (t, 3) at the middle of each triangle, components xx, yy, xy of the flat sheet.
+
+    Args:
+        elements: of the sheet.
+        sheet: material and thickness.
+        moments: (t, 3 m) generalised moments.
+        strain: (t, 3 m) generalised strains.
+
+    Returns:
+        Membrane forces, N/mm, and moments, N.
+    """
     X = elements.mesh.nodes[elements.mesh.triangles, :2]
     slopes = gradients(MIDDLE)[0] if elements.mesh.degree == 2 else SLOPES
     F = np.einsum("tnc,nd->tcd", X, slopes)

@@ -63,7 +63,11 @@ def describe_motion(mesh: ElementMesh, creases: Connectors, x: Array, moves: Arr
     """What moves, as a clause to be followed by how: the whole sheet, a crease, or a few nodes.
 
     Args:
-        x: (n, 3) positions of all nodes; moves: (n, 3) their motion; beta: (c, r) that of fold angles.
+        mesh: elements.
+        creases: creased edges.
+        x: (n, 3) positions of all nodes, mm.
+        moves: (n, 3) their motion, of any size.
+        beta: (c, r) the motion of fold angles.
     """
     size = float(np.linalg.norm(moves))
     if size > 0.0:
