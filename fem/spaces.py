@@ -120,7 +120,7 @@ def regge_interpolation() -> Array:
 
 def edge_points(edge: int, s: Array) -> Array:
     """(q, 2) points at parameters s in [0, 1] on an edge, counter-clockwise."""
-    return CORNERS[(edge + 1) % 3] + s[:, None] * EDGES[edge]
+    return np.asarray(CORNERS[(edge + 1) % 3] + s[:, None] * EDGES[edge])
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,9 +25,9 @@ from bh.model.serialise import ACTUATIONS as MAKERS
 from bh.model.supports import Holding, RigidBody, Support, directions, select
 from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
 from bh.scene.reading import (
+    arguments,
     as_table,
     as_tables,
-    as_tuple,
     check_keys,
     nearest,
     one_line,
@@ -54,8 +53,18 @@ from bh.scene.tables import (
 )
 from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy",
-            "symmetry")  # fmt: skip
+SECTIONS = (
+    "pattern",
+    "sheet",
+    "mesh",
+    "model",
+    "supports",
+    "creases",
+    "steps",
+    "outputs",
+    "accuracy",
+    "symmetry",
+)
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
 COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
@@ -63,7 +72,15 @@ LONGEST_FILE = 20_000_000  # bytes
 
 @dataclass(frozen=True)
 class Outputs:
-    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet, the flat pattern."""
+    """What `bh run` writes beside the result.
+
+    Attributes:
+        pictures: of the folded sheet.
+        vtu: the path, a file a state and a list of them (PVD).
+        fold: the path as a FOLD file.
+        folded: formats of the folded sheet, such as "glb".
+        flat: formats of the flat pattern, such as "svg".
+    """
 
     pictures: bool = False
     vtu: bool = False
@@ -95,6 +112,9 @@ class Scene:
 
 def load_scene(path: str | Path) -> Scene:
     """Read a scene file.
+
+    Args:
+        path: of the file (TOML); patterns that it names are looked for in its folder.
 
     Raises:
         SceneError: it cannot be read, or asks for what cannot be; one line that begins with the file's name.
@@ -135,6 +155,11 @@ def load_scene(path: str | Path) -> Scene:
 def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     """A scene from its text; `folder` is where files that it names are looked for.
 
+    Args:
+        text: TOML.
+        folder: where files that it names are looked for.
+        name: of the scene, for messages and results.
+
     Raises:
         SceneError: the text is not TOML, or what it asks for cannot be; one line that begins with `name`.
     """
@@ -144,8 +169,13 @@ def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Sce
         raise SceneError(one_line(f"{name}: {error}")) from error
 
 
-def scene_from_tables(tables: dict[str, Any], folder: str | Path = ".", name: str = "scene") -> Scene:
+def scene_from_tables(tables: dict[str, object], folder: str | Path = ".", name: str = "scene") -> Scene:
     """A scene from its tables as `tomllib` reads them: what a sweep changes between points.
+
+    Args:
+        tables: keys and values of TOML.
+        folder: where files that they name are looked for.
+        name: of the scene, for messages and results.
 
     Raises:
         SceneError: as `parse_scene`.
@@ -160,7 +190,7 @@ def _scene(text: str, folder: Path) -> Scene:
     return _from_tables(read_toml(text), folder)
 
 
-def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
+def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     check_keys("", data, SECTIONS)
     for key in ("pattern", "sheet", "steps"):
         if key not in data:
@@ -190,11 +220,15 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
             pattern_of(model)
             if accuracy.at is not None:
                 model.mesh.nodes(accuracy.at)
-    return Scene(model, Outputs(**{name: as_tuple(value) for name, value in outputs}), accuracy=accuracy,
-                 symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None)  # fmt: skip
+    return Scene(
+        model,
+        Outputs(**arguments(outputs)),
+        accuracy=accuracy,
+        symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None,
+    )
 
 
-def _symmetry(model: Model, data: Any) -> Plane:
+def _symmetry(model: Model, data: object) -> Plane:
     """A letter, or a normal."""
     if not isinstance(data, str | list):
         raise SceneError(f'symmetry = {shown(data)} cannot be; give "x", "y" or a normal [x, y, 0]')
@@ -203,11 +237,11 @@ def _symmetry(model: Model, data: Any) -> Plane:
     return data if isinstance(data, str) else tuple(data)
 
 
-def _accuracy(data: Any) -> Goal:
+def _accuracy(data: object) -> Goal:
     """A number, or a table."""
     with within("accuracy"):
         if not isinstance(data, dict):
-            return Goal(data)
+            return Goal(data)  # type: ignore[arg-type]  # it refuses what is no number
         table = read_table(AccuracyTable, data, "accuracy")
         direction = None if table.direction is None else tuple(table.direction)
         return Goal(table.within, table.of, table.at, direction)  # type: ignore[arg-type]
@@ -226,7 +260,7 @@ def _formulation(name: str) -> str:
     return name
 
 
-def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
+def _mesh(pattern: object, mesh: object, folder: Path) -> SheetMesh:
     table = as_table(pattern, "pattern")
     if "file" in table:
         return _mesh_from_file(table, mesh, folder)
@@ -241,7 +275,7 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
     return _meshed(drawn, how)
 
 
-def _drawn(table: dict[str, Any]) -> CreasePattern:
+def _drawn(table: dict[str, object]) -> CreasePattern:
     """A pattern of the library, or of the user's own: "module:function" with its arguments as keys."""
     kind = table.get("kind")
     listed = ", ".join(LIBRARY)
@@ -277,7 +311,7 @@ def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
         return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
 
 
-def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable | DrawnTable:
+def _mesh_table(table: dict[str, object]) -> MeshTable | GmshTable | DrawnTable:
     if table.get("kind") == "gmsh":
         return read_table(GmshTable, table, "mesh")
     if table.get("kind") == "drawn":
@@ -289,7 +323,7 @@ def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable | DrawnTable:
     return read_table(MeshTable, table, "mesh")
 
 
-def _mesh_from_file(table: dict[str, Any], mesh: Any, folder: Path) -> SheetMesh:
+def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path) -> SheetMesh:
     name = shown(table["file"])
     suffix = Path(str(table["file"])).suffix.lower()
     if suffix in (".svg", ".dxf"):
@@ -305,8 +339,9 @@ def _mesh_from_file(table: dict[str, Any], mesh: Any, folder: Path) -> SheetMesh
         return read_fold(folder / stored.file, stored.frame)
 
 
-def _mesh_from_drawing(table: DrawingPattern, mesh: Any, folder: Path) -> SheetMesh:
+def _mesh_from_drawing(table: DrawingPattern, mesh: object, folder: Path) -> SheetMesh:
     from meshes.io import read_drawn, read_pattern
+    from meshes.io.drawing import DrawingOptions
 
     if mesh is None:
         raise SceneError(
@@ -314,7 +349,13 @@ def _mesh_from_drawing(table: DrawingPattern, mesh: Any, folder: Path) -> SheetM
             'side), or kind = "drawn" (the faces of the drawing)'
         )
     how = _mesh_table(as_table(mesh, "mesh"))
-    options = {name: value for name, value in table if name != "file"}
+    options: DrawingOptions = {
+        "scale": table.scale,
+        "fit": table.fit,
+        "tolerance": table.tolerance,
+        "gap": table.gap,
+        "lines": table.lines,
+    }
     with within("pattern.file"):
         if isinstance(how, DrawnTable):
             return read_drawn(folder / table.file, **options)
@@ -340,7 +381,7 @@ def _check_triangles(triangles: float) -> None:
         raise SceneError(f"mesh: this is some {triangles:.2g} triangles; ask for fewer than {LARGEST_MESH:,}")
 
 
-def _support(item: Any, at: str) -> Holding:
+def _support(item: object, at: str) -> Holding:
     if isinstance(item, dict) and ":" in str(item.get("kind")):
         with within(at):
             held: Holding = made(item["kind"], without(item, "kind"), Holding)
@@ -351,22 +392,26 @@ def _support(item: Any, at: str) -> Holding:
     place = table.at if isinstance(table.at, str) else tuple(table.at)
     if table.fix is None:
         return Support(place, clamp=table.clamp)
-    fix: Any = table.fix
-    if not isinstance(fix, str):
-        vectors = fix if isinstance(fix[0], list) else [fix]
-        fix = tuple(_direction(vector, f"{at}.fix") for vector in vectors)
+    fix = table.fix if isinstance(table.fix, str) else _vectors(table.fix, f"{at}.fix")
     with within(f"{at}.fix"):
         directions(fix)
     return Support(place, fix, table.clamp)
 
 
-def _crease(item: Any, at: str) -> CreaseLaw:
+def _vectors(fix: list[float] | list[list[float]], at: str) -> tuple[tuple[float, ...], ...]:
+    """A direction, or a list of directions, as a tuple of them."""
+    vectors = [each for each in fix if isinstance(each, list)]
+    numbers = [each for each in fix if not isinstance(each, list)]
+    return tuple(_direction(vector, at) for vector in vectors or [numbers])
+
+
+def _crease(item: object, at: str) -> CreaseLaw:
     table = read_table(CreaseTable, item, at)
     with within(at):
         return CreaseLaw(table.Lstar, table.stiffness, table.rest)
 
 
-def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
+def _step(item: object, at: str) -> tuple[Actuation | Until, ...]:
     step = as_table(item, at)
     check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTUATIONS, "until"))
     if not set(step) - {"until"}:
@@ -381,7 +426,7 @@ def _step(item: Any, at: str) -> tuple[Actuation | Until, ...]:
     return tuple(found)
 
 
-def _until(item: Any, at: str) -> Until:
+def _until(item: object, at: str) -> Until:
     table = read_table(UntilTable, item, at)
     with within(at):
         if table.depth is not None:
@@ -391,12 +436,12 @@ def _until(item: Any, at: str) -> Until:
         return Until(table.observable, table.value, table.of, table.tolerance)
 
 
-def _actuation(key: str, item: Any, at: str) -> Actuation:
+def _actuation(key: str, item: object, at: str) -> Actuation:
     if ":" in key:
         with within(at):
             own: Actuation = made(key, as_table(item, at), Actuation)
             return own
-    given = {name: as_tuple(value) for name, value in read_table(ACTUATIONS[key], item, at)}
+    given = arguments(read_table(ACTUATIONS[key], item, at))
     if isinstance(given.get("direction"), tuple):
         given["direction"] = _direction(given["direction"], f"{at}.direction")
     with within(at):

@@ -80,9 +80,16 @@ def step_over(before: Path, model: Model) -> Path | None:
     if not found.converged or not found.stable or system.objection(record.q, 1.0, found.q, 1.0):
         return None
     record = Record(
-        last, 1.0, found.q, found.iterations, found.evaluation.imbalance, 0.0, record.next_increment,
-        negative=found.negative, note="from a neighbouring point",
-    )  # fmt: skip
+        last,
+        1.0,
+        found.q,
+        found.iterations,
+        found.evaluation.imbalance,
+        0.0,
+        record.next_increment,
+        negative=found.negative,
+        note="from a neighbouring point",
+    )
     path.records.append(record)
     path.steps.append(StepOutcome("reached"))
     return path
