@@ -1,4 +1,7 @@
-"""Compile (or load from the cache) every kernel, so that a user's first run does not wait: `python -m bh.commands.warm_up`."""
+"""Compile every kernel, or load it from the cache, so that a user's first run does not wait.
+
+Run it as `python -m bh.commands.warm_up`.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ import math
 import meshes
 from bh.analysis.contact import candidates
 from bh.analysis.triangles import intersecting
-from bh.formulations.registry import names
+from bh.formulations.registry import formulation, names
+from bh.loading.program import program
 from bh.model.model import Model, Sheet
 from bh.paths.path import Path
 from bh.solvers.linear import linear_response
@@ -17,15 +21,16 @@ from bh.solving.follow import trace
 def warm_up() -> None:
     """Fold a tiny sheet in every way that has kernels of its own, in every formulation that is installed."""
     mesh = meshes.structured(meshes.annulus_sector(10.0, 1.0, 0.3), along=2)
-    for formulation in names():
-        path = _fold(Model(mesh, Sheet(E=1.0, t=0.1), formulation=formulation))
+    for name in names():
+        path = _fold(Model(mesh, Sheet(E=1.0, t=0.1), formulation=name))
     clamped = Model(mesh, Sheet(E=1.0, t=0.1), formulation="consistent").support(
         "edge:start", "xyz", clamp=True
     )
     trace(clamped.fold("crease", rest=3.0, Lstar=1.0))
     intersecting(path[-1].points, mesh.triangles, candidates(path[-1].points, mesh.triangles), 1e-9)
     wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
-    system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0))._system(0)
+    model = Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0)
+    system = formulation(model.formulation).system(model, program(model)[0], None)
     now = system.evaluate(system.start(), 0.0)
     matrix = system.tangent(system.start(), 0.0, now.forces)
     matrix @ matrix.factorise().solve(now.residual)
@@ -38,12 +43,12 @@ def _fold(sheet: Model) -> Path:
         .support("edge:end", [[0.0, 1.0, 1.0]])
         .fold("crease", rest=3.0, Lstar=1.0)
     )
-    system = path._system(0)
+    system, _ = path.solved()
     linear_response(system, path.records[0].q)
     displaced = (
         sheet.support("edge:start", "xyz").support("edge:inner", "z").displace("corner:outer-end", "z", 0.01)
     )
-    system = trace(displaced)._system(0)
+    system, _ = trace(displaced).solved()
     system.control_rate(system.start(), 0.0)
     return path
 

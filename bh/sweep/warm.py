@@ -69,8 +69,9 @@ def step_over(before: Path, model: Model) -> Path | None:
     path = Path(model)
     path.records = [record for record in before.records if record.step < last]
     path.steps = list(before.steps[:last])
-    system = path._system(last)
     old, record = before.solved()
+    path.records.append(record)  # the initial guess, until the state is found
+    system, _ = path.solved()
     if len(record.q) != system.size:
         return None
     newton = LoadControl().newton
@@ -90,7 +91,7 @@ def step_over(before: Path, model: Model) -> Path | None:
         negative=found.negative,
         note="from a neighbouring point",
     )
-    path.records.append(record)
+    path.records[-1] = record
     path.steps.append(StepOutcome("reached"))
     return path
 
