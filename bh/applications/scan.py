@@ -21,9 +21,22 @@ from bh.plotting.offscreen import PlotError, render
 from meshes.io.export import replacing
 
 __all__ = [
-    "IDENTITY", "TRIM", "Comparison", "Distances", "Motion", "Registration", "ScanError", "Surface", "align", "compare",
-    "distances", "picked", "picture", "read_cloud", "register",
-]  # fmt: skip
+    "IDENTITY",
+    "TRIM",
+    "Comparison",
+    "Distances",
+    "Motion",
+    "Registration",
+    "ScanError",
+    "Surface",
+    "align",
+    "compare",
+    "distances",
+    "picked",
+    "picture",
+    "read_cloud",
+    "register",
+]
 
 
 @dataclass(frozen=True, eq=False)
