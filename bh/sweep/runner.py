@@ -126,7 +126,8 @@ def run(
             )
         found, broken = _collect(state, ready, pool, retries)
         if broken:  # everything in flight is lost with the pool, or was finished just before
-            more, _ = _collect(state, wait(state.running).done, pool, retries)
+            # a scheduler that is gone may leave futures that never come back
+            more, _ = _collect(state, wait(state.running, timeout=QUIET_S).done, pool, retries)
             found += more
         if found:
             store.add(found)
