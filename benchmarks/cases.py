@@ -48,14 +48,22 @@ def array_problem(name: str) -> bh.Model | None:
     if not file.is_file():
         return None
     data = json.loads(file.read_text())
-    model = bh.Model.from_arrays(
-        data["nodes"], data["triangles"], data["bars"], data["bar_k"], data["bend_hinges"], data["bend_k"],
-        data["fold_hinges"], data["fold_k"], data["supports"], green=True,
-    )  # fmt: skip
+    names = (
+        "nodes",
+        "triangles",
+        "bars",
+        "bar_k",
+        "bend_hinges",
+        "bend_k",
+        "fold_hinges",
+        "fold_k",
+        "supports",
+    )
+    model = bh.Model.from_arrays(*(data[key] for key in names), green=True)
     return model.fold("fold", rest=data["fold_rest_end"])
 
 
-def least(job: Callable[[], Any], seconds: float = 1.0, most: int = 200) -> float:
+def least(job: Callable[[], object], seconds: float = 1.0, most: int = 200) -> float:
     """Least processor time of a job that runs in this thread, s, over at least three runs and about `seconds`.
 
     On a quiet machine that is the wall time; on a busy one it leaves out the time of others.
@@ -111,8 +119,14 @@ def one_iteration(make: Callable[[], bh.Model]) -> dict[str, Any]:
     else:
         solver = "PARDISO" if pardiso.pays(system.size) else "multifrontal"
     return {
-        "unknowns": system.size, "solver": solver, "pattern": took_pattern, "analysis": max(first - factorise, 0.0),
-        "evaluate": evaluate, "assemble": assemble, "factorise": factorise, "solve": solve,
+        "unknowns": system.size,
+        "solver": solver,
+        "pattern": took_pattern,
+        "analysis": max(first - factorise, 0.0),
+        "evaluate": evaluate,
+        "assemble": assemble,
+        "factorise": factorise,
+        "solve": solve,
         "total": evaluate + assemble + factorise + solve,
         "memory": {phase: value - before for phase, value in memory.items()},
-    }  # fmt: skip
+    }
