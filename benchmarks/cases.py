@@ -48,18 +48,18 @@ def array_problem(name: str) -> bh.Model | None:
     if not file.is_file():
         return None
     data = json.loads(file.read_text())
-    names = (
-        "nodes",
-        "triangles",
-        "bars",
-        "bar_k",
-        "bend_hinges",
-        "bend_k",
-        "fold_hinges",
-        "fold_k",
-        "supports",
+    model = bh.Model.from_arrays(
+        data["nodes"],
+        data["triangles"],
+        data["bars"],
+        data["bar_k"],
+        data["bend_hinges"],
+        data["bend_k"],
+        data["fold_hinges"],
+        data["fold_k"],
+        data["supports"],
+        green=True,
     )
-    model = bh.Model.from_arrays(*(data[key] for key in names), green=True)
     return model.fold("fold", rest=data["fold_rest_end"])
 
 

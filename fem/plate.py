@@ -62,7 +62,12 @@ class Deflection:
 
 
 def morley(mesh: skfem.MeshTri, plate: Plate) -> Deflection:
-    """Solve with Morley's element."""
+    """Solve with Morley's element.
+
+    Args:
+        mesh: triangles, mm.
+        plate: stiffness, support and load.
+    """
     basis = skfem.Basis(mesh, skfem.ElementTriMorley(), intorder=4)
 
     def stiffness(u: Any, v: Any, _: Any) -> Any:
@@ -76,7 +81,12 @@ def morley(mesh: skfem.MeshTri, plate: Plate) -> Deflection:
 
 
 def hhj(mesh: skfem.MeshTri, plate: Plate) -> Deflection:
-    """Solve with the Hellan-Herrmann-Johnson element of second order."""
+    """Solve with the Hellan-Herrmann-Johnson element of second order.
+
+    Args:
+        mesh: triangles, mm.
+        plate: stiffness, support and load.
+    """
     moment, quadratic = skfem.ElementTriHHJ1(), skfem.ElementTriP2G()
     inside = skfem.Basis(mesh, moment, intorder=4)
     bending = skfem.Basis(mesh, quadratic, intorder=4)

@@ -88,7 +88,14 @@ class ShellElements:
         )
 
     def tangent(self, x: Array, forces: Array, B: Array, frames: Frames) -> Array:
-        """(t, w, w) element tangents with the given forces (t, 6 m) in their geometric part."""
+        """(t, w, w) element tangents with the given forces (t, 6 m) in their geometric part.
+
+        Args:
+            x: (n, 3) positions of all nodes, mm.
+            forces: (t, 6 m) conjugate to strains and curvatures.
+            B: (t, 6 m, w) gradients there.
+            frames: of the step.
+        """
         K = np.zeros((len(self.areas), self.width, self.width))
         kernels.add_material(B, self.membrane, self.bending, K)
         kernels.add_geometric(x, forces, self.loops, frames, K)

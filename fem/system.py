@@ -331,7 +331,14 @@ class ShellSystem:
         return out
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Why an increment is not to be trusted; "" if it is."""
+        """Why an increment is not to be trusted; "" if it is.
+
+        Args:
+            q: (size,) unknowns before the increment.
+            lam: before the increment.
+            q_new: (size,) after it.
+            lam_new: after it.
+        """
         before, after = self.components.whole(q, lam), self.components.whole(q_new, lam_new)
         turn = float(np.abs(self.components.alpha(after) - self.components.alpha(before)).max())
         if turn > LARGEST_TURN:

@@ -32,7 +32,16 @@ def arc_lengths(points: Array) -> Array:
 
 
 def interpolated(at: Array, lengths: Array, values: Array) -> Array:
-    """(n, d) values (k, d), known at rising lengths (k,), linear between them, at lengths (n,)."""
+    """Values between samples, linear in the length.
+
+    Args:
+        at: (n,) lengths where they are wanted.
+        lengths: (k,) rising lengths of the samples.
+        values: (k, d) samples.
+
+    Returns:
+        (n, d).
+    """
     return np.column_stack([np.interp(at, lengths, column) for column in values.T])
 
 
@@ -199,7 +208,12 @@ def _arc_step(heading: float, k: float, s: Array) -> Array:
 
 
 def sample(curve: Curve, tolerance: float = 1e-3) -> Array:
-    """Points (k, 2) on `curve` whose chords stay within about `tolerance` (mm) of it."""
+    """Points (k, 2) on `curve` whose chords stay within about `tolerance` (mm) of it.
+
+    Args:
+        curve: of any kind.
+        tolerance: mm; a `Polyline` gives its own vertices whatever it is.
+    """
     if isinstance(curve, Polyline):
         return curve.vertices
     if isinstance(curve, ArcChain):

@@ -70,6 +70,11 @@ def annulus_sector(
 def full_annulus(radius: float | Sequence[float], width: float, folds: Folds = "mountain") -> CreasePattern:
     """A whole annulus with concentric creases; arguments as for `annulus_sector`.
 
+    Args:
+        radius: radius of the crease, or rising radii of several creases, mm.
+        width: of the panel inside the first and outside the last crease, mm.
+        folds: "mountain" or "valley" for all, or one word a crease from the inside.
+
     Raises:
         PatternError: sizes that cannot be, radii out of order, or folds that are not one a crease.
     """
@@ -218,7 +223,7 @@ def _graph(width: float, y: Callable[[Array], Array]) -> Polyline:
 
 
 def alternating(count: int) -> list[FoldKind]:
-    """Mountain and valley in turn."""
+    """Mountain and valley in turn, mountain first."""
     return ["valley" if i % 2 else "mountain" for i in range(count)]
 
 

@@ -67,6 +67,10 @@ class Topology:
 def build(triangles: Ints, nodes: int) -> Topology:
     """Topology of (t, 3) `triangles` on `nodes` nodes.
 
+    Args:
+        triangles: (t, 3) node numbers.
+        nodes: how many nodes there are.
+
     Raises:
         MeshError: an index is out of range, a triangle repeats a node, an edge has more than two triangles
             (non-manifold) or neighbouring triangles are oriented against each other.

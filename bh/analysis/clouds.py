@@ -207,7 +207,7 @@ def align(points: ArrayLike, targets: ArrayLike, names: tuple[str, str] = ("poin
 
 
 def picked(on_cloud: ArrayLike, on_sheet: ArrayLike) -> Motion:
-    """First guess from three or more points picked on the scan (k, 3) and the same ones of the sheet (k, 3).
+    """Initial guess from three or more points picked on the scan (k, 3) and the same ones of the sheet (k, 3).
 
     Corners and ends of creases serve best: `state.points[state.mesh.corners["corner:inner-start"]]`.
 

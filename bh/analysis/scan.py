@@ -64,7 +64,15 @@ class Surface:
         return np.asarray(found, dtype=float).reshape(-1, 3), np.asarray(cells, dtype=np.int64).reshape(-1)
 
     def on_edge(self, found: Array, cells: Ints) -> NDArray[np.bool_]:
-        """(k,) do these points of triangles `cells` lie on an edge of the sheet?"""
+        """Whether points lie on an edge of the sheet, to rounding.
+
+        Args:
+            found: (k, 3) points of the sheet, mm.
+            cells: (k,) the triangles that they lie on.
+
+        Returns:
+            (k,) truth values.
+        """
         p = self.points[self.triangles[cells]]
         height = np.empty((len(found), 3))  # of the point over each side, relative to the triangle's
         for corner in range(3):
@@ -120,7 +128,7 @@ class Registration:
 def register(
     cloud: ArrayLike, state: State | Surface, start: Motion = IDENTITY, trim: float = TRIM
 ) -> Registration:
-    """The rigid motion that brings a scan (k, 3) onto a solved sheet, from the first guess `start`; see the module.
+    """The rigid motion that brings a scan (k, 3) onto a solved sheet, from the initial guess `start`; see the module.
 
     Args:
         cloud: (k, 3), mm.

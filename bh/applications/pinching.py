@@ -107,6 +107,10 @@ class Response:
 def respond(pattern: CreasePattern, how: Pinching | None = None) -> Response:
     """Fold and pinch a pattern.
 
+    Args:
+        pattern: with edges "start", "end", "inner" and "outer".
+        how: it is made, folded and pinched; None for the defaults.
+
     Raises:
         ModelError: the sheet did not get there; the message says how far.
     """
@@ -145,12 +149,23 @@ def bends(length: float = 100.0, spacing: float = 5.0, curvature: float = 0.01) 
 
 
 def stays(length: float = 100.0, spacing: float = 5.0) -> CreasePattern:
-    """Neither (Fig. 5.12 c): five straight creases."""
+    """Neither (Fig. 5.12 c): five straight creases.
+
+    Args:
+        length: of the creases, mm.
+        spacing: between creases and to the edges, mm.
+    """
     return meshes.parallel_creases(0.0, length, spacing, 5)
 
 
 def bends_and_twists(length: float = 100.0, spacing: float = 5.0, curvature: float = 0.01) -> CreasePattern:
-    """Both (Fig. 5.12 d): one arc."""
+    """Both (Fig. 5.12 d): one arc.
+
+    Args:
+        length: of the crease, mm.
+        spacing: to the edges, mm.
+        curvature: kappa_0, 1/mm.
+    """
     return meshes.parallel_creases(curvature, length, spacing, 1)
 
 

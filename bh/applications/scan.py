@@ -69,7 +69,7 @@ class Comparison:
 def compare(
     cloud: ArrayLike, state: State, start: Motion = IDENTITY, spacing: float = 1.0, trim: float = TRIM
 ) -> Comparison:
-    """Register a scan (k, 3) on a solved sheet from the first guess `start` and measure the distances both ways.
+    """Register a scan (k, 3) on a solved sheet from the initial guess `start` and measure the distances both ways.
 
     Args:
         cloud: (k, 3) scan points, mm.

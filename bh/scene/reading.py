@@ -149,6 +149,10 @@ def as_tables(data: object, at: str) -> list[object]:
 def one_or_more(value: object, at: str) -> list[tuple[str, object]]:
     """A table, or the tables of a list, each with its path.
 
+    Args:
+        value: what the scene has there.
+        at: its dotted path.
+
     Raises:
         SceneError: the list is empty.
     """

@@ -327,6 +327,13 @@ def _under(folded: Folded, points: Array, across: Array, half: float) -> Array:
 def all_directions(folded: Folded, rig: Rig | None = None) -> dict[str, BendingTest]:
     """The three tests of the source: bending about x, xy and y.
 
+    Args:
+        folded: the corrugation.
+        rig: supports and bar; None for those of the source.
+
+    Returns:
+        The tests by direction.
+
     Raises:
         ModelError: see `three_point`.
     """

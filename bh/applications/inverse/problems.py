@@ -64,6 +64,10 @@ class Design:
 def resample(curve: ArrayLike, count: int) -> Array:
     """(count, 2) points at equal distances along a curve given by points (k, 2), both ends included.
 
+    Args:
+        curve: (k, 2), mm.
+        count: of the points.
+
     Raises:
         DesignError: fewer than two different points.
     """
@@ -217,7 +221,12 @@ class ReachPoint(_Segments):
     target: Array = field(default_factory=lambda: np.zeros(3))
 
     def end(self, x: Array, on: Bools) -> Array:
-        """(..., 3) ends of designs, mm."""
+        """(..., 3) ends of designs, mm.
+
+        Args:
+            x: (..., 2 n) variables.
+            on: (..., n) pinches.
+        """
         return self.surrogate.forward(*self.split(x), on, check=False)[0][..., -1, :]
 
     def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:

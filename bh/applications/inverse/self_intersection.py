@@ -36,7 +36,7 @@ class SelfIntersectionRule(Protocol):
 
 
 def planar(points: ArrayLike) -> Bools:
-    """(...) True where polygons (..., n + 1, 2) cross themselves.
+    """Whether polygons intersect themselves: (...) of (..., n + 1, 2) vertices.
 
     Two segments cross if the ends of each lie on different sides of the other. Touching is allowed, so that a crease
     may end where it begins; a segment that goes straight back over the one before is not.
@@ -123,7 +123,7 @@ class Swept:
         return False
 
     def flat_is_simple(self, k0: ArrayLike, length: ArrayLike) -> bool:
-        """Can the flat strip be cut out of one sheet?"""
+        """Whether the flat strip of one design, (n,) each, can be cut out of one sheet."""
         from meshes import PatternError, parallel_creases
 
         try:
@@ -135,7 +135,14 @@ class Swept:
     def strip(
         self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools
     ) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-        """Points (m, 3), triangles (t, 3) and the number (t,) of the cell along the crease that each belongs to."""
+        """Points (m, 3), triangles (t, 3) and the number (t,) of the cell along the crease that each belongs to.
+
+        Args:
+            surrogate: of the segments.
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+            pinched: (n,).
+        """
         points, frames = self.crease(surrogate, k0, length, pinched)
         half = 0.5 * surrogate.setting.fold
         down, out = self.width * math.cos(half), self.width * math.sin(half)
@@ -153,7 +160,14 @@ class Swept:
         return np.vstack((points, left, right)), triangles, np.tile(i, 4)
 
     def crease(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> tuple[Array, Array]:
-        """(m, 3) points and (m, 3, 3) frames along the whole crease, one a cell."""
+        """(m, 3) points and (m, 3, 3) frames along the whole crease, one a cell.
+
+        Args:
+            surrogate: of the segments.
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+            pinched: (n,).
+        """
         ends, starts = surrogate.forward(k0, length, pinched, check=False)
         points, frames = [ends[:1]], [starts[:1]]
         for i, (k, size, on) in enumerate(zip(k0, length, pinched, strict=True)):

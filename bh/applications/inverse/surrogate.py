@@ -170,7 +170,12 @@ class Surrogate:
         return chain(*self.local(k0, length, pinched, check))
 
     def unpinched(self, k0: ArrayLike, length: ArrayLike) -> tuple[Array, Array]:
-        """Points and frames of designs before they are pinched."""
+        """Points and frames of designs before they are pinched.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+        """
         return chain(*folded_transforms(k0, length, self.setting.fold))
 
     def about(self) -> Mapping[str, object]:
