@@ -45,8 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None for those of the process.
 
     Returns:
-        The exit code: 0, 1 where a result was not reached, 2 for bad input, 3 for a fault of the program, 130 where it was
-        interrupted.
+        The exit code: 0, 1 where a result was not reached, 2 for bad input, 3 for a fault of the program, 130 where
+        it was interrupted.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in (words[: words.index("--")] if "--" in words else words)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bh.plotting.camera import best_view, viewing_axes
 from bh.plotting.offscreen import PlotError
 from bh.plotting.panels import cut_open
 from meshes.io.export import replacing
@@ -95,8 +96,6 @@ def frames(
     Raises:
         PlotError: no models, no states, or not as many states as lambdas.
     """
-    from bh.plotting.pictures import best_view, viewing_axes
-
     if not models or not lambdas:
         raise PlotError("there are no states to show; trace the model first")
     for name, states in models.items():

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.plotting.camera import Camera, camera_of
 from bh.plotting.charts import INK
 from bh.plotting.offscreen import PlotError, has_display, render
 from bh.plotting.panels import cut_open
@@ -86,7 +87,7 @@ def picture(
     unit = _unit(width, height)
     head, foot = int(64 * unit) if title else 0, int(118 * unit) if colouring is not None else 0
     inner = height - head - foot
-    image = _render(state, colouring, (width, inner), _camera(state, width / inner, camera))
+    image = _render(state, colouring, (width, inner), camera_of(state, width / inner, camera))
     figure = _frame(image, (width, height), foot, title, f"{colour} energy density", colouring)
     with replacing(target) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
@@ -114,7 +115,7 @@ def moving_pictures(
     unit = _unit(width, height)
     head, foot = int(64 * unit), int(118 * unit) if top else 0
     inner = height - head - foot
-    camera = _camera(states[-1], width / inner, None, np.concatenate([state.points for state in states]))
+    camera = camera_of(states[-1], width / inner, None, np.concatenate([state.points for state in states]))
     found = []
     for state in states:
         colouring = _colouring(state, colour, top or None)
@@ -147,7 +148,7 @@ def show(state: State, colour: str | None = "bending", **options: object) -> obj
 
     colouring = _colouring(state, colour, None)
     plotter = pv.Plotter(window_size=[1200, 900], title="bh")
-    near = _camera(state, 4 / 3, None)
+    near = camera_of(state, 4 / 3, None)
     # room for the texts
     camera = near._replace(
         half_height=1.22 * near.half_height, centre=near.centre - 0.08 * near.half_height * near.up
@@ -327,85 +328,6 @@ def _lines(state: State, pairs: NDArray[np.int64]) -> PolyData:
 def _tubes(plotter: Plotter, lines: PolyData, radius: float) -> None:
     joined = lines.strip(join=True, max_length=100_000)
     plotter.add_mesh(joined.tube(radius=radius, n_sides=12, capping=True), color=INK, lighting=False)
-
-
-# --- where it is seen from ---------------------------------------------------------------------------------
-
-
-class Camera(NamedTuple):
-    """Parallel projection with z up: the picture's unit vectors in space, its centre and half its height, mm."""
-
-    across: Array
-    up: Array
-    back: Array
-    centre: Array
-    half_height: float
-    depth: float
-
-    def aim(self, plotter: Plotter) -> None:
-        """Make a pyvista plotter see the sheet so."""
-        plotter.enable_parallel_projection()
-        plotter.camera.focal_point = self.centre
-        plotter.camera.position = self.centre + 2.0 * self.depth * self.back
-        plotter.camera.up = self.up
-        plotter.camera.parallel_scale = self.half_height
-        plotter.camera.clipping_range = (0.5 * self.depth, 3.5 * self.depth)
-
-
-def _camera(
-    state: State, aspect: float, view: tuple[float, float] | None, points: Array | None = None
-) -> Camera:
-    """The sheet fills the picture (`aspect` wide a height) but for a margin, or all of `points` (n, 3) do."""
-    across, up, back = viewing_axes(*(view or best_view(state, aspect)))
-    to_picture = np.column_stack((across, up, back))
-    seen = (state.points if points is None else points) @ to_picture
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    width, height, _ = (high - low).tolist()
-    centre, depth = to_picture @ (0.5 * (low + high)), float(np.linalg.norm(high - low))
-    return Camera(across, up, back, centre, 0.54 * max(width / aspect, height), depth)
-
-
-def best_view(state: State, aspect: float) -> tuple[float, float]:
-    """Azimuth and elevation, rad, from where most of the upper side is seen and the picture is filled.
-
-    Args:
-        state: of a path.
-        aspect: width of the picture over its height.
-    """
-    triangles = state.points[state.mesh.triangles]
-    doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    area = np.linalg.norm(doubled, axis=1)
-    normal, weight = doubled / area[:, None], area / area.sum()
-    if weight @ normal[:, 2] < 0.0:
-        normal = -normal
-    plan = state.points[:, :2] - state.points[:, :2].mean(axis=0)
-    long_axis = np.linalg.eigh(plan.T @ plan)[1][:, 1]
-    best, choice = -np.inf, (0.0, 0.0)
-    for elevation in np.deg2rad((30.0, 36.0, 42.0, 48.0)):
-        for azimuth in np.deg2rad(np.arange(-60.0, 300.0, 10.0)):
-            across, up, back = viewing_axes(azimuth, elevation)
-            facing = np.log(np.maximum(normal @ back, 0.08))
-            extent = max(np.ptp(state.points @ across) / aspect, np.ptp(state.points @ up))
-            # along and across the sheet are dull; so is a view from far above
-            slanted = abs(2.0 * (long_axis @ across[:2]) * (long_axis @ back[:2]))
-            score = float(weight @ facing - 0.8 * np.log(extent) + 0.3 * slanted - 0.6 * elevation)
-            if score > best + 1e-9:
-                best, choice = score, (float(azimuth), float(elevation))
-    return choice
-
-
-def viewing_axes(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
-    """Unit vectors (3,) of the picture in space: to its right, to its top, and towards the viewer.
-
-    Args:
-        azimuth: that it looks from, rad.
-        elevation: that it looks from, rad.
-    """
-    back = np.array(
-        (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
-    )
-    across = np.array((-np.sin(azimuth), np.cos(azimuth), 0.0))
-    return across, np.cross(back, across), back
 
 
 # --- rendering ---------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,6 +185,28 @@ def simulate(
     return Simulated(path, t, r, path[-1].dihedral("crease")[[0, -1]])
 
 
+class SegmentValues(TypedDict):
+    """What is measured of a segment.
+
+    Attributes:
+        t: (3,) end of the crease in the frame at its start, mm.
+        uvw: (3,) Tait-Bryan angles of the frame there, rad.
+        end_dihedral: (2,) dihedral angles of the first and the last edge of the crease, rad.
+        energy: elastic, N mm.
+        stable: 1 if the state is stable, else 0.
+        critical_points: on the way.
+        iterations: of the solver.
+    """
+
+    t: Array
+    uvw: Array
+    end_dihedral: Array
+    energy: float
+    stable: float
+    critical_points: int
+    iterations: int
+
+
 @dataclass(frozen=True)
 class SegmentTask:
     """One pinched segment: the task of the sweep that makes the data set (`bh.sweep.run`).
@@ -198,7 +221,7 @@ class SegmentTask:
         """What the task is, for the identity of a sweep."""
         return f"pinched segment {self.setting.identity}"
 
-    def __call__(self, point: Mapping[str, float | int | str | bool]) -> dict[str, object]:
+    def __call__(self, point: Mapping[str, float | int | str | bool]) -> SegmentValues:
         """Simulate a segment and measure its end.
 
         Raises:
