@@ -40,7 +40,7 @@ def wide(rows: int) -> bh.Model:
     return supported(meshes.structured(meshes.annulus_sector(100.0, 30.0, 1.5), along=4 * rows, rows=rows))
 
 
-def least(job: Callable[[], Any], seconds: float = 1.0, most: int = 200) -> float:
+def least(job: Callable[[], object], seconds: float = 1.0, most: int = 200) -> float:
     """Least processor time of a job that runs in this thread, s, over at least three runs and about `seconds`.
 
     On a quiet machine that is the wall time; on a busy one it leaves out the time of others.
@@ -96,8 +96,14 @@ def one_iteration(make: Callable[[], bh.Model]) -> dict[str, Any]:
     else:
         solver = "PARDISO" if pardiso.pays(system.size) else "multifrontal"
     return {
-        "unknowns": system.size, "solver": solver, "pattern": took_pattern, "analysis": max(first - factorise, 0.0),
-        "evaluate": evaluate, "assemble": assemble, "factorise": factorise, "solve": solve,
+        "unknowns": system.size,
+        "solver": solver,
+        "pattern": took_pattern,
+        "analysis": max(first - factorise, 0.0),
+        "evaluate": evaluate,
+        "assemble": assemble,
+        "factorise": factorise,
+        "solve": solve,
         "total": evaluate + assemble + factorise + solve,
         "memory": {phase: value - before for phase, value in memory.items()},
-    }  # fmt: skip
+    }

@@ -6,17 +6,18 @@ Newton iterations of growing sheets, phase by phase.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
 
 import bh
 from benchmarks.cases import strip, wide
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
 from bh.runtime.threads import one_blas_thread
-from bh.solvers.increments import point
+from bh.solvers.increments import Increment, point
 from bh.solvers.trace import Walk, walk
 from verification.studies.app_b.appendix_b import model
 from verification.theory.array_annulus import ENERGIES, array_annulus
@@ -24,11 +25,12 @@ from verification.theory.array_annulus import ENERGIES, array_annulus
 
 @pytest.fixture(scope="module")
 def annulus() -> bh.Model:
+    """The sheet of App. B (a), with warm kernels."""
     bh.trace(model("a"))  # warm up
     return model("a")
 
 
-def test_trace_of_appendix_b(benchmark: Any, annulus: bh.Model) -> None:
+def test_trace_of_appendix_b(benchmark: BenchmarkFixture, annulus: bh.Model) -> None:
     """The whole job: program, pattern, all increments, records."""
     path = benchmark(bh.trace, annulus)
     benchmark.extra_info["iterations"] = path.iterations
@@ -36,11 +38,11 @@ def test_trace_of_appendix_b(benchmark: Any, annulus: bh.Model) -> None:
     assert path.outcome == "reached"
 
 
-def test_solver_alone(benchmark: Any, annulus: bh.Model) -> None:
+def test_solver_alone(benchmark: BenchmarkFixture, annulus: bh.Model) -> None:
     """System, pattern and all increments, without path, records and provenance: the surroundings are the difference."""
     steps = load_steps(annulus)
 
-    def fold() -> Any:
+    def fold() -> list[Increment]:
         system = formulation(annulus.formulation).system(annulus, steps[0], None)
         start = point(system, system.start(), 0.0)
         return list(walk(Walk(system, bh.Automatic(), (start,))))
@@ -49,14 +51,14 @@ def test_solver_alone(benchmark: Any, annulus: bh.Model) -> None:
     assert increments[-1].outcome == "reached"
 
 
-def test_trace_to_a_file(benchmark: Any, annulus: bh.Model, tmp_path: Path) -> None:
+def test_trace_to_a_file(benchmark: BenchmarkFixture, annulus: bh.Model, tmp_path: Path) -> None:
     """With every state on disk before the next increment begins."""
     file = tmp_path / "path.bh"
     assert benchmark(lambda: bh.trace(annulus, file=file)).outcome == "reached"
 
 
 @pytest.mark.parametrize("held", [True, False], ids=["held crease", "spring crease"])
-def test_one_iteration(benchmark: Any, annulus: bh.Model, held: bool) -> None:
+def test_one_iteration(benchmark: BenchmarkFixture, annulus: bh.Model, held: bool) -> None:
     """Assembly, factorisation and solve of one Newton iteration at the folded state."""
     spring = bh.Model(annulus.mesh, annulus.sheet, annulus.supports).fold("crease", rest=1.6, Lstar=25.0)
     sheet = annulus if held else spring
@@ -64,15 +66,15 @@ def test_one_iteration(benchmark: Any, annulus: bh.Model, held: bool) -> None:
     system, record = path.solved()
     q = record.q
 
-    def iteration() -> Any:
+    def iteration() -> None:
         now = system.evaluate(q, 1.0)
-        return system.tangent(q, 1.0, now.forces).matrix.factorise().solve(now.residual)
+        system.tangent(q, 1.0, now.forces).matrix.factorise().solve(now.residual)
 
     benchmark(iteration)
 
 
 @pytest.mark.parametrize("columns", ENERGIES)
-def test_array_problem(benchmark: Any, columns: Any) -> None:
+def test_array_problem(benchmark: BenchmarkFixture, columns: int) -> None:
     """The annulus of plain arrays from flat to a rest angle of 90 degrees."""
     path = benchmark(bh.trace, array_annulus(columns).model())
     benchmark.extra_info["iterations"] = path.iterations
@@ -91,17 +93,17 @@ PHASES = ("pattern", "evaluate", "assemble", "factorise", "solve")
 
 @pytest.mark.parametrize("phase", PHASES)
 @pytest.mark.parametrize(("make", "size"), SIZES)
-def test_phase(benchmark: Any, make: Any, size: int, phase: str) -> None:
+def test_phase(benchmark: BenchmarkFixture, make: Callable[[int], bh.Model], size: int, phase: str) -> None:
     """One phase of one Newton iteration in the flat state."""
     model = make(size)
     steps = load_steps(model)
 
-    def build() -> Any:
-        system = formulation(model.formulation).system(model, steps[0], None)
-        assert system._pattern.size > 0
-        return system
+    def make_system() -> None:
+        made = formulation(model.formulation).system(model, steps[0], None)
+        assert made._pattern.size > 0
 
-    system = build()
+    make_system()
+    system = formulation(model.formulation).system(model, steps[0], None)
     q = system.start()
     benchmark.extra_info["unknowns"] = system.size
     with one_blas_thread():
@@ -109,13 +111,13 @@ def test_phase(benchmark: Any, make: Any, size: int, phase: str) -> None:
         matrix = system.tangent(q, 0.0, now.forces).matrix
         factor = matrix.factorise()
         jobs = {
-            "pattern": build,
+            "pattern": make_system,
             "evaluate": lambda: system.evaluate(q, 0.0),
             "assemble": lambda: system.tangent(q, 0.0, now.forces),
             "factorise": matrix.factorise,
             "solve": lambda: factor.solve(now.residual),
         }
         if size > 50 and make is wide:
-            benchmark.pedantic(jobs[phase], rounds=3)
+            benchmark.pedantic(jobs[phase], rounds=3)  # type: ignore[no-untyped-call]
         else:
             benchmark(jobs[phase])

@@ -18,6 +18,7 @@ import bh
 import meshes
 from bh import plotting
 from bh.plotting import offscreen, pictures
+from bh.plotting.camera import camera_of
 from meshes.errors import InputError
 
 
@@ -162,7 +163,7 @@ def test_window_needs_a_display(path: bh.Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_camera_keeps_z_up_and_sees_the_upper_side(path: bh.Path) -> None:
     for state in (path[0], path[-1]):
-        camera = pictures._camera(state, 4 / 3, None)
+        camera = camera_of(state, 4 / 3, None)
         axes = np.array((camera.across, camera.up, camera.back))
         assert np.allclose(axes @ axes.T, np.eye(3))
         assert camera.across[2] == 0.0
