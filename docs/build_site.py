@@ -34,7 +34,7 @@ PAGES = {
 # packages whose __all__ is public, and modules that are public as a whole
 PUBLIC = ("bh", "meshes")
 MODULES = (
-    "bh.plotting", "bh.plotting.interactive", "bh.analysis.stiffness_probe", "bh.analysis.contact", 
+    "bh.plotting", "bh.plotting.interactive", "bh.analysis.stiffness_probe", "bh.analysis.contact",
     "bh.analysis.creases",
     "bh.analysis.isometric", "bh.applications.scan",
 )  # fmt: skip
