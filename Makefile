@@ -5,7 +5,7 @@
 #   PYTHON       the interpreter that .venv is made from, 3.11 or newer
 #                (unset: the first usable one of python3.14 ... python3.11, python3)
 #   QUICK        QUICK=1: `make report` runs every case with fewer points
-#   PYTEST_ARGS  handed to pytest by `make test` and `make bench`
+#   PYTEST_ARGS  handed to pytest by `make test`, `make coverage` and `make bench`
 
 VENV := .venv
 PY   := $(VENV)/bin/python
@@ -15,7 +15,7 @@ export PIP_NO_INPUT := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup libraries report test lint format bench bench-table docs fast clean distclean
+.PHONY: help setup libraries report test coverage lint format bench bench-table docs fast clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -27,6 +27,12 @@ report: setup ## set everything up, then write the report (QUICK=1 for fewer poi
 test: lint ## set everything up, then run the linters and the tests (PYTEST_ARGS="-k name")
 	@echo "== pytest"
 	@$(PY) -m pytest -n auto --maxprocesses=4 $(PYTEST_ARGS)
+
+coverage: setup ## run the tests and write which lines they reach into build/coverage/html
+	@echo "== pytest, with coverage"
+	@mkdir -p build/coverage
+	@$(PY) -m pytest -n auto --maxprocesses=4 --cov --cov-report=term --cov-report=html $(PYTEST_ARGS)
+	@echo "coverage: $(CURDIR)/build/coverage/html/index.html"
 
 lint: setup ## ruff check, ruff format --check, mypy
 	@echo "== ruff check"

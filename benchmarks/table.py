@@ -136,7 +136,7 @@ def folds() -> list[str]:
             f"| {name} | {path.unknowns} | {path.iterations} | {most} ({few}) | {took:.1f} | {ms:g} ({quick}) |"
         )
     path = bh.trace(appendix_b("a"))
-    system, record = path._system(0), path.records[-1]
+    system, record = path.system(0), path.records[-1]
 
     def iteration() -> None:
         now = system.evaluate(record.q, 0.95)  # a residual as in the middle of an increment

@@ -57,7 +57,7 @@ def test_one_iteration(benchmark, annulus, held):
     spring = bh.Model(annulus.mesh, annulus.sheet, annulus.supports).fold("crease", rest=1.6, Lstar=25.0)
     sheet = annulus if held else spring
     path = bh.trace(sheet)
-    system, q = path._system(0), path.records[-1].q
+    system, q = path.system(0), path.records[-1].q
 
     def iteration():
         now = system.evaluate(q, 1.0)

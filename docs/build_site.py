@@ -12,6 +12,7 @@ import argparse
 import html
 import inspect
 import os
+import pkgutil
 import re
 import shutil
 import subprocess
@@ -29,13 +30,17 @@ PAGES = {
         "stiffness", "corrugations", "pinching", "inverse_design", "isometric", "sensitivities", "scaling", "scan",
         "performance",
     ),
-    "How it works": ("architecture", "extending", "formulation", "fem", "solver", "decisions"),
+    "How it works": ("architecture", "extending", "formulation", "fem", "solver", "glossary", "decisions"),
+    "Project": ("releasing",),
 }  # fmt: skip
-# packages whose __all__ is public, and modules that are public as a whole
+# The reference: packages whose __all__ is public, the modules that `bh` gives a short name, what is read and written
+# (USE), the classes that a pattern, a support, an actuation or a formulation of one's own is made from (EXTENSION;
+# extending.md), and all modules of `fem` and `meshes`.
 PUBLIC = ("bh", "meshes")
-MODULES = (
-    "bh.plotting", "bh.plotting.interactive", "bh.analysis.stiffness_probe", "bh.analysis.contact", "bh.analysis.creases",
-    "bh.analysis.isometric", "bh.applications.scan",
+USE = ("meshes.io",)
+EXTENSION = (
+    "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
+    "bh.formulations.protocols", "bh.formulations.registry", "bh.solvers.system",
 )  # fmt: skip
 
 
@@ -59,7 +64,7 @@ def build(folder: Path, gallery: bool = True) -> int:
     for page in (source / "docs").glob("*.md"):
         text = page.read_text(encoding="utf-8")
         page.write_text(text.replace("](../examples/)", "](../examples/README.md)"), encoding="utf-8")
-    for name in ("CHANGELOG.md", "LICENSE"):
+    for name in ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE"):
         shutil.copyfile(ROOT / name, source / name)
     shutil.copyfile(ROOT / "docs" / "conf.py", source / "conf.py")
     write_reference(source / "reference")
@@ -81,7 +86,8 @@ def write_index(source: Path, gallery: bool) -> None:
     trees["Studies"] += [f"docs/{name}" for name in rest]
     trees["Use"].insert(1, "gallery/index" if gallery else "examples/README")
     trees["Use"] += ["examples/README"] if gallery else []
-    trees["Reference"] = ["reference/index", "CHANGELOG"]
+    trees["Project"] = ["CONTRIBUTING", *trees["Project"], "CHANGELOG"]
+    trees["Reference"] = ["reference/index"]
     for caption, pages in trees.items():
         lines = "\n".join(pages)
         text += f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{lines}\n```\n"
@@ -102,44 +108,63 @@ def public_names(module: ModuleType) -> Iterator[str]:
             yield name
 
 
+def reference_pages() -> dict[str, tuple[str, ...]]:
+    """Names of the modules that the reference describes, by the heading that they stand under."""
+    import bh
+
+    found = {
+        "To use": (*PUBLIC, *sorted(bh._SUBMODULES.values()), *USE),
+        "To extend": EXTENSION,
+        "The shell": tuple(modules_of("fem")),
+        "Geometry in detail": tuple(modules_of("meshes")),
+    }
+    return found
+
+
+def modules_of(package: str) -> Iterator[str]:
+    """Names of all modules of a package, itself first; those with an underscore are private."""
+    yield package
+    for module in pkgutil.walk_packages(import_module(package).__path__, f"{package}."):
+        if not any(part.startswith("_") for part in module.name.split(".")):
+            yield module.name
+
+
 def write_reference(folder: Path) -> None:
-    """A page a public module, with every public name where it is defined, and a list of them all."""
+    """A page a public module, with every public name where it is first met, and a list of them all by subject."""
     folder.mkdir(parents=True)
-    pages, told = [], set()  # a name that two modules share is described once
-    for name in (*PUBLIC, *MODULES):
-        module = import_module(name)
-        lines = [
-            name,
-            "=" * len(name),
-            "",
-            f".. py:module:: {name}",
-            "   :no-index:" if name in PUBLIC else "",
-            "",
-        ]
-        lines += [(inspect.getdoc(module) or "").split("\n\n")[0], ""]
-        for item in public_names(module):
-            value = getattr(module, item)
-            if id(value) in told:
-                continue
-            told.add(id(value))
-            if inspect.isclass(value):
-                bases = ["   :show-inheritance:"] if value.__bases__ != (object,) else []
-                lines += [f".. autoclass:: {name}.{item}", "   :members:", *bases, ""]
-            elif callable(value):
-                lines += [f".. autofunction:: {name}.{item}", ""]
-        (folder / f"{name}.rst").write_text("\n".join(lines), encoding="utf-8")
-        pages.append(name)
-    tree = [
-        "Reference",
-        "=========",
-        "",
-        ".. toctree::",
-        "   :maxdepth: 2",
-        "",
-        *(f"   {page}" for page in pages),
-        "",
-    ]
+    described: set[int] = set()  # a name that two modules share is described once
+    tree = ["Reference", "=========", ""]
+    for heading, names in reference_pages().items():
+        pages = [name for name in names if write_module(folder, name, described)]
+        tree += [heading, "-" * len(heading), "", ".. toctree::", "   :maxdepth: 2", ""]
+        tree += [*(f"   {page}" for page in pages), ""]
     (folder / "index.rst").write_text("\n".join(tree), encoding="utf-8")
+
+
+def write_module(folder: Path, name: str, described: set[int]) -> bool:
+    """The page of a module; False, and no page, if all of its names are `described` on others. Adds to these."""
+    import bh
+
+    module = import_module(name)
+    items = [item for item in public_names(module) if id(getattr(module, item)) not in described]
+    if not items:
+        return False
+    # `meshes.structured` is a function, and the module that it comes from: the name leads to the function
+    parent, _, last = name.rpartition(".")
+    hidden = name in PUBLIC or (parent and inspect.isroutine(getattr(import_module(parent), last, None)))
+    lines = [name, "=" * len(name), "", f".. py:module:: {name}", "   :no-index:" if hidden else "", ""]
+    lines += [(inspect.getdoc(module) or "").split("\n\n")[0], ""]
+    lines += [f"In short ``bh.{short}``.\n" for short, real in bh._SUBMODULES.items() if real == name]
+    for item in items:
+        value = getattr(module, item)
+        described.add(id(value))
+        if inspect.isclass(value):
+            bases = ["   :show-inheritance:"] if value.__bases__ != (object,) else []
+            lines += [f".. autoclass:: {name}.{item}", "   :members:", *bases, ""]
+        elif callable(value):
+            lines += [f".. autofunction:: {name}.{item}", ""]
+    (folder / f"{name}.rst").write_text("\n".join(lines), encoding="utf-8")
+    return True
 
 
 # --- gallery -----------------------------------------------------------------------------------------------------

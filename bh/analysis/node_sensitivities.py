@@ -13,15 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.analysis.sensitivities import (
-    OFFSETS,
-    STEP,
-    Observable,
-    Situation,
-    data_of,
-    derivatives_to_data,
-    differences,
-)
+from bh.analysis.sensitivities import OFFSETS, STEP, Observable, data_of, derivatives_to_data, differences
+from bh.analysis.situation import Situation
 from bh.errors import ModelError
 from bh.formulations.protocols import Data
 from bh.loading.builder import load_steps

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.analysis.sensitivities import Build, Observable, Situation, of
+from bh.analysis.sensitivities import Build, Observable, of
+from bh.analysis.situation import Situation
 from bh.errors import InputError, ModelError
 from bh.paths.path import Path
 from bh.solvers.outcome import Outcome

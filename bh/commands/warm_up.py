@@ -1,4 +1,4 @@
-"""Compile (or load from the cache) every kernel, so that a user's first run does not wait: `python -m bh.commands.warm_up`."""
+"""Compile (or load from the cache) every kernel, so that a first run does not wait: `python -m bh.commands.warm_up`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def warm_up() -> None:
     trace(clamped.fold("crease", rest=3.0, Lstar=1.0))
     intersecting(path[-1].points, mesh.triangles, candidates(path[-1].points, mesh.triangles), 1e-9)
     wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
-    system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0))._system(0)
+    system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0)).system(0)
     now = system.evaluate(system.start(), 0.0)
     matrix = system.tangent(system.start(), 0.0, now.forces).matrix
     matrix @ matrix.factorise().solve(now.residual)
@@ -39,12 +39,12 @@ def _fold(sheet: Model) -> Path:
         .support("edge:end", [[0.0, 1.0, 1.0]])
         .fold("crease", rest=3.0, Lstar=1.0)
     )
-    system = path._system(0)
+    system = path.system(0)
     linear_response(system, path.records[0].q)
     displaced = (
         sheet.support("edge:start", "xyz").support("edge:inner", "z").displace("corner:outer-end", "z", 0.01)
     )
-    system = trace(displaced)._system(0)
+    system = trace(displaced).system(0)
     system.control_rate(system.start(), 0.0)
     return path
 

@@ -105,6 +105,11 @@ class LoadStepBuilder:
     """Walks through the steps of a model; the `bh.model.step.StepBuilder` that its actuations speak to."""
 
     def __init__(self, model: Model) -> None:
+        """Begin before the first step of a model.
+
+        Raises:
+            ModelError, MeshError: its creases cannot be; one line.
+        """
         self.mesh: SheetMesh = model.mesh
         self.sheet: Sheet = model.sheet
         self._supports = model.supports

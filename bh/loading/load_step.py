@@ -50,10 +50,10 @@ class LoadStep:
         law: (m,) SHEET (uncreased), SPRING (elastic crease) or PRESCRIBED (angle imposed exactly).
         stiffness: (m,) of spring creases a length, N mm / (mm rad).
         rest: rest dihedral angles of the springs, rad; start is nan where a prescribed crease is released: the
-            spring then begins with the moment that the crease has. `rest_ends` are those at the ends of each edge (m, 2), at the
-            lower and the higher node, for a formulation whose angles vary along an edge.
-        prescribed: imposed dihedral angles, rad; start is nan where the angle at the start of the step is to be taken. What
-            a pinch imposes depends on that angle, see `prescribed_angles`.
+            spring then begins with the moment that the crease has. `rest_ends` are those at the ends of each edge
+            (m, 2), at the lower and the higher node, for a formulation whose angles vary along an edge.
+        prescribed: imposed dihedral angles, rad; start is nan where the angle at the start of the step is to be taken.
+            What a pinch imposes depends on that angle, see `prescribed_angles`.
         pinch: which prescribed creases are pinched in this step, or were before.
         moment: couple a length that closes the dihedral angle below the sheet, N mm / mm.
         force: (n, 3) dead forces, N.

@@ -55,10 +55,12 @@ class Mirror:
 
     @cached_property
     def edge_weight(self) -> Array:
+        """(e,) parts of the edges in the kept half."""
         return self._weight(self.edge, self.side[self.mesh.topology.edges].sum(axis=1))
 
     @cached_property
     def hinge_weight(self) -> Array:
+        """(m,) parts of the hinges in the kept half."""
         return np.asarray(self.edge_weight[self.mesh.topology.hinge_edges])
 
     @cached_property
@@ -69,6 +71,7 @@ class Mirror:
 
     @cached_property
     def triangle_weight(self) -> Array:
+        """(t,) parts of the triangles in the kept half."""
         return self._weight(self.triangle, self.side[self.mesh.triangles].sum(axis=1))
 
     @staticmethod

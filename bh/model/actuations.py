@@ -43,6 +43,11 @@ class Fold(Actuation):
     stiffness: float | None = None
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         given = [key for key in ("to", "by", "rest") if getattr(self, key) is not None]
         if len(given) != 1:
             raise ModelError(
@@ -82,10 +87,12 @@ class Fold(Actuation):
         return self.Lstar is not None or self.stiffness is not None
 
     def prepare(self, builder: StepBuilder) -> None:
+        """Ask for the spring before the first step."""
         if self._spring:
             builder.spring(builder.creases(self.crease)[0], self.Lstar, self.stiffness)
 
     def apply(self, builder: StepBuilder) -> None:
+        """Ask for the angle, imposed or as a rest angle."""
         hinges, sense, drawn = builder.creases(self.crease)
         angle = self._target(sense, drawn)
         if self.rest is not None or self._spring:
@@ -123,9 +130,15 @@ class Moment(Actuation):
     to: float
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         _finite(f"moment on crease '{self.crease}'", (self.to,))
 
     def apply(self, builder: StepBuilder) -> None:
+        """Ask for the couple."""
         hinges, sense, _ = builder.creases(self.crease)
         builder.couple(hinges, sense * self.to)
 
@@ -139,6 +152,11 @@ class Force(Actuation):
     total: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         if (self.each is None) == (self.total is None):
             raise ModelError(
                 f"force at '{self.at}' needs either each or total, a vector of three numbers in N"
@@ -148,6 +166,7 @@ class Force(Actuation):
         _vector(f"force at '{self.at}'", vector)
 
     def apply(self, builder: StepBuilder) -> None:
+        """Ask for the force on every node."""
         nodes = select(builder.mesh, self.at)
         vector = self.each if self.each is not None else self.total
         share = 1.0 if self.each is not None else 1.0 / len(nodes)
@@ -166,6 +185,11 @@ class Displace(Actuation):
     by: float
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         _finite(f"displacement at '{self.at}'", (self.by,))
         if isinstance(self.direction, str):
             if self.direction not in ("x", "y", "z"):
@@ -178,6 +202,7 @@ class Displace(Actuation):
                 raise ModelError(f"displacement at '{self.at}': the direction is the zero vector")
 
     def apply(self, builder: StepBuilder) -> None:
+        """Ask for the displacement."""
         raw = AXES[self.direction] if isinstance(self.direction, str) else self.direction
         unit = np.asarray(raw, dtype=float) / np.linalg.norm(raw)
         builder.displace(select(builder.mesh, self.at), unit.tolist(), self.by)
@@ -212,6 +237,11 @@ class Indenter(Body):
     gap: float = 0.05
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         for key in ("at", "by"):
             _vector(f"indenter '{self.name}': {key}", getattr(self, key))
         _finite(f"indenter '{self.name}': azimuth or tilt", (self.azimuth, self.tilt))
@@ -249,6 +279,11 @@ class Tether(Body):
     total: tuple[float, float, float]
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         _vector(f"tether at '{self.at}'", self.total)
         if min(self.total) < 0.0:
             raise ModelError(f"tether at '{self.at}': {self.total} cannot be; stiffness is not negative")

@@ -47,6 +47,11 @@ class Model:
     hinge_lock: bool = True
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         for name, kind, how in (
             ("mesh", SheetMesh, "meshes.structured(pattern, aspect_ratio=8)"),
             ("sheet", Sheet, "bh.Sheet(E=4000, nu=0.38, t=0.127)"),
@@ -91,10 +96,14 @@ class Model:
         """A bar-and-hinge problem given as plain arrays, as other codes hand it over.
 
         Args:
-            points: (n, 3) nodes, mm; triangles: (t, 3).
-            bars: (b, 2) node pairs and their stiffness (b,), N/mm; every edge of the mesh must have one.
-            bending_hinges, folding_hinges: (m, 2) or (m, 4) rows that begin with the two nodes of the edge, and their
-                stiffness (m,), N mm / rad. The folding hinges become the crease "fold", at rest flat.
+            points: (n, 3) nodes, mm.
+            triangles: (t, 3) nodes of the triangles.
+            bars: (b, 2) node pairs; every edge of the mesh must have one.
+            bar_stiffness: (b,) their stiffness, N/mm.
+            bending_hinges: (m, 2) or (m, 4) rows that begin with the two nodes of the edge.
+            bending_stiffness: (m,) their stiffness, N mm / rad.
+            folding_hinges: as `bending_hinges`; they become the crease "fold", at rest flat.
+            folding_stiffness: (m,) their stiffness, N mm / rad.
             supports: (s, 4) rows node, x, y, z with 1 for a direction that is held.
             green: bars measure Green's strain; see `ElementStiffness`.
 

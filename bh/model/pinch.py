@@ -88,6 +88,11 @@ class Pinch(Actuation):
     late: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         what = f"pinch of crease '{self.crease}'"
         if self.to is not None and self.by is not None:
             raise ModelError(f"{what} has to and by; give one of them")
@@ -161,6 +166,7 @@ class Chain:
 
     @property
     def length(self) -> float:
+        """Of the whole crease, mm."""
         return float(self.ends[-1, 1])
 
 

@@ -23,5 +23,5 @@ class Ramp:
 
     @property
     def rate(self) -> Array:
-        """d value / d lambda, of the shape of both ends."""
+        """Derivative by lambda, of the shape of both ends."""
         return self.end - self.start

@@ -39,6 +39,11 @@ class Goal:
     direction: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         ok = isinstance(self.within, float | int) and not isinstance(self.within, bool)
         if not (ok and LEAST <= self.within <= MOST):
             raise ModelError(

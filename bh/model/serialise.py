@@ -75,7 +75,8 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
     """
     if data.get("format") != FORMAT:
         raise PathFileError(
-            f"stored model has format {data.get('format')}, this version reads {FORMAT}; solve again"
+            f"stored model has format {data.get('format')}, this version reads {FORMAT}; make it anew "
+            "from its scene or script"
         )
     try:
         flat = data["mesh"]

@@ -27,6 +27,11 @@ class Sheet:
     nu: float = 0.0
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         for name, unit in (("E", "MPa"), ("t", "mm")):
             value = getattr(self, name)
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
@@ -52,6 +57,11 @@ class CreaseLaw:
     rest: float = math.pi
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         if (self.Lstar is None) == (self.stiffness is None):
             raise ModelError("a crease needs either Lstar (mm) or stiffness (N mm / (mm rad))")
         value = self.Lstar if self.Lstar is not None else self.stiffness
@@ -85,6 +95,11 @@ class ElementStiffness:
     green: bool = False
 
     def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
         for name in ("bars", "hinges"):
             values = np.array(getattr(self, name), dtype=float)
             if not (np.isfinite(values).all() and (values >= 0.0).all()):

@@ -23,8 +23,9 @@ TURNED = "the forces turn the free sheet, so they do not stay in equilibrium; ad
 
 
 class Constraint:
-    """What holds a sheet. A support of your own derives from it and is a frozen dataclass of plain values
-    (docs/extending.md).
+    """What holds a sheet.
+
+    A support of your own derives from it and is a frozen dataclass of plain values (docs/extending.md).
     """
 
     def fixed(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
@@ -52,10 +53,12 @@ class Support(Constraint):
     clamp: bool = False
 
     def fixed(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+        """See `Constraint.fixed`."""
         nodes = select(mesh, self.at)
         return [(nodes, direction) for direction in directions(self.fix)]
 
     def clamps(self, mesh: SheetMesh) -> Ints:
+        """See `Constraint.clamps`."""
         return clamped_edges(mesh, self.at) if self.clamp else super().clamps(mesh)
 
 
@@ -64,6 +67,7 @@ class RigidBody(Constraint):
     """Takes out exactly the rigid motions that the other supports leave free, without any force (see `bh.trace`)."""
 
     def fixed(self, mesh: SheetMesh) -> Iterable[tuple[Ints, Array]]:
+        """See `Constraint.fixed`."""
         return []
 
 
@@ -243,7 +247,7 @@ def free_motions(points: Array, constraints: Constraints) -> Array:
     # the triangular factor has the same null space and six rows at most, where all left vectors would be (k, k)
     _, values, right = np.linalg.svd(np.linalg.qr(rows, mode="r"), full_matrices=True)
     rank = int((values > 1e-7 * max(values[0], 1e-300)).sum())
-    return scale[:, None] * right[rank:].T
+    return np.asarray(scale[:, None] * right[rank:].T)
 
 
 def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints) -> None:

@@ -48,7 +48,8 @@ class Until:
             value: float,
             of: str | None = None,
             tolerance: float = 1e-4,
-        ) -> None: ...
+        ) -> None:
+            """See the attributes."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be met.
@@ -90,7 +91,7 @@ def depth(to: float, tolerance: float = 1e-4) -> Until:
 
 
 def _importable(function: Callable[..., float]) -> str:
-    """ "module:function" of a function, which must be found again in another process."""
+    """Name "module:function" of a function, which must be found again in another process."""
     module, name = getattr(function, "__module__", ""), getattr(function, "__qualname__", "")
     if getattr(import_module(module), name, None) is not function:
         raise ModelError(

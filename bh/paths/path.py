@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,10 @@ from numpy.typing import NDArray
 from bh.formulations.protocols import Formulation, SheetSystem
 from bh.formulations.registry import checked_system, formulation, remarks
 from bh.formulations.state import State
-from bh.formulations.symmetry_reduction import Half, Halves
 from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd, open_ends
-from bh.loading.symmetry import Plane
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
-from bh.paths.estimate import Accuracy
 from bh.paths.provenance import provenance_of
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
@@ -28,6 +25,11 @@ from bh.runtime import viewer
 from bh.solvers.increments import ARC, CriticalPoint
 from bh.solvers.outcome import Outcome
 from meshes.mesh import count
+
+if TYPE_CHECKING:
+    from bh.formulations.symmetry_reduction import Half, Halves
+    from bh.loading.symmetry import Plane
+    from bh.paths.estimate import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -63,6 +65,8 @@ class Path:
         self._load_steps: tuple[LoadStep, ...] = load_steps(model)
         self._halves: Halves | None = None
         if symmetry is not None:
+            from bh.formulations.symmetry_reduction import Halves
+
             self._halves = Halves(self._formulation, model, self._load_steps, symmetry)
         self._systems: dict[int, SheetSystem] = {}
         self._states: dict[int, State] = {}
@@ -98,7 +102,7 @@ class Path:
         if self._halves is not None and self.records and self.records[-1].negative is None:
             last = self.records[-1]
             self.records[-1] = replace(
-                last, negative=self._halves.negative(self._system(last.step), last.q, last.lam)
+                last, negative=self._halves.negative(self.system(last.step), last.q, last.lam)
             )
             self._states.pop(len(self.records) - 1, None)
 
@@ -171,10 +175,17 @@ class Path:
         index = range(len(self))[index]
         if index not in self._states:
             record = self.records[index]
-            self._states[index] = self._formulation.observe(
-                self.model, self._system(record.step), record.q, record.lam, record.step, record.stable
-            )
+            self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
         return self._states[index]
+
+    def observe(self, step: int, q: Array, lam: float, stable: bool | None = None) -> State:
+        """What is to be read from unknowns q (n,) of a step at `lam`; of the whole sheet where halves are solved."""
+        return self._formulation.observe(self.model, self.system(step), q, lam, step, stable)
+
+    def take_over(self, other: Path) -> None:
+        """Begin with all that a path of the same model with fewer steps has; its states are not read anew."""
+        self.records, self.steps = list(other.records), list(other.steps)
+        self._states = dict(other._states)
 
     def __iter__(self) -> Iterator[State]:
         """States in order."""
@@ -183,7 +194,7 @@ class Path:
     def solved(self, index: int = -1) -> tuple[SheetSystem, Record]:
         """The system of the step that a state belongs to, and its record: what analyses of a state begin with."""
         record = self.records[range(len(self))[index]]
-        return self._system(record.step), record
+        return self.system(record.step), record
 
     def plot(self, **options: Any) -> Any:
         """Show the last state as a picture; options of `bh.plotting.show`."""
@@ -198,8 +209,8 @@ class Path:
             PathFileError: the file cannot be written.
         """
         target = new_file(self, FilePath(file))
-        for index, record in enumerate(self.records):
-            target.add(self._row(index, record))
+        for index in range(len(self)):
+            target.add(self.row(index))
         for step, end in enumerate(self.steps):
             target.finish_step(step, *astuple(end))
         target.close()
@@ -223,7 +234,9 @@ class Path:
             ]
         return path
 
-    def _row(self, index: int, record: Record) -> StateRow:
+    def row(self, index: int) -> StateRow:
+        """A state as a path file stores it."""
+        record = self.records[index]
         energy = self[index].energy
         critical = tuple(
             CriticalRow(record.step, c.kind, c.lam, c.error, c.negative, c.q, c.mode) for c in record.critical
@@ -234,7 +247,7 @@ class Path:
             record.note, record.cuts, record.q, self[index].points, critical,
         )  # fmt: skip
 
-    def _system(self, step: int) -> SheetSystem:
+    def system(self, step: int) -> SheetSystem:
         """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
         if step not in self._systems:
             if any(each.until is not None for each in self.model.steps[:step]):
@@ -243,11 +256,11 @@ class Path:
             self._systems[step] = checked_system(made, self.model.formulation)
         return self._systems[step]
 
-    def _half(self, step: int) -> Half | None:
+    def half(self, step: int) -> Half | None:
         """The half that solves a step, or None where the whole sheet is solved."""
         if self._halves is None:
             return None
-        return self._halves.of(step, self._system(step), self._start(step), self._ended(step))
+        return self._halves.of(step, self.system(step), self._start(step), self._ended(step))
 
     def _start(self, step: int) -> State | None:
         """The state that a step begins at; None is the stress-free sheet."""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.formulations.symmetry_reduction import Half
 from bh.paths.storage import StateRow
 from bh.solvers.increments import LOAD, CriticalPoint, Mode
 from bh.solvers.outcome import Critical, Outcome
+
+if TYPE_CHECKING:
+    from bh.formulations.symmetry_reduction import Half
 
 Array = NDArray[np.float64]
 

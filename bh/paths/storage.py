@@ -22,7 +22,9 @@ from bh.errors import InputError, PathFileError
 from bh.model.serialise import AnyArray
 
 Array = NDArray[np.float64]
-FORMAT = 2  # of the tables; raised with every change
+FORMAT = (
+    3  # of the tables and of the model in them; raised with every change. Format 2 is that of version 0.1
+)
 SCHEMA = """
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE arrays (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL, data BLOB NOT NULL);
@@ -77,6 +79,7 @@ class PathFile:
     """An open path file; every `add` is one transaction."""
 
     def __init__(self, file: FilePath, connection: sqlite3.Connection) -> None:
+        """Of an open connection; see `create` and `open`."""
         self.file, self._db = file, connection
 
     @classmethod
@@ -138,7 +141,8 @@ class PathFile:
         if found != FORMAT:
             db.close()
             raise PathFileError(
-                f"'{file}' was written by another version (format {found}, this one reads {FORMAT}); run it again"
+                f"'{file}' was written by another version (format {found}, this one reads {FORMAT}); make it anew "
+                "from its scene: bh run SCENE, or bh.trace(model, file=...)"
             )
         return cls(file, db)
 
@@ -186,9 +190,11 @@ class PathFile:
             self._db.execute("DELETE FROM steps WHERE outcome != 'reached'")
 
     def meta(self) -> dict[str, Any]:
+        """Model and provenance as plain data."""
         return {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
 
     def arrays(self) -> dict[str, AnyArray]:
+        """Arrays of the model by name."""
         rows = self._db.execute("SELECT name, dtype, shape, data FROM arrays")
         return {
             name: np.frombuffer(data, dtype).reshape(json.loads(shape)).copy()
@@ -196,6 +202,7 @@ class PathFile:
         }
 
     def states(self) -> Iterator[StateRow]:
+        """All accepted states, in order."""
         critical = self._critical()
         rows = self._db.execute(
             "SELECT id, step, lambda, iterations, imbalance, negative, mode, jumped, wall_time_s, next_increment,"
@@ -243,6 +250,7 @@ class PathFile:
         return {step: (outcome, reason, iterations) for step, outcome, reason, iterations in rows}
 
     def close(self) -> None:
+        """Close the file; nothing is lost if it is not done."""
         with suppress(sqlite3.Error):  # takes the empty journal away; it is in nobody's way if that fails
             self._db.execute("PRAGMA journal_mode = DELETE")
         self._db.close()

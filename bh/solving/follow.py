@@ -6,11 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 from bh.errors import ModelError, PathFileError
 from bh.formulations.observables import measure
-from bh.formulations.symmetry_reduction import Half
-from bh.loading.symmetry import Plane
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
 from bh.paths.path import Path, new_file
@@ -22,6 +21,10 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.increments import LOAD, Point, point
 from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
+
+if TYPE_CHECKING:
+    from bh.formulations.symmetry_reduction import Half
+    from bh.loading.symmetry import Plane
 
 
 def follow(
@@ -73,22 +76,22 @@ def _opened(
         raise ModelError("a path that goes on from another one cannot have a file; save it when it is solved")
     if resume:
         return _resume(model, FilePath(file), symmetry)
-    path._system(0)  # a model that cannot be solved must not replace the file of one that was
+    path.system(0)  # a model that cannot be solved must not replace the file of one that was
     return path, new_file(path, FilePath(file))
 
 
 def _run_step(
     path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
 ) -> StepOutcome:
-    half = path._half(step)
-    system = path._system(step) if half is None else half.system
+    half = path.half(step)
+    system = path.system(step) if half is None else half.system
     began = time.perf_counter()
 
     def accept(record: Record) -> None:
         record = record if half is None else record.of_whole(half)
         path.records.append(record)
         if target is not None:
-            target.add(path._row(len(path.records) - 1, record))
+            target.add(path.row(-1))
 
     increment: float | None = None
     done = [record for record in path.records if record.step == step]
@@ -137,7 +140,7 @@ def _goal(path: Path, step: int, half: Half | None) -> tuple[Callable[[Point], f
 
     def missed(at: Point) -> float:
         q = at.q if half is None else half.unknowns(at.q, at.lam)
-        state = path._formulation.observe(path.model, path._system(step), q, at.lam, step)
+        state = path.observe(step, q, at.lam)
         return measure(until, state) - until.value
 
     return missed, until.tolerance
@@ -161,8 +164,7 @@ def _continued(after: Path, model: Model, symmetry: Plane | None) -> Path:
             "the path to go on from is of another model; add steps to its own: path.model.step(...)"
         )
     path = Path(model, symmetry=symmetry)
-    path.records, path.steps = list(after.records), list(after.steps)
-    path._states = dict(after._states)
+    path.take_over(after)
     return path
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 from bh.errors import ModelError
-from bh.loading.symmetry import Plane
 from bh.model.model import Model
-from bh.model.refinement import Goal
 from bh.paths.path import Path
 from bh.runtime.progress import ProgressMeter
 from bh.solvers.trace import Strategy
 from bh.solving.follow import follow
+
+if TYPE_CHECKING:
+    from bh.loading.symmetry import Plane
+    from bh.model.refinement import Goal
 
 
 def trace(
@@ -68,7 +71,9 @@ def trace(
         raise ModelError(
             "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
         )
-    from bh.solving.accuracy import solve  # its analyses are loaded only where they are needed
+    # its analyses are loaded only where they are needed
+    from bh.model.refinement import Goal
+    from bh.solving.accuracy import solve
 
     def on_mesh(refined: Model) -> Path:
         return follow(refined, symmetry=symmetry, progress=progress, strategy=strategy)

@@ -71,7 +71,7 @@ def step_over(before: Path, model: Model) -> Path | None:
     path = Path(model)
     path.records = [record for record in before.records if record.step < last]
     path.steps = list(before.steps[:last])
-    system = path._system(last)
+    system = path.system(last)
     old, record = before.solved()
     if len(record.q) != system.size:
         return None

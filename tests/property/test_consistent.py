@@ -109,7 +109,7 @@ def systems(name: str) -> list[tuple[ConsistentSystem, Array, float]]:
     """System, unknowns and lambda of the last state of every step."""
     path = solved(name)
     last = {record.step: record for record in path.records}
-    return [(path._system(step), record.q, record.lam) for step, record in last.items()]
+    return [(path.system(step), record.q, record.lam) for step, record in last.items()]
 
 
 def disturbed(system: ConsistentSystem, q: Array, seed: int) -> Array:
@@ -160,7 +160,7 @@ def test_energy_is_that_of_the_state(name: str) -> None:
     """Potential at equilibrium = energies of the state, by triangle and in total, less the work of the dead loads."""
     path = solved(name)
     for record, state in zip(path.records, path, strict=True):
-        system = path._system(record.step)
+        system = path.system(record.step)
         e, area = system.elements, state.mesh.areas
         for kind, density in state.energy_density.items():
             assert float(density @ area) == pytest.approx(state.energy.as_dict()[kind], rel=1e-9, abs=1e-15)
@@ -177,7 +177,7 @@ def test_states_are_in_equilibrium(name: str) -> None:
     path = solved(name)
     # a spring on a curved sheet is made flat: it does not begin in equilibrium
     for record in path.records[name == "curved, spring crease" :]:
-        system = path._system(record.step)
+        system = path.system(record.step)
         now = system.evaluate(record.q, record.lam)
         assert now.imbalance <= 1e-8
         rotations = np.abs(now.residual[system.moving :]).max(initial=0.0)
@@ -194,7 +194,7 @@ def test_a_step_begins_where_the_one_before_ended(name: str) -> None:
     model = KINDS[name]
     for step in range(1, len(model.steps)):
         last = max(i for i, record in enumerate(path.records) if record.step == step - 1)
-        system = path._system(step)
+        system = path.system(step)
         now = system.evaluate(system.start(), 0.0)
         assert now.imbalance < 1e-6  # a prescribed crease gives its moment to a spring, or takes it
         before = path[last]

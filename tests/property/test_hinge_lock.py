@@ -198,7 +198,7 @@ def test_what_is_in_contact_is_named() -> None:
     mesh = flap().mesh
     held = trace(Model(mesh, SHEET).fold("crease", to=0.2 * ZONE))
     assert held.outcome == "reached"
-    assert held._system(0).contact(held.records[-1].q, 1.0) == ""
+    assert held.system(0).contact(held.records[-1].q, 1.0) == ""
     plain = Model(mesh, SHEET).support("crease:crease", "xyz").support("edge:inner", "xyz")  # no law: sheet
     system, q = bent_to(plain.force("edge:outer", total=(0.0, 0.0, -0.01)), 0.2 * ZONE)
     assert system.elements.spring == 0
@@ -252,9 +252,9 @@ def test_soft_crease_stops(stiffness: float, force: float, other_way: bool) -> N
     left = until_closed(path[-1].dihedral("crease"))
     assert left.max() < 0.5 * ZONE
     assert path[-1].energy.lock > 0.0
-    said = path._system(1).contact(path.records[-1].q, 1.0)
+    said = path.system(1).contact(path.records[-1].q, 1.0)
     assert said.startswith("the panels at crease 'crease' (edge ")
-    assert path._system(0).contact(path.records[0].q, 0.0) == ""
+    assert path.system(0).contact(path.records[0].q, 0.0) == ""
 
 
 def test_harder_pressed_is_closer() -> None:
@@ -273,7 +273,7 @@ def test_without_the_lock_nothing_passes(other_way: bool) -> None:
     assert "would pass through each other" in path.reason
     assert path[-1].energy.lock == 0.0
     assert until_closed(path[-1].dihedral("crease")).min() < 1e-3
-    assert "touch" in path._system(1).contact(path.records[-1].q, path.records[-1].lam)
+    assert "touch" in path.system(1).contact(path.records[-1].q, path.records[-1].lam)
 
 
 @pytest.mark.parametrize("small", [1e-9, 0.01, 0.6])
@@ -293,7 +293,7 @@ def test_work_is_total_plus_lock() -> None:
     path = trace(closing(5.0), strategy=bh.LoadControl(largest=0.02))
     assert path.outcome == "reached"
     for record, state in zip(path.records, path, strict=True):
-        system = path._system(record.step)
+        system = path.system(record.step)
         loads = float(np.vdot(system.force.at(record.lam), state.points - state.mesh.points))
         held = state.energy.total + state.energy.lock
         assert system.evaluate(record.q, record.lam).energy == pytest.approx(
@@ -301,7 +301,7 @@ def test_work_is_total_plus_lock() -> None:
         )
     near = [state for state in path if state.energy.lock > 0.0]
     assert len(near) > 5
-    force = path._system(1).force
+    force = path.system(1).force
     work = sum(
         float(np.vdot(0.5 * (force.at(a.lam) + force.at(b.lam)), b.points - a.points))
         for a, b in pairwise(near)
@@ -335,7 +335,7 @@ def test_released_in_the_zone() -> None:
     model = flap(0.05).fold("crease", to=0.5 * ZONE).fold("crease", rest=1.0, stiffness=0.05)
     path = trace(model)
     assert path.outcome == "reached", path.reason
-    system = path._system(1)
+    system = path.system(1)
     assert system.elements.lock[system.elements.bending :].all()
     assert system.evaluate(system.start(), 0.0).imbalance < 1e-7
     assert path[-1].dihedral("crease").mean() == pytest.approx(1.0, abs=0.05)

@@ -173,7 +173,7 @@ def test_held_crease_is_the_limit_of_a_stiff_spring() -> None:
 
 def test_held_angle_is_exact_and_without_multipliers() -> None:
     path = trace(model().fold("crease", to=1.2))
-    system = path._system(0)
+    system = path.system(0)
     assert system.size == system.primal
     assert np.abs(path[-1].dihedral("crease") - 1.2).max() < 1e-14
     # the triangles at the crease turn by other angles: the sheet bends up to it

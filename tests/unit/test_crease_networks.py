@@ -1,4 +1,4 @@
-"""Sheets with creases that meet, end inside, or close on themselves fold: closed forms, and drawings of others."""
+"""Sheets with creases that meet, end inside, or close on themselves fold: closed forms and drawings."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from meshes import structured, unstructured
 from meshes.io import read_drawn, read_fold, read_pattern
 from meshes.topology import dihedral_angles
 
-PATTERNS = Path(__file__).parents[3] / "shared" / "patterns"
-needs_patterns = pytest.mark.skipif(not PATTERNS.is_dir(), reason="the shared crease patterns are not here")
+DATA = Path(__file__).parents[1] / "data"
 SHEET = bh.Sheet(E=4000.0, nu=0.3, t=0.2)
 FORMULATIONS = ("bars-and-hinges", "consistent")
 SECTORS = np.radians(
@@ -118,14 +117,13 @@ def test_springs_of_a_folded_sheet_begin_at_its_angles():
     assert path[-1].fold_angle("ridge") == pytest.approx(1.3, abs=1e-6)
 
 
-@needs_patterns
-class TestSharedPatterns:
-    """Every drawing that can fold without self-contact folds with either formulation; the others say why not."""
+class TestFilesOfOtherPrograms:
+    """Every drawing that can fold without self-contact folds with either formulation; the other one says why not."""
 
     @pytest.mark.parametrize("formulation", FORMULATIONS)
-    @pytest.mark.parametrize("name", ["curvedPleatSimple", "curvedcrease2", "miura-ori", "shell6"])
+    @pytest.mark.parametrize("name", ["cone_pleat", "cones", "miura", "fan", "ring_pleats"])
     def test_own_faces(self, name, formulation):
-        mesh = read_drawn(PATTERNS / f"{name}.svg", fit=200.0)
+        mesh = read_drawn(DATA / f"{name}.svg", fit=200.0)
         path = bh.trace(bh.Model(mesh, SHEET, formulation=formulation).fold("all", by=0.8, Lstar=25.0))
         assert path.outcome == "reached"
         assert path.stable
@@ -133,14 +131,14 @@ class TestSharedPatterns:
 
     def test_as_drawn(self):
         """The opacity of the lines of this one says 90 degrees."""
-        mesh = read_drawn(PATTERNS / "shell6.svg", fit=200.0)
+        mesh = read_drawn(DATA / "fan.svg", fit=200.0)
         path = bh.trace(bh.Model(mesh, SHEET, formulation="consistent").fold("all", by="drawn", Lstar=25.0))
         assert path.outcome == "reached"
         assert path[-1].fold_angle("mountain").mean() == pytest.approx(0.5 * math.pi, rel=0.05)
 
     @pytest.mark.parametrize("formulation", FORMULATIONS)
     def test_pleats_on_rulings(self, formulation):
-        mesh = structured(read_pattern(PATTERNS / "wavy_pleats.svg", fit=200.0), aspect_ratio=8.0)
+        mesh = structured(read_pattern(DATA / "pleats.svg", fit=200.0), aspect_ratio=8.0)
         path = bh.trace(bh.Model(mesh, SHEET, formulation=formulation).fold("all", by=1.2, Lstar=5.0))
         assert path.outcome == "reached"
         assert path.stable
@@ -148,35 +146,26 @@ class TestSharedPatterns:
 
     def test_miura_imposed(self):
         """Its angles do not fit together all at once, so panels bend; the driver takes it all the same."""
-        mesh = read_drawn(PATTERNS / "miura-ori.svg", fit=200.0)
+        mesh = read_drawn(DATA / "miura.svg", fit=200.0)
         path = bh.trace(bh.Model(mesh, SHEET, formulation="consistent").fold("all", by=0.8))
         assert path.outcome == "reached"
         assert path[-1].fold_angle("mountain") == pytest.approx(
             np.full(len(mesh.crease_edges("mountain")), 0.8)
         )
 
-    def test_square_twist_unfolds_and_folds_rigidly(self):
-        mesh = read_fold(PATTERNS / "squaretwist.fold")
+    def test_a_rigid_fold_unfolds_and_folds_further(self):
+        mesh = read_fold(DATA / "rigid_miura.fold")
         model = bh.Model(mesh, SHEET, formulation="consistent")
         flat = bh.trace(model.fold("all", by=0.0))
         assert flat.outcome == "reached"
         assert flat[-1].energy.total < 1e-8
         spread = np.linalg.svd(flat[-1].points - flat[-1].points.mean(axis=0), compute_uv=False)
         assert spread[2] < 1e-5 * spread[0]
-        more = bh.trace(model.fold("all", by=1.2, Lstar=25.0))
+        more = bh.trace(model.fold("all", by=1.6, Lstar=25.0))
         assert more.outcome == "reached"
         assert more[-1].fold_angle("mountain").mean() > flat[0].fold_angle("mountain").mean()
 
     def test_layers_that_lie_on_each_other_are_told(self):
-        """Two of the four faces of this file are folded onto a third: it begins in contact."""
-        path = bh.trace(bh.Model(read_fold(PATTERNS / "simple.fold"), SHEET).fold("all", by=0.3, Lstar=25.0))
+        """Two of the four faces of this file lie on the other two: it begins in contact."""
+        path = bh.trace(bh.Model(read_fold(DATA / "layers.fold"), SHEET).fold("all", by=0.3, Lstar=25.0))
         assert path.outcome != "reached" or first_contact(path) is not None
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("formulation", FORMULATIONS)
-    def test_circular_pleat(self, formulation):
-        mesh = read_drawn(PATTERNS / "CircularPleat-antiFacet.svg", fit=200.0)
-        path = bh.trace(bh.Model(mesh, SHEET, formulation=formulation).fold("all", by=0.8, Lstar=25.0))
-        assert path.outcome == "reached"
-        assert path.stable
-        assert first_contact(path) is None

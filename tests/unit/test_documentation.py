@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
+import pkgutil
 import subprocess
 import sys
 from importlib import util
@@ -12,6 +15,8 @@ from urllib.parse import unquote
 import pytest
 
 import bh
+from bh.formulations.registry import Formulation
+from bh.solvers.system import System
 from reports.pdf import browser
 from tests.unit.test_plotting import needs_opengl
 from tests.unit.test_report import Page
@@ -52,23 +57,79 @@ def test_scripts_of_the_gallery_run(file: Path, tmp_path: Path) -> None:
     assert {part for part in text.split('"') if part.startswith(f"{file.stem}") and "." in part} == made
 
 
-def test_reference_has_every_public_name(tmp_path: Path) -> None:
-    builder = site_builder()
-    builder.write_reference(tmp_path / "reference")
-    pages = {file.stem: file.read_text(encoding="utf-8") for file in (tmp_path / "reference").glob("*.rst")}
-    everything = "\n".join(pages.values())
-    for name in (
-        "bh.Model",
-        "bh.trace",
-        "bh.Path",
-        "meshes.structured",
-        "bh.plotting.response",
-        "bh.plotting.interactive.view",
-    ):
-        assert f":: {name}\n" in everything
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The sources of the reference, by the name of the module that each describes, and its index."""
+    folder = tmp_path_factory.mktemp("sources") / "reference"
+    site_builder().write_reference(folder)
+    return {file.stem: file.read_text(encoding="utf-8") for file in folder.glob("*.rst")}
+
+
+def own_names(module: ModuleType) -> list[str]:
+    """Classes and functions that are defined in a module and have no underscore."""
+    return [
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and (inspect.isclass(value) or inspect.isfunction(value))
+        and value.__module__ == module.__name__
+    ]
+
+
+def modules_of(package: str) -> list[ModuleType]:
+    path = importlib.import_module(package).__path__
+    return [importlib.import_module(found.name) for found in pkgutil.walk_packages(path, f"{package}.")]
+
+
+def described(reference: dict[str, str]) -> set[int]:
+    """Identities of all objects that the reference has a description of."""
+    found = set()
+    for text in reference.values():
+        for line in text.splitlines():
+            if line.startswith((".. autoclass::", ".. autofunction::")):
+                module, _, name = line.split(":: ")[1].rpartition(".")
+                found.add(id(getattr(importlib.import_module(module), name)))
+    return found
+
+
+def test_reference_has_every_public_name_of_bh(reference: dict[str, str]) -> None:
+    assert len(bh.__all__) >= 30
     for name in bh.__all__:
-        assert f":: bh.{name}\n" in pages["bh"]
-    assert "   bh.plotting" in pages["index"]
+        assert f":: bh.{name}\n" in reference["bh"]
+
+
+@pytest.mark.parametrize("short", sorted(bh._SUBMODULES))
+def test_reference_has_every_public_module_of_bh(reference: dict[str, str], short: str) -> None:
+    module = getattr(bh, short)
+    page = reference[module.__name__]
+    assert f"``bh.{short}``" in page
+    assert f"   {module.__name__}\n" in reference["index"]
+    public = [
+        name for name in getattr(module, "__all__", own_names(module)) if callable(getattr(module, name))
+    ]
+    assert public
+    missing = [name for name in public if id(getattr(module, name)) not in described(reference)]
+    assert missing == []
+
+
+@pytest.mark.parametrize("package", ["fem", "meshes"])
+def test_reference_has_every_public_class(reference: dict[str, str], package: str) -> None:
+    there = described(reference)
+    found = {
+        f"{module.__name__}.{name}": getattr(module, name)
+        for module in modules_of(package)
+        for name in own_names(module)
+        if inspect.isclass(getattr(module, name))
+    }
+    assert len(found) >= 15
+    assert [name for name, value in found.items() if id(value) not in there] == []
+
+
+def test_reference_has_what_extensions_are_made_from(reference: dict[str, str]) -> None:
+    """The bases of what docs/extending.md adds, wherever they are defined."""
+    there = described(reference)
+    for base in (bh.Support.__bases__[0], bh.Fold.__bases__[0], Formulation, System):
+        assert id(base) in there, base
 
 
 def test_every_example_is_in_the_readme_of_the_examples() -> None:

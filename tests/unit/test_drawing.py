@@ -16,8 +16,7 @@ from meshes.curves import sample
 from meshes.io import read_drawn, read_pattern, write_pattern
 from meshes.unstructured import sheet_area
 
-PATTERNS = Path(__file__).parents[3] / "shared" / "patterns"
-needs_patterns = pytest.mark.skipif(not PATTERNS.is_dir(), reason="the shared crease patterns are not here")
+DATA = Path(__file__).parents[1] / "data"
 SQUARE = '<rect x="0" y="0" width="100" height="60" stroke="black" fill="none"/>'
 
 
@@ -412,19 +411,19 @@ class TestWriting:
                 write_pattern(tmp_path / name, pattern, **options)
 
 
-@needs_patterns
-class TestSharedPatterns:
-    """Real drawings; the numbers are what the files say (counted in them), not what the importer once gave."""
+class TestFilesOfOtherPrograms:
+    """Files as drawing programs write them (tests/data/README.md); numbers are counted in the files."""
 
     def test_pleats(self):
-        pattern = read_pattern(PATTERNS / "wavy_pleats.svg")
-        assert list(folds(pattern).values()) == ["mountain", "valley", "mountain", "valley", "mountain"]
-        assert len(pattern.rails) == 7
-        assert sheet_area(pattern) == pytest.approx((425.2 * 25.4 / 96.0) ** 2, rel=1e-5)
+        """Creases in no order, in groups within groups whose names are not ASCII, lengths without a unit."""
+        pattern = read_pattern(DATA / "pleats.svg")
+        assert list(folds(pattern).values()) == ["valley", "mountain", "valley", "mountain"]
+        assert len(pattern.rails) == 6
+        assert sheet_area(pattern) == pytest.approx(400.0 * 320.0 * (25.4 / 96.0) ** 2, rel=1e-5)
 
     def test_miura(self):
-        """11 columns and 13 rows of panels are drawn as single lines; each vertex inside has degree four."""
-        mesh = read_drawn(PATTERNS / "miura-ori.svg", fit=200.0)
+        """6 columns and 5 rows of panels, drawn as zigzags and short lines; each vertex inside has degree four."""
+        mesh = read_drawn(DATA / "miura.svg")
         degree = np.bincount(
             np.concatenate([mesh.crease_edges(c) for c in ("mountain", "valley")]).ravel(),
             minlength=len(mesh.points),
@@ -432,31 +431,37 @@ class TestSharedPatterns:
         rim = np.zeros(len(mesh.points), dtype=bool)
         rim[mesh.nodes("edge:boundary")] = True
         assert (degree[~rim] == 4).all()
-        assert (~rim).sum() == 12 * 11
+        assert (~rim).sum() == 5 * 4
+        # two groups turn it by a quarter, back and forth; without one of them the sides change places
+        assert np.ptp(mesh.points[:, :2], axis=0) == pytest.approx(np.array([558.0, 350.0]) * 25.4 / 96.0)
 
     def test_circular_pleat(self):
-        mesh = read_drawn(PATTERNS / "CircularPleat-antiFacet.svg")
-        assert (
-            len(mesh.triangles),
-            len(mesh.crease_edges("mountain")),
-            len(mesh.crease_edges("valley")),
-        ) == (3000, 700, 700)
-        # 15 rings of 100 panels, each with a side and a diagonal in yellow
-        assert len(mesh.edge_sets["edge:boundary"]) == 200
-        assert len(mesh.edge_sets["edge:flat"]) == 2 * 15 * 100
+        """Every segment is a line of its own, in either direction, with coordinates of two decimals."""
+        mesh = read_drawn(DATA / "ring_pleats.svg")
+        assert len(mesh.triangles) == 2 * 5 * 24
+        assert len(mesh.crease_edges("mountain")) == len(mesh.crease_edges("valley")) == 2 * 24
+        # 5 rings of 24 panels, each with a side and a diagonal in yellow
+        assert len(mesh.edge_sets["edge:boundary"]) == 2 * 24
+        assert len(mesh.edge_sets["edge:flat"]) == 2 * 5 * 24
 
-    def test_shell(self):
-        mesh = read_drawn(PATTERNS / "shell6.svg")
-        assert len(mesh.crease_edges("mountain")) == 480
-        assert len(mesh.crease_edges("valley")) == 480
-        assert np.abs(mesh.fold_angles["valley"]) == pytest.approx(np.full(480, math.pi / 2))
+    def test_angles_and_short_lines(self):
+        """Two creases part by 0.8 units on a sheet of 3,600; their opacity says 90 degrees."""
+        mesh = read_drawn(DATA / "fan.svg")
+        assert len(mesh.crease_edges("mountain")) == len(mesh.crease_edges("valley")) == 24
+        assert len(mesh.triangles) == 6 * 24 - 1
+        assert np.abs(mesh.fold_angles["valley"]) == pytest.approx(np.full(24, math.pi / 2))
 
     def test_cones(self):
-        """Its rulings are drawn in black, and one vertex of the fan misses the others by 0.07 units."""
-        pattern = read_pattern(PATTERNS / "curvedcrease2.svg")
-        assert "boundary lines lie inside" in pattern.remarks[0]
-        mesh = read_drawn(PATTERNS / "curvedPleatSimple.svg")
-        assert (len(mesh.points), len(mesh.triangles)) == (17, 16)
+        """Rulings in black inside the sheet; the end of one misses its vertex by 0.07 of 340 units."""
+        pattern = read_pattern(DATA / "cones.svg")
+        assert "38 boundary lines lie inside" in pattern.remarks[0]
+        mesh = read_drawn(DATA / "cones.svg")
+        assert (len(mesh.points), len(mesh.triangles)) == (3 * 21, 2 * 2 * 20)
+
+    def test_facets_that_cross(self):
+        """Lines that cross in one point are cut there, and a view box beside the sheet does not matter."""
+        mesh = read_drawn(DATA / "cone_pleat.svg")
+        assert (len(mesh.points), len(mesh.triangles)) == (12, 11)
 
 
 def test_area_is_kept(tmp_path):

@@ -16,8 +16,7 @@ from meshes import FileFormatError, SheetMesh, annulus_sector, full_annulus, str
 from meshes.io import read_fold, write_fold, write_mesh
 from meshes.io.export import FORMATS
 
-PATTERNS = pathlib.Path(__file__).parents[3] / "shared" / "patterns"
-shared = pytest.mark.skipif(not PATTERNS.is_dir(), reason="the shared crease patterns are not here")
+DATA = pathlib.Path(__file__).parents[1] / "data"
 
 SQUARE = {
     "vertices_coords": [[0, 0], [2, 0], [2, 2], [0, 2], [1, 1]],
@@ -553,20 +552,20 @@ def test_no_file(tmp_path):
     assert str(caught.value).isprintable()
 
 
-@shared
-def test_shared_simple():
-    mesh = read_fold(PATTERNS / "simple.fold")
+def test_a_folded_form():
+    """Two pages at a right angle, each with a flap that lies on it, with the order of the layers."""
+    mesh = read_fold(DATA / "layers.fold")
     assert len(mesh.points) == 6
-    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 4, 1], [1, 5, 2]]
-    assert pairs(mesh, "crease:v1") == [[0, 2]]
-    assert undirected(mesh.edge_sets["crease:mountain"]) == {(0, 1), (1, 2)}
+    assert mesh.triangles.tolist() == [[0, 2, 1], [0, 1, 3], [0, 4, 2], [0, 3, 5]]
+    assert pairs(mesh, "crease:m1") == [[0, 2]]
+    assert undirected(mesh.edge_sets["crease:valley"]) == {(0, 1), (0, 3)}
     assert len(mesh.edge_sets["edge:boundary"]) == 6
     assert not mesh.flat
 
 
-@shared
-def test_shared_square_twist():
-    mesh = read_fold(PATTERNS / "squaretwist.fold")
+def test_a_rigidly_folded_form():
+    """Three by three panels of a Miura fold, rounded to six decimals: every panel gets a diagonal."""
+    mesh = read_fold(DATA / "rigid_miura.fold")
     assert (len(mesh.points), len(mesh.triangles)) == (16, 18)
     counts = {name: len(mesh.edge_sets[name]) for name in ("crease:mountain", "crease:valley", "edge:facet")}
     assert counts == {"crease:mountain": 6, "crease:valley": 6, "edge:facet": 9}

@@ -171,7 +171,7 @@ def test_small_load_balances_in_the_referee(make: type[Assemblage]) -> None:
 
 def test_condition_number() -> None:
     path = trace(supported(1.0))
-    system = path._system(0)
+    system = path.system(0)
     q = path.records[-1].q
     K = system.tangent(q, 1.0, system.evaluate(q, 1.0).forces).matrix
     assert condition_number(path) == pytest.approx(

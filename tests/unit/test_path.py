@@ -154,7 +154,7 @@ def test_steps_begin_where_the_last_one_ended() -> None:
     path = reached(MODELS["several steps"])
     ends = [max(i for i, r in enumerate(path.records) if r.step == step) for step in range(4)]
     for step in (1, 2, 3):
-        system = path._system(step)
+        system = path.system(step)
         before = path[ends[step - 1]]
         assert np.abs(system.positions(system.start(), 0.0) - before.points).max() < 1e-12
         if step != 2:  # in step 2 the spring is replaced by an exact angle, its moment by a multiplier
@@ -164,7 +164,7 @@ def test_steps_begin_where_the_last_one_ended() -> None:
 def test_spring_that_becomes_a_held_crease() -> None:
     """The prescribed crease begins at the angle and the moment that the spring had: still in balance."""
     path = reached(FREE.fold("crease", rest=1.5, Lstar=20.0).fold("crease", to=2.0))
-    system = path._system(1)
+    system = path.system(1)
     first = system.evaluate(system.start(), 0.0)
     assert first.imbalance < 1e-6
     last = max(i for i, r in enumerate(path.records) if r.step == 0)
@@ -180,7 +180,7 @@ def test_held_crease_with_a_couple_that_is_released(formulation: str) -> None:
         Fold("crease", to=2.4), bh.Moment("crease", 0.05)
     )
     path = reached(model.fold("crease", rest=2.4, stiffness=0.5))
-    begin = path._system(1)
+    begin = path.system(1)
     assert begin.evaluate(begin.start(), 0.0).imbalance <= 1e-7
     assert path.iterations < 60
 
@@ -189,7 +189,7 @@ def test_held_crease_that_is_released() -> None:
     """It keeps angle and moment at first, and ends as the spring alone would have."""
     held = FREE.fold("crease", to=2.0)
     path = reached(held.fold("crease", rest=1.5, Lstar=20.0))
-    system = path._system(1)
+    system = path.system(1)
     assert system.evaluate(system.start(), 0.0).imbalance < 1e-6
     alone = reached(FREE.fold("crease", rest=1.5, Lstar=20.0))
     assert path[-1].energy.total == pytest.approx(alone[-1].energy.total, rel=1e-8)
@@ -776,3 +776,30 @@ def test_moment_of_a_held_crease_is_the_slope_of_the_energy() -> None:
     lengths = np.linalg.norm(MESH.points[edges[:, 1]] - MESH.points[edges[:, 0]], axis=1)
     # U falls as the crease opens; the multiplier is the moment that the holder must add
     assert float(lengths @ mid.crease_moment("crease")) == pytest.approx(-slope, rel=1e-5)
+
+
+def test_a_file_of_version_0_1_is_refused_in_one_line(tmp_path: FilePath) -> None:
+    """Its steps were tuples that hid what ends them; the line says how to make it anew."""
+    file = tmp_path / "old.bh"
+    db = sqlite3.connect(file)
+    db.executescript(
+        """
+        CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+        CREATE TABLE arrays (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL, data BLOB NOT NULL);
+        CREATE TABLE states (id INTEGER PRIMARY KEY, step INTEGER NOT NULL, lambda REAL NOT NULL);
+        CREATE TABLE steps (step INTEGER PRIMARY KEY, outcome TEXT NOT NULL, reason TEXT NOT NULL);
+        INSERT INTO meta VALUES ('model', '{"format": 1, "steps": [[{"kind": "fold", "crease": "a", "to": 1.2}]]}');
+        INSERT INTO states VALUES (1, 0, 0.0);
+        PRAGMA user_version = 2;
+        """
+    )
+    db.close()
+    before = file.read_bytes()
+    for use in (lambda: Path.load(file), lambda: trace(MODELS["held"], file=file, resume=True)):
+        with pytest.raises(
+            PathFileError, match=r"format 2, this one reads 3\); make it anew from its scene"
+        ) as told:
+            use()
+        assert "\n" not in str(told.value)
+        assert "old.bh" in str(told.value)
+    assert file.read_bytes() == before

@@ -98,7 +98,7 @@ def shaken(formulation: str, seed: int) -> tuple[object, np.ndarray, float]:
     model = Model(mesh, SHEET, formulation=formulation).support("corner:inner-start", [[1.0, 0.5, 0.2]])
     bar = Indenter("bar", (19.0, 5.0, 0.6), 0.7, 4.0, 1.5, 0.5, by=(0.3, -0.2, -0.5), tilt=0.1, gap=0.4)
     model = model.crease("crease", Lstar=25.0).step(bar, Tether("edge:start", (0.5, 1.0, 2.0)))
-    system = Path(model)._system(0)
+    system = Path(model).system(0)
     q = system.start() + 0.1 * np.random.default_rng(seed).normal(size=system.size)
     return system, q, 0.4
 

@@ -22,10 +22,10 @@ from bh.analysis.sensitivities import (
     OfNodes,
     OfPoints,
     Position,
-    Situation,
     Stiffness,
     of,
 )
+from bh.analysis.situation import Situation
 from bh.analysis.stiffness_probe import Probe
 from bh.applications.polish import polish
 from meshes.errors import InputError

@@ -71,7 +71,7 @@ def test_moment_is_the_rate_of_energy() -> None:
     path = solve(steps)
     ends = [s for s in path if s.lam == 1.0]
     pairs = SECTOR.topology.find_edges(SECTOR.crease_edges("crease"))
-    lengths = path._system(0).elements.lengths[pairs]
+    lengths = path.system(0).elements.lengths[pairs]
     moments = [float(s.crease_moment("crease") @ lengths) for s in ends]
     work = 0.05 / 3.0 * (moments[0] + 4.0 * moments[1] + moments[2])
     assert work == pytest.approx(ends[2].energy.total - ends[0].energy.total, rel=2e-5)
@@ -120,7 +120,7 @@ def test_released_crease_stays_until_its_spring_is_turned() -> None:
     model = sheet().fold("crease", by=0.8).fold("crease", rest=math.pi - 0.8, stiffness=0.02)
     path = solve(model)
     begin = [s for s in path if s.step == 0][-1]
-    system = path._system(1)
+    system = path.system(1)
     assert system.evaluate(system.start(), 0.0).imbalance < 1e-6
     assert path[-1].energy.bending < begin.energy.bending
     assert path[-1].fold_angle("crease").mean() < 0.8
@@ -176,7 +176,7 @@ def test_state_reads_the_crease() -> None:
     curve = last.crease_curve("crease", points=3)
     np.testing.assert_array_equal(curve[::2], last.crease_points("crease"))
     np.testing.assert_allclose(last.fold_angles_along("crease"), 0.9, rtol=1e-12)
-    assert last.energy_density["bending"] @ path._system(0).elements.areas == pytest.approx(
+    assert last.energy_density["bending"] @ path.system(0).elements.areas == pytest.approx(
         last.energy.bending
     )
     assert np.abs(last.dihedral_angles - math.pi).max() > 0.5  # the crease, measured at all hinges

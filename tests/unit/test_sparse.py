@@ -48,7 +48,7 @@ def tangents(request: pytest.FixtureRequest) -> dict[str, SparseMatrix]:
     try:
         path = bh.trace(sheet(request.param).fold("crease", rest=2.0 * math.pi / 3.0, Lstar=25.0))
         assert path.outcome == "reached"
-        system, q = path._system(0), path.records[-1].q
+        system, q = path.system(0), path.records[-1].q
         forces = system.evaluate(q, 1.0).forces
         pressed = forces.copy()
         pressed[: len(system.elements.bars)] -= 2.0  # N in every bar
@@ -115,7 +115,7 @@ def test_paths_agree_with_those_of_the_band(backend: str, monkeypatch: pytest.Mo
             patch.setattr(patterns, "band_is_cheaper", lambda n, bandwidth: False)
             other = bh.trace(model)
             assert isinstance(
-                other._system(0)._pattern.matrix(np.zeros(other._system(0)._pattern.size)), SparseMatrix
+                other.system(0)._pattern.matrix(np.zeros(other.system(0)._pattern.size)), SparseMatrix
             )
         assert banded.outcome == other.outcome == "reached"
         assert banded.iterations == other.iterations

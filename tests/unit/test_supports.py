@@ -245,7 +245,7 @@ def test_free_motion_is_named() -> None:
 def internal_forces(path: bh.Path) -> tuple[Array, Array]:
     """Nodes (n, 3) and forces (n, 3) of bars and hinges on them, in the last state of a free sheet."""
     record = path.records[-1]
-    system = path._system(record.step)
+    system = path.system(record.step)
     _, _, forces, _, _ = system.internal_forces(path[-1].points, record.q, record.lam)
     return path[-1].points, forces
 
@@ -257,7 +257,7 @@ def test_free_sheet_is_held_without_force(how: str, kind: str) -> None:
     path = solve(Model(mesh, SHEET).fold("crease", **FOLDS[how]))
     for state in path:
         assert np.abs(state.reactions).max() == 0.0
-    system = path._system(0)
+    system = path.system(0)
     assert system.primal == 3 * len(mesh.points)  # nothing is fixed, not even invisibly
     x, forces = internal_forces(path)
     typical = np.abs(system.evaluate(path.records[-1].q, 1.0).forces[: len(system.elements.bars)]).max()

@@ -123,7 +123,7 @@ def test_full_ring_and_a_given_normal() -> None:
 @pytest.mark.parametrize("name", BOTH)
 def test_half_the_unknowns(name: str) -> None:
     path = Path(sector(along=32, rows=2, name=name).fold("crease", to=2.0), symmetry="y")
-    half = path._half(0)
+    half = path.half(0)
     assert half is not None
     assert half.system.size < 0.53 * half.sheet.size
 
@@ -134,7 +134,7 @@ def test_derivatives_of_a_half(name: str, kind: Kind, along: int, rows: int) -> 
     """Gradient and tangent of the half against differences, and its energy against half of the whole's."""
     path = Path(strip(kind, along, rows, name).support("edge:start", "xyz").support("edge:end", "xyz")
                 .fold("crease", rest=2.0, Lstar=10.0), symmetry="x")  # fmt: skip
-    half = path._half(0)
+    half = path.half(0)
     assert half is not None
     system = half.system
     rng, lam = np.random.default_rng(3), 0.4

@@ -11,7 +11,7 @@ import pytest
 import bh
 import meshes
 from bh import Model, ModelError, Sheet, Until, trace
-from bh.formulations.observables import depth_of
+from bh.formulations.observables import depth_of, measure
 from bh.formulations.state import State
 from bh.scene.load import parse_scene
 
@@ -72,7 +72,7 @@ def test_any_observable_ends_a_step(observable: str, of: str | None, value: floa
     until = Until(observable, value, of, 1e-7)
     path = folded(model, until)
     assert path.outcome == "reached"
-    assert until.measure(path[-1]) == pytest.approx(value, abs=1e-7)
+    assert measure(until, path[-1]) == pytest.approx(value, abs=1e-7)
 
 
 def test_what_is_never_met_fails_with_its_reason() -> None:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from bh.solvers.outcome import Outcome
+
 
 def verify(
     cases: Annotated[
@@ -44,7 +46,7 @@ def verify(
     for check in failed:
         typer.echo(
             f"failed: {check['case']} {check['quantity']} {check['params']} = "
-            f"{check['value'] if check['outcome'] == 'reached' else check['outcome']}",
+            f"{check['value'] if check['outcome'] == Outcome.REACHED else check['outcome']}",
             err=True,
         )
     judged = sum(check["passed"] is not None for check in data["checks"])

@@ -131,7 +131,7 @@ def play(scene: Scene, compare: bool = True) -> Result:
 
 
 def _excess(path: Path, fine: Path) -> float:
-    scale = max(fine[-1].energy.total, 1e-15 * path._system(0).energy_scale)
+    scale = max(fine[-1].energy.total, 1e-15 * path.system(0).energy_scale)
     return (path[-1].energy.total - fine[-1].energy.total) / scale
 
 

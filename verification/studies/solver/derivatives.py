@@ -157,7 +157,7 @@ def work_mismatch(increment: float) -> tuple[float, int]:
     model = Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=math.pi / 2)
     fixed = LoadControl(first_rotation=increment, largest_rotation=increment)
     path = trace(model, strategy=fixed)
-    system = path._system(0)
+    system = path.system(0)
     lam = np.array([record.lam for record in path.records])
     power = np.array([system.power(record.q, record.lam) for record in path.records])
     from scipy.integrate import simpson

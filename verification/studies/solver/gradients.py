@@ -20,10 +20,10 @@ from bh.analysis.sensitivities import (
     Observable,
     OfNodes,
     Position,
-    Situation,
     Stiffness,
     of,
 )
+from bh.analysis.situation import Situation
 from bh.applications.inverse.simulate import SETTING, model, simulate
 from bh.applications.inverse.surrogate import shipped
 from bh.applications.polish import Polished, polish

@@ -33,7 +33,7 @@ def check(
 def located(path: Path, kind: Critical) -> list[tuple[float, Array]]:
     """Lambda and node positions (n, 3), mm, of every limit or bifurcation point that the path has passed."""
     return [
-        (at.lam, path._system(step).positions(at.q, at.lam))
+        (at.lam, path.system(step).positions(at.q, at.lam))
         for step, at in path.critical_points
         if at.kind == kind
     ]

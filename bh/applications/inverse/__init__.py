@@ -1,0 +1,1 @@
+"""Inverse design: creases whose pinched segments meet a target (source Ch. 6)."""
