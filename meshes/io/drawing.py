@@ -14,16 +14,18 @@ import numpy as np
 from meshes.curves import Array
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import shown
-from meshes.io.strokes import Rules, Stroke
+from meshes.io.strokes import Rules, Stroke, Strokes
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.planar import RIM, DrawnLine, Graph, heal
 from meshes.sheet import pattern_of, region_of
 
-FORMATS = (".svg", ".dxf")
+FORMATS = (".svg", ".svgz", ".dxf", ".cp", ".opx")
+UPWARDS = (".dxf", ".cp", ".opx")  # keep their coordinates; the page of an SVG file begins anywhere
 TOLERANCE, GAP = 2e-5, 5e-4  # of the drawing's diagonal
 SHORT = 0.4  # of its shortest line: a larger gap by default would swallow it
 LONGEST = 1e6  # mm
+SMALL, LARGE = 5.0, 5000.0  # mm; a longer side beyond these gets a remark
 LETTERS = {"mountain": "M", "valley": "V", "boundary": "B", "cut": "B", "facet": "F", "flat": "U"}
 
 
@@ -109,7 +111,8 @@ def read_graph(
             raise FileFormatError(f"{name} = {value} cannot be; give a positive number")
     if scale is not None and fit is not None:
         raise FileFormatError("scale and fit are both given; give one of them")
-    strokes, unit = _read(path)
+    found = _read(path)
+    strokes, unit, remarks = found.strokes, found.unit, list(found.remarks)
     rules = Rules(lines)
     kept = [(stroke, kind) for stroke in strokes if (kind := rules.kind(stroke)) != "ignore"]
     if not kept:
@@ -129,7 +132,9 @@ def read_graph(
         raise FileFormatError(f"the drawing is {diagonal:.3g} mm across; set scale (mm a unit) or fit (mm)")
     if tolerance is not None:
         sampled = [_finite(stroke, stroke.sample(tolerance / unit)) for stroke, _ in kept]
-    moved = low if Path(path).suffix.lower() == ".svg" or fit is not None else np.zeros(2)
+    if scale is None:
+        remarks += _size_remarks(unit * float((high - low).max()), found.stated)
+    moved = np.zeros(2) if Path(path).suffix.lower() in UPWARDS and fit is None else low
     partly = any(stroke.opacity < 1.0 for stroke, kind in kept if kind in ("mountain", "valley"))
     drawn = [
         DrawnLine(_clean((points - moved) * unit, 1e-9 * diagonal), kind, stroke.name,
@@ -138,7 +143,6 @@ def read_graph(
     ]  # fmt: skip
     drawn = [line for line in drawn if len(line.points) > 1]
     lengths = np.array([_length(line.points) for line in drawn])
-    remarks = []
     if gap is None:
         gap = min(GAP * diagonal, SHORT * float(lengths.min()))
     elif (lengths <= gap).any():
@@ -149,9 +153,9 @@ def read_graph(
     return heal(drawn, gap), drawn, remarks
 
 
-def _read(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
+def _read(path: str | os.PathLike[str]) -> Strokes:
     suffix = Path(path).suffix.lower()
-    if suffix == ".svg":
+    if suffix in (".svg", ".svgz"):
         from meshes.io.svg import read_svg
 
         return read_svg(path)
@@ -159,7 +163,22 @@ def _read(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
         from meshes.io.dxf import read_dxf
 
         return read_dxf(path)
+    if suffix in (".cp", ".opx"):
+        from meshes.io.oripa import read_cp, read_opx
+
+        return (read_cp if suffix == ".cp" else read_opx)(path)
     raise FileFormatError(f"suffix '{suffix}' is no drawing; give one of {', '.join(FORMATS)}")
+
+
+def _size_remarks(size: float, stated: bool) -> list[str]:
+    """What to say of a sheet whose longer side is `size` mm: nobody folds a crease pattern of half a millimetre or 20 m."""
+    if SMALL <= size <= LARGE:
+        return []
+    told = "as the file says" if stated else "as the file states no unit"
+    return [
+        f"the sheet is {size:.3g} mm long, {told}; if that is not meant, give its longer side: fit = 200.0 (mm), or "
+        "scale (mm a unit of the drawing)"
+    ]
 
 
 def _finite(stroke: Stroke, points: Array) -> Array:

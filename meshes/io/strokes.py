@@ -9,7 +9,7 @@ from __future__ import annotations
 import colorsys
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from meshes.curves import Array
@@ -57,6 +57,7 @@ class Stroke:
         layer: name of the layer or group that it lies in, or "".
         dash: solid or how it is broken.
         opacity: 0 to 1; as a part of 180 degrees it says how far to fold.
+        unknown: what its colour says where that is not understood; `colour` is None then.
     """
 
     sample: Callable[[float], Array]
@@ -65,6 +66,24 @@ class Stroke:
     layer: str = ""
     dash: Dash = "solid"
     opacity: float = 1.0
+    unknown: str = ""
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """The lines of a file.
+
+    Attributes:
+        strokes: the lines.
+        unit: millimetres a unit of theirs.
+        stated: whether the file says so itself; otherwise `unit` is what its format takes for granted.
+        remarks: what was read into the file.
+    """
+
+    strokes: list[Stroke]
+    unit: float
+    stated: bool = True
+    remarks: list[str] = field(default_factory=list)
 
 
 class Rules:
@@ -106,6 +125,11 @@ class Rules:
         for found in (*own, _by_layer(stroke.layer)):
             if found is not None:
                 return found
+        if stroke.unknown:
+            raise FileFormatError(
+                f"{stroke.name} has the colour '{stroke.unknown}', which is not understood; write it as #rrggbb, or "
+                "put the line on a layer that says what it is (mountain, valley, boundary, ...)"
+            )
         by_colour = _by_colour(stroke.colour)
         if by_colour == "boundary" and stroke.dash in DASHES:  # a drawing in black only
             return DASHES[stroke.dash]
