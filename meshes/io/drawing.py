@@ -14,12 +14,14 @@ import numpy as np
 from meshes.curves import Array
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import shown
+from meshes.io.perforation import join_dashes
 from meshes.io.strokes import Rules, Stroke, Strokes
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.planar import RIM, DrawnLine, Graph, heal
 from meshes.sheet import pattern_of, region_of
 
+OUTLINES = ("drawn", "hull")
 FORMATS = (".svg", ".svgz", ".dxf", ".cp", ".opx")
 UPWARDS = (".dxf", ".cp", ".opx")  # keep their coordinates; the page of an SVG file begins anywhere
 TOLERANCE, GAP = 2e-5, 5e-4  # of the drawing's diagonal
@@ -43,6 +45,7 @@ def read_pattern(path: str | os.PathLike[str], **options: Any) -> CreasePattern:
         gap: lines that miss each other by up to so much are joined, mm; None for 1 / 2,000 of the diagonal, but no
             more than 0.4 of the shortest line.
         lines: what colours, layers and dashes stand for, in front of the defaults (see `meshes.io.strokes`).
+        outline: "hull" takes the convex hull of what is drawn as the outline.
 
     Raises:
         FileFormatError: one line that names the file, the line or place, and the mend.
@@ -104,11 +107,14 @@ def read_graph(
     tolerance: float | None = None,
     gap: float | None = None,
     lines: Mapping[str, str] | None = None,
+    outline: str = "drawn",
 ) -> tuple[Graph, list[DrawnLine], list[str]]:
     """The healed plane graph of a drawing, its lines, and remarks; arguments as `read_pattern`."""
     for name, value in (("scale", scale), ("fit", fit), ("tolerance", tolerance), ("gap", gap)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise FileFormatError(f"{name} = {value} cannot be; give a positive number")
+    if outline not in OUTLINES:
+        raise FileFormatError(f"outline = '{outline}' is not known; use {' or '.join(OUTLINES)}")
     if scale is not None and fit is not None:
         raise FileFormatError("scale and fit are both given; give one of them")
     found = _read(path)
@@ -150,7 +156,21 @@ def read_graph(
         first = drawn[int(np.argmax(lengths <= gap))].name
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
-    return heal(drawn, gap), drawn, remarks
+    drawn, joined = join_dashes(drawn, gap)
+    if outline == "hull":
+        drawn.append(_hull(drawn))
+        remarks.append("the outline is the convex hull of what is drawn")
+    return heal(drawn, gap), drawn, [*remarks, *rules.remarks, *joined]
+
+
+def _hull(lines: list[DrawnLine]) -> DrawnLine:
+    """The convex hull of everything that is drawn, as the outline."""
+    import shapely
+
+    hull = shapely.convex_hull(shapely.MultiPoint(np.vstack([line.points for line in lines])))
+    if hull.geom_type != "Polygon":
+        raise FileFormatError('outline = "hull": all lines lie on one line; draw the outline')
+    return DrawnLine(np.asarray(hull.exterior.coords), "boundary", "the hull of the drawing")
 
 
 def _read(path: str | os.PathLike[str]) -> Strokes:
@@ -171,7 +191,7 @@ def _read(path: str | os.PathLike[str]) -> Strokes:
 
 
 def _size_remarks(size: float, stated: bool) -> list[str]:
-    """What to say of a sheet whose longer side is `size` mm: nobody folds a crease pattern of half a millimetre or 20 m."""
+    """What to say of a sheet whose longer side is `size` mm: few are smaller than a stamp or longer than a room."""
     if SMALL <= size <= LARGE:
         return []
     told = "as the file says" if stated else "as the file states no unit"

@@ -27,8 +27,10 @@ UNITS = {
     14: 100.0,
 }
 # entities that are no lines of a pattern; others that are no lines are refused
-SILENT = ("TEXT", "MTEXT", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION", "POINT", "HATCH", "MPOLYGON", "ATTDEF",
-          "ATTRIB", "LEADER", "MULTILEADER", "MLEADER", "TOLERANCE", "IMAGE", "VIEWPORT", "SOLID", "WIPEOUT", "OLE2FRAME",
+SILENT = ("TEXT", "MTEXT", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION",
+          "POINT", "HATCH", "MPOLYGON", "ATTDEF",
+          "ATTRIB", "LEADER", "MULTILEADER", "MLEADER", "TOLERANCE", "IMAGE",
+          "VIEWPORT", "SOLID", "WIPEOUT", "OLE2FRAME",
           "ACAD_PROXY_ENTITY")  # fmt: skip
 LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX", "3DFACE", "TRACE")
 MOST = 200_000  # entities once all blocks are written out
@@ -46,8 +48,8 @@ class Look(NamedTuple):
 def read_dxf(path: str | os.PathLike[str]) -> Strokes:
     """The strokes of the model space, and millimetres a unit of theirs ($INSUNITS; where it is not written, mm).
 
-    Layers that are off or frozen are left out, and so are texts, dimensions, hatches and what has no length. What lies on
-    layer 0 of a block, or is coloured "by block", takes layer and colour of the reference.
+    Layers that are off or frozen are left out, and so are texts, dimensions, hatches and what has no length. What lies
+    on layer 0 of a block, or is coloured "by block", takes layer and colour of the reference.
 
     Raises:
         FileFormatError: the file cannot be read or is not DXF, has units that are no lengths, lines that are not in
@@ -73,17 +75,18 @@ def read_dxf(path: str | os.PathLike[str]) -> Strokes:
         papers = [layout.name for layout in drawing.layouts if layout.name != "Model" and len(layout)]
         if papers:
             raise FileFormatError(
-                f"the model space is empty; the lines are in the paper space '{papers[0]}': move them to the model space"
+                f"the model space is empty, all is in the paper space '{papers[0]}'; move it to the model space"
             )
     return Strokes(strokes, UNITS[unit], stated=stated and unit != 0)
 
 
 def _document(path: str | os.PathLike[str]) -> Any:
-    import ezdxf
+    from ezdxf.filemanagement import readfile
+    from ezdxf.lldxf.const import DXFError
 
     try:
-        return ezdxf.readfile(os.fspath(path))
-    except ezdxf.DXFError as error:
+        return readfile(os.fspath(path))
+    except DXFError as error:
         raise FileFormatError(
             f"this is not a DXF file that can be read ({error}); save it as DXF again"
         ) from error
@@ -148,8 +151,15 @@ def _stroke(drawing: Any, entity: Any, around: Look | None, number: int) -> Stro
             raise FileFormatError(f"{name} is not in the xy plane; flatten the drawing")
         return np.asarray(points[:, :2], dtype=float)
 
-    return Stroke(sample, name, _colour(drawing, entity, around), _layer_name(entity, around),
-                  _dash(drawing, entity, around), 1.0 - entity.transparency)  # fmt: skip
+    return Stroke(
+        sample,
+        name,
+        _colour(drawing, entity, around),
+        _layer_name(entity, around),
+        _dash(drawing, entity, around),
+        1.0 - entity.transparency,
+        key=f"handle:{entity.dxf.handle}",
+    )
 
 
 def _flattening(entity: Any) -> Any:

@@ -1,17 +1,19 @@
 """Crease patterns of ORIPA and Oriedita: .cp (a line each: kind and two points) and .opx (Java beans in XML).
 
-Both have no unit and count y downwards, as the screen does: 1 is the rim, 2 a mountain, 3 a valley, 4 an auxiliary line.
+Both have no unit and count y downwards, as the screen does: 1 is the rim, 2 a mountain, 3 a valley, 4 an auxiliary
+line.
 """
 
 from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from xml.etree import ElementTree
 
 import numpy as np
 
+from meshes.curves import Array
 from meshes.errors import FileFormatError
 from meshes.io.files import drawing_bytes
 from meshes.io.strokes import Colour, Stroke, Strokes
@@ -82,6 +84,10 @@ def _value(void: ElementTree.Element) -> float:
         ) from error
 
 
+def _always(points: Array) -> Callable[[float], Array]:
+    return lambda tolerance: points
+
+
 def _strokes(rows: Iterator[Row]) -> Strokes:
     strokes = []
     for number, (kind, a, b, c, d) in enumerate(rows, start=1):
@@ -92,7 +98,7 @@ def _strokes(rows: Iterator[Row]) -> Strokes:
         points = np.array([[a, -b], [c, -d]])
         if np.array_equal(points[0], points[1]):
             continue
-        strokes.append(Stroke(lambda _, points=points: points, f"line {number}", COLOURS[kind]))
+        strokes.append(Stroke(_always(points), f"line {number}", COLOURS[kind]))
     if not strokes:
         raise FileFormatError("there is no line in the file; draw the creases first")
     return Strokes(strokes, 1.0, stated=False)

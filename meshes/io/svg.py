@@ -6,7 +6,8 @@ import contextlib
 import io
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import ParseError
 
@@ -77,7 +78,14 @@ def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
             if part:
                 name += f", part {part + 1}"
             stroke = Stroke(
-                _sampler(se, segments), name, colour, layer, _dash(shape), _opacity(shape), unknown
+                _sampler(se, segments),
+                name,
+                colour,
+                layer,
+                _dash(shape),
+                _opacity(shape),
+                unknown,
+                f"id:{shape.id}" if shape.id else "",
             )
             yield from _clipped(stroke, clips)
 
@@ -146,10 +154,11 @@ def _clipped(stroke: Stroke, clips: tuple[Any, ...]) -> Iterator[Stroke]:
         if piece.geom_type == "LineString" and piece.length > 0.0:
             points = np.asarray(piece.coords)
             name = stroke.name + (f", clipped part {number + 1}" if number else ", clipped")
-            yield Stroke(
-                lambda _, points=points: points, name, stroke.colour, stroke.layer, stroke.dash, stroke.opacity,
-                stroke.unknown,
-            )  # fmt: skip
+            yield replace(stroke, sample=_always(points), name=name)
+
+
+def _always(points: Array) -> Callable[[float], Array]:
+    return lambda tolerance: points
 
 
 def _hidden(shape: Any) -> bool:
