@@ -54,8 +54,8 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
         lines: that its edges belong to.
 
     Raises:
-        PatternError: the outline is open, is no boundary line, or there are two; a line leaves the sheet; a
-            cut lies inside it. One line, with the name of the line and the place.
+        PatternError: the outline is open, or there are two; a line leaves the sheet; a cut
+            lies inside it. One line, with the name of the line and the place.
     """
     region = region_of(graph, lines)
     creases: list[Crease] = []
@@ -101,7 +101,10 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
     ]
     _check_ends(graph, lines, segments)
     if not faces:
-        raise PatternError("the drawing has no closed outline; draw one as a boundary (black) line")
+        raise PatternError(
+            "the drawing has no closed outline; draw one as a boundary (black) line, or take the hull of what is "
+            'drawn: outline = "hull"'
+        )
     number = {tuple(pair): e for e, pair in enumerate(np.sort(graph.edges, axis=1).tolist())}
     around = [[number[min(a, b), max(a, b)] for ring in face for a, b in _sides(ring)] for face in faces]
     keep = _without_holes(graph, around)
@@ -117,15 +120,10 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
             f"the drawing holds {len(polygon.geoms)} separate sheets (at {spots}); keep one of them"
         )
     rim = np.flatnonzero(used == 1)
-    for e in rim.tolist():
-        if graph.kinds[e] not in RIM:
-            raise PatternError(
-                f"{_name(graph, lines, e)} is drawn as {graph.kinds[e]} but is the rim of the sheet at "
-                f"{_middle(graph, e)}; close the outline with a boundary (black) line"
-            )
     inside = np.setdiff1d(np.arange(len(graph.edges)), rim)
     inside = _check_inside(graph, lines, polygon, inside)
-    return Region(polygon, _rings(graph, rim), inside, _remarks(graph, lines, inside))
+    remarks = _rim_remarks(graph, lines, rim, inside) + _remarks(graph, lines, inside)
+    return Region(polygon, _rings(graph, rim), inside, remarks)
 
 
 def _without_holes(graph: Graph, around: list[list[int]]) -> list[bool]:
@@ -187,6 +185,23 @@ def _check_inside(graph: Graph, lines: Sequence[DrawnLine], polygon: Any, inside
                 'draw it as a hole, or take it as something else: lines = { "green" = "ignore" }'
             )
     return inside
+
+
+def _rim_remarks(graph: Graph, lines: Sequence[DrawnLine], rim: Ints, inside: Ints) -> list[str]:
+    """A crease along the rim cannot fold: it is taken as the boundary."""
+    wrong = [e for e in rim.tolist() if graph.kinds[e] not in RIM]
+    if not wrong:
+        return []
+    kind = graph.kinds[wrong[0]]
+    remark = (
+        f"{_name(graph, lines, wrong[0])} is drawn as {kind} but is the rim of the sheet at "
+        f"{_middle(graph, wrong[0])}: taken as boundary"
+    )
+    whole = len(wrong) == len(rim) and {graph.kinds[e] for e in wrong} == {"mountain"}
+    others = {graph.kinds[e] for e in inside.tolist()} & set(CREASES)
+    if whole and "valley" in others:
+        remark += '; if red is cut and blue is score, as laser shops have it: lines = { "#ff0000" = "cut" }'
+    return [remark]
 
 
 def _remarks(graph: Graph, lines: Sequence[DrawnLine], inside: Ints) -> list[str]:

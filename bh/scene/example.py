@@ -76,9 +76,11 @@ def example(drawing: Path | None = None, folder: Path = Path()) -> str:
     if drawing is None:
         rest = REST.format(mesh=STRUCTURED, formulation="bars-and-hinges", place="corner:inner-start")
         return f"{head}{LIBRARY}\n{rest}"
-    if drawing.suffix.lower() not in (".svg", ".dxf"):
-        raise InputError(f"'{drawing}' is no drawing; give an .svg or .dxf file")
     from meshes.io import read_pattern
+    from meshes.io.drawing import DRAWINGS
+
+    if drawing.suffix.lower() not in DRAWINGS:
+        raise InputError(f"'{drawing}' is no drawing; give a file that ends in one of {', '.join(DRAWINGS)}")
 
     pattern = read_pattern(folder / drawing)
     name = '"' + str(drawing).replace("\\", "/").replace('"', '\\"') + '"'

@@ -93,7 +93,9 @@ def _mesh_table(table: dict[str, object]) -> MeshTable | GmshTable | DrawnTable:
 def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path) -> SheetMesh:
     name = shown(table["file"])
     suffix = Path(str(table["file"])).suffix.lower()
-    if suffix in (".svg", ".dxf"):
+    from meshes.io.drawing import DRAWINGS
+
+    if suffix in DRAWINGS:
         return _mesh_from_drawing(read_table(DrawingPattern, table, "pattern"), mesh, folder)
     stored = read_table(FilePattern, table, "pattern")
     if suffix != ".fold":

@@ -183,7 +183,7 @@ class DrawingPattern(Table):
     """An SVG or DXF drawing."""
 
     file: Annotated[str, Field(min_length=1)] = Field(
-        description="the name of an .svg or .dxf file, from the folder of the scene"
+        description="the name of an .svg, .dxf, .cp or .opx file, from the folder of the scene"
     )
     scale: Positive | None = Field(
         None, description="how many mm a unit of the drawing is, a positive number"
@@ -192,6 +192,9 @@ class DrawingPattern(Table):
     tolerance: Length | None = Field(None, description="how far chords may stay off curves, in mm")
     gap: Length | None = Field(
         None, description="up to which distance lines that miss each other are joined, in mm"
+    )
+    outline: Literal["drawn", "hull"] = Field(
+        "drawn", description='"drawn", or "hull" for the convex hull of what is drawn'
     )
     lines: dict[str, str] = Field(
         {}, description='what lines stand for, such as { "#00aa00" = "valley", "layer:score" = "mountain" }'

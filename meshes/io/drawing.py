@@ -14,16 +14,20 @@ import numpy as np
 from meshes.curves import Array
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import shown
-from meshes.io.strokes import Rules, Stroke
+from meshes.io.perforation import join_dashes
+from meshes.io.strokes import Rules, Stroke, Strokes
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.planar import RIM, DrawnLine, Graph, heal
 from meshes.sheet import pattern_of, region_of
 
-FORMATS = (".svg", ".dxf")
+OUTLINES = ("drawn", "hull")
+DRAWINGS = (".svg", ".svgz", ".dxf", ".cp", ".opx")
+UPWARDS = (".dxf", ".cp", ".opx")  # keep their coordinates; the page of an SVG file begins anywhere
 TOLERANCE, GAP = 2e-5, 5e-4  # of the drawing's diagonal
 SHORT = 0.4  # of its shortest line: a larger gap by default would swallow it
 LONGEST = 1e6  # mm
+SMALL, LARGE = 5.0, 5000.0  # mm; a longer side beyond these gets a remark
 LETTERS = {"mountain": "M", "valley": "V", "boundary": "B", "cut": "B", "facet": "F", "flat": "U"}
 
 Read = TypeVar("Read")
@@ -40,6 +44,7 @@ class DrawingOptions(TypedDict, total=False):
         gap: lines that miss each other by up to so much are joined, mm; None for 1 / 2,000 of the diagonal, but no
             more than 0.4 of the shortest line.
         lines: what colours, layers and dashes stand for, in front of the defaults (see `meshes.io.strokes`).
+        outline: "hull" takes the convex hull of what is drawn as the outline.
     """
 
     scale: float | None
@@ -47,16 +52,17 @@ class DrawingOptions(TypedDict, total=False):
     tolerance: float | None
     gap: float | None
     lines: Mapping[str, str] | None
+    outline: str
 
 
 def read_pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> CreasePattern:
-    """The crease pattern of an SVG or DXF drawing, lengths in mm.
+    """The crease pattern of a drawing (SVG, DXF, .cp, .opx), lengths in mm.
 
     Mountain and valley are as seen on the drawing, that is from +z. The sheet of an SVG file has the lower left corner
     of its bounding box at the origin; that of a DXF file keeps its coordinates (unless `fit` scales it).
 
     Args:
-        path: of an .svg or .dxf file.
+        path: of an .svg, .svgz, .dxf, .cp or .opx file.
         **options: see `DrawingOptions`.
 
     Raises:
@@ -71,7 +77,7 @@ def read_drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) 
     For drawings whose facet lines are to be the mesh. The names are those of `meshes.io.read_fold`.
 
     Args:
-        path: of an .svg or .dxf file.
+        path: of an .svg, .svgz, .dxf, .cp or .opx file.
         **options: as for `read_pattern`.
 
     Raises:
@@ -126,16 +132,18 @@ def read_graph(
     tolerance: float | None = None,
     gap: float | None = None,
     lines: Mapping[str, str] | None = None,
+    outline: str = "drawn",
 ) -> tuple[Graph, list[DrawnLine], list[str]]:
     """The healed plane graph of a drawing.
 
     Args:
-        path: of an .svg or .dxf file.
+        path: of an .svg, .svgz, .dxf, .cp or .opx file.
         scale: mm a unit of the drawing; None for the unit that the file states.
         fit: length of the longer side of the sheet's bounding box, mm, in place of a scale.
         tolerance: how far chords may stay off curves, mm; None for a part of the diagonal.
         gap: lines that miss each other by up to so much are joined, mm; None for a part of the diagonal.
         lines: what colours, layers and dashes stand for, in front of the defaults.
+        outline: "drawn", or "hull" for the convex hull of what is drawn.
 
     Returns:
         The graph, the lines that its edges belong to, and one remark for each thing that was taken for
@@ -149,9 +157,12 @@ def read_graph(
     for name, value in (("scale", scale), ("fit", fit), ("tolerance", tolerance), ("gap", gap)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise FileFormatError(f"{name} = {value} cannot be; give a positive number")
+    if outline not in OUTLINES:
+        raise FileFormatError(f"outline = '{outline}' is not known; use {' or '.join(OUTLINES)}")
     if scale is not None and fit is not None:
         raise FileFormatError("scale and fit are both given; give one of them")
-    strokes, unit = _read(path)
+    found = _read(path)
+    strokes, unit, remarks = found.strokes, found.unit, list(found.remarks)
     rules = Rules(lines)
     kept = [(stroke, kind) for stroke in strokes if (kind := rules.kind(stroke)) != "ignore"]
     if not kept:
@@ -171,7 +182,9 @@ def read_graph(
         raise FileFormatError(f"the drawing is {diagonal:.3g} mm across; set scale (mm a unit) or fit (mm)")
     if tolerance is not None:
         sampled = [_finite(stroke, stroke.sample(tolerance / unit)) for stroke, _ in kept]
-    moved = low if Path(path).suffix.lower() == ".svg" or fit is not None else np.zeros(2)
+    if scale is None:
+        remarks += _size_remarks(unit * float((high - low).max()), found.stated)
+    moved = np.zeros(2) if Path(path).suffix.lower() in UPWARDS and fit is None else low
     partly = any(stroke.opacity < 1.0 for stroke, kind in kept if kind in ("mountain", "valley"))
     drawn = []
     for (stroke, kind), points in zip(kept, sampled, strict=True):
@@ -179,7 +192,6 @@ def read_graph(
         drawn.append(DrawnLine(_clean((points - moved) * unit, 1e-9 * diagonal), kind, stroke.name, angle))
     drawn = [line for line in drawn if len(line.points) > 1]
     lengths = np.array([_length(line.points) for line in drawn])
-    remarks = []
     if gap is None:
         gap = min(GAP * diagonal, SHORT * float(lengths.min()))
     elif (lengths <= gap).any():
@@ -187,12 +199,26 @@ def read_graph(
         first = drawn[int(np.argmax(lengths <= gap))].name
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
-    return heal(drawn, gap), drawn, remarks
+    drawn, joined = join_dashes(drawn, gap)
+    if outline == "hull":
+        drawn.append(_hull(drawn))
+        remarks.append("the outline is the convex hull of what is drawn")
+    return heal(drawn, gap), drawn, [*remarks, *rules.remarks, *joined]
 
 
-def _read(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
+def _hull(lines: list[DrawnLine]) -> DrawnLine:
+    """The convex hull of everything that is drawn, as the outline."""
+    import shapely
+
+    hull = shapely.convex_hull(shapely.MultiPoint(np.vstack([line.points for line in lines])))
+    if hull.geom_type != "Polygon":
+        raise FileFormatError('outline = "hull": all lines lie on one line; draw the outline')
+    return DrawnLine(np.asarray(hull.exterior.coords), "boundary", "the hull of the drawing")
+
+
+def _read(path: str | os.PathLike[str]) -> Strokes:
     suffix = Path(path).suffix.lower()
-    if suffix == ".svg":
+    if suffix in (".svg", ".svgz"):
         from meshes.io.svg import read_svg
 
         return read_svg(path)
@@ -200,7 +226,22 @@ def _read(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
         from meshes.io.dxf import read_dxf
 
         return read_dxf(path)
-    raise FileFormatError(f"suffix '{suffix}' is no drawing; give one of {', '.join(FORMATS)}")
+    if suffix in (".cp", ".opx"):
+        from meshes.io.oripa import read_cp, read_opx
+
+        return (read_cp if suffix == ".cp" else read_opx)(path)
+    raise FileFormatError(f"suffix '{suffix}' is no drawing; give one of {', '.join(DRAWINGS)}")
+
+
+def _size_remarks(size: float, stated: bool) -> list[str]:
+    """What to say of a sheet whose longer side is `size` mm: few are smaller than a stamp or longer than a room."""
+    if SMALL <= size <= LARGE:
+        return []
+    told = "as the file says" if stated else "as the file states no unit"
+    return [
+        f"the sheet is {size:.3g} mm long, {told}; if that is not meant, give its longer side: fit = 200.0 (mm), or "
+        "scale (mm a unit of the drawing)"
+    ]
 
 
 def _finite(stroke: Stroke, points: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import colorsys
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from meshes.curves import Array
@@ -21,14 +21,41 @@ Colour = tuple[int, int, int]
 
 # a layer that is named by one of these words, whole or among others
 LAYERS: dict[LineKind, tuple[str, ...]] = {
-    "mountain": ("mountain", "mountains", "m"),
-    "valley": ("valley", "valleys", "v"),
+    "mountain": ("mountain", "mountains", "m", "berg", "bergfalte", "montagne", "monte"),
+    "valley": ("valley", "valleys", "v", "tal", "talfalte", "vallee", "valle"),
     "flat": ("flat", "undriven", "hinge", "hinges"),
-    "boundary": ("boundary", "outline", "border", "contour", "rim", "edge", "edges", "b"),
-    "cut": ("cut", "cuts", "slit", "slits"),
+    "boundary": (
+        "boundary",
+        "outline",
+        "border",
+        "contour",
+        "rim",
+        "edge",
+        "edges",
+        "b",
+        "umriss",
+        "rand",
+        "kontur",
+    ),
+    "cut": ("cut", "cuts", "cutting", "slit", "slits", "schnitt", "schneiden", "coupe", "corte"),
     "facet": ("facet", "facets", "triangulation", "ruling", "rulings", "f"),
     "ignore": ("ignore", "text", "notes", "dimensions", "construction", "guide", "guides", "hidden"),
 }
+# layers of creases that do not say which way they fold: a mountain where their colour does not tell either
+SCORES = (
+    "score",
+    "scores",
+    "scoring",
+    "crease",
+    "creases",
+    "fold",
+    "folds",
+    "engrave",
+    "etch",
+    "rill",
+    "falz",
+    "ritzen",
+)
 # hue in degrees, of colours that are neither dark, pale nor grey
 HUES: tuple[tuple[float, float, LineKind], ...] = (
     (-20.0, 20.0, "mountain"),
@@ -57,6 +84,8 @@ class Stroke:
         layer: name of the layer or group that it lies in, or "".
         dash: solid or how it is broken.
         opacity: 0 to 1; as a part of 180 degrees it says how far to fold.
+        key: "id:NAME" or "handle:NUMBER" by which a mapping can name this line alone, or "".
+        unknown: what its colour says where that is not understood; `colour` is None then.
     """
 
     sample: Callable[[float], Array]
@@ -65,6 +94,25 @@ class Stroke:
     layer: str = ""
     dash: Dash = "solid"
     opacity: float = 1.0
+    unknown: str = ""
+    key: str = ""
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """The lines of a file.
+
+    Attributes:
+        strokes: the lines.
+        unit: millimetres a unit of theirs.
+        stated: whether the file says so itself; otherwise `unit` is what its format takes for granted.
+        remarks: what was read into the file.
+    """
+
+    strokes: list[Stroke]
+    unit: float
+    stated: bool = True
+    remarks: list[str] = field(default_factory=list)
 
 
 class Rules:
@@ -82,17 +130,22 @@ class Rules:
         self.layers: dict[str, LineKind] = {}
         self.colours: dict[Colour, LineKind] = {}
         self.dashes: dict[str, LineKind] = {}
+        self.keys: dict[str, LineKind] = {}
+        self._scored: list[str] = []
         for key, word in (lines or {}).items():
             kind = _kind(key, word)
             if key.startswith("layer:"):
                 self.layers[key.removeprefix("layer:").strip().lower()] = kind
             elif key.startswith("dash:") and key.removeprefix("dash:") in get_args(Dash):
                 self.dashes[key.removeprefix("dash:")] = kind
+            elif key.startswith(("handle:", "id:")):
+                self.keys[key.lower()] = kind
             elif (colour := parse_colour(key)) is not None:
                 self.colours[colour] = kind
             else:
                 raise FileFormatError(
-                    f'lines: \'{key}\' names no line; use a colour ("#ff0000", "red"), "layer:NAME" or '
+                    f'lines: \'{key}\' names no line; use a colour ("#ff0000", "red"), "layer:NAME", '
+                    f'"handle:NUMBER" (DXF), "id:NAME" (SVG) or '
                     f'"dash:WORD" with {", ".join(get_args(Dash))}'
                 )
 
@@ -103,6 +156,7 @@ class Rules:
             FileFormatError: nothing says so.
         """
         own = (
+            self.keys.get(stroke.key.lower()),
             self.layers.get(stroke.layer.strip().lower()),
             self.colours.get(stroke.colour) if stroke.colour else None,
             self.dashes.get(stroke.dash),
@@ -110,7 +164,15 @@ class Rules:
         for found in (*own, _by_layer(stroke.layer)):
             if found is not None:
                 return found
+        if stroke.unknown:
+            raise FileFormatError(
+                f"{stroke.name} has the colour '{stroke.unknown}', which is not understood; write it as #rrggbb, or "
+                "put the line on a layer that says what it is (mountain, valley, boundary, ...)"
+            )
         by_colour = _by_colour(stroke.colour)
+        if by_colour in ("boundary", None) and stroke.dash == "solid" and _scored(stroke.layer):
+            self._scored.append(stroke.layer)
+            return "mountain"
         if by_colour == "boundary" and stroke.dash in DASHES:  # a drawing in black only
             return DASHES[stroke.dash]
         if by_colour is None:
@@ -120,6 +182,19 @@ class Rules:
                 f'lines = {{ "{shown}" = "mountain" }} (or {", ".join(get_args(LineKind)[1:])})'
             )
         return by_colour
+
+    @property
+    def remarks(self) -> list[str]:
+        """What was taken for granted by the strokes so far."""
+        return [
+            f"layer '{layer}' does not say which way its lines fold: taken as mountain; to change that: lines = "
+            f'{{ "layer:{layer}" = "valley" }}'
+            for layer in dict.fromkeys(self._scored)
+        ]
+
+
+def _scored(layer: str) -> bool:
+    return any(word in SCORES for word in re.split(r"[^a-z]+", layer.lower()))
 
 
 def _kind(key: str, word: str) -> LineKind:

@@ -1,4 +1,4 @@
-"""SVG drawings as strokes, parsed by svgelements (transforms, units, styles and `use` resolved there)."""
+"""SVG drawings as strokes: the tree of `meshes.io.svg_tree`, its shapes parsed by svgelements, colours by tinycss2."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import contextlib
 import io
 import os
 import re
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import ParseError
 
@@ -15,16 +15,20 @@ import numpy as np
 
 from meshes.curves import Array
 from meshes.errors import FileFormatError
-from meshes.io.strokes import Colour, Dash, Stroke, dash_kind
+from meshes.io.files import drawing_bytes
+from meshes.io.strokes import Colour, Dash, Stroke, Strokes, dash_kind
+from meshes.io.svg_tree import CLIP, CLIP_SHAPE, svg_tree
 
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 PIXELS = 96.0  # an inch, as CSS has it
+FINE = 2e-5  # of the size of what is clipped
 
 
-def read_svg(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
-    """The strokes of a file, and millimetres a unit of theirs (y points upwards in them).
+def read_svg(path: str | os.PathLike[str]) -> Strokes:
+    """The strokes of a file (y points upwards in them) and millimetres a unit of theirs.
 
-    Filled areas without a stroke and texts are no lines. Elements that are not displayed are left out.
+    Filled areas without a stroke and texts are no lines. Elements that are not displayed are left out; what a clip path
+    cuts off is, too.
 
     Args:
         path: of the file.
@@ -32,66 +36,168 @@ def read_svg(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
     Raises:
         FileFormatError: the file cannot be read, or is not SVG.
     """
-    try:
-        text = Path(path).read_bytes()
-    except IsADirectoryError as error:
-        raise FileFormatError("this is a folder; name an .svg file in it") from error
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise FileFormatError(f"cannot be read ({why}); check the name and rights") from error
+    tree = svg_tree(drawing_bytes(path, "SVG"))
     import svgelements as se
 
     try:
-        picture = se.SVG.parse(io.BytesIO(text), ppi=PIXELS, reify=True)
-    except ParseError as error:
-        raise FileFormatError(f"this is not XML ({error}); save the drawing as SVG again") from error
-    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+        picture = se.SVG.parse(io.BytesIO(tree.text), ppi=PIXELS, reify=False)
+        strokes = list(_strokes(se, picture))
+    except FileFormatError:
+        raise
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        RecursionError,
+        TypeError,
+        ValueError,
+        ParseError,
+    ) as error:
         raise FileFormatError(
             f"the SVG cannot be understood ({error}); save it again as plain SVG"
         ) from error
-    if b"<svg" not in text and b":svg" not in text:
-        raise FileFormatError("the file has no <svg> element; save the drawing as SVG")
-    strokes: list[Stroke] = []
-    for shape, layer in _shapes(se, picture, ""):
-        colour = _colour(shape)
-        if colour is None or _hidden(shape):
-            continue
-        number = len(strokes)
-        path_ = se.Path(shape)
-        for part, subpath in enumerate(path_.as_subpaths()):
-            segments = [s for s in se.Path(subpath) if not isinstance(s, se.Move)]
-            segments = [s for s in segments if s.start is not None and s.end is not None and s.start != s.end]
-            if segments:
-                name = f"'{shape.id}'" if shape.id else f"line {number + 1} ({type(shape).__name__.lower()})"
-                if part:
-                    name += f", part {part + 1}"
-                strokes.append(
-                    Stroke(_sampler(se, segments), name, colour, layer, _dash(shape), _opacity(shape))
-                )
+    remarks = []
+    if tree.illustrator:
+        remarks.append(
+            "Illustrator's pixels are 1/72 inch, but an SVG file's are 1/96: if the sheet is too small, scale = "
+            f"{25.4 / 72.0:.6g} makes it as large as in Illustrator"
+        )
     # svgelements' own millimetre, so that a drawing in mm comes out exactly
-    return strokes, 1.0 / float(se.Length("1mm").value(ppi=PIXELS))
+    unit = 1.0 / float(se.Length("1mm").value(ppi=PIXELS))
+    return Strokes(strokes, unit, stated=tree.unit or tree.illustrator, remarks=remarks)
 
 
-def _shapes(se: Any, group: Any, layer: str) -> Iterator[tuple[Any, str]]:
-    """All shapes with the name of the innermost named group around them."""
-    for item in group:
+def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
+    number = 0
+    for shape, layer, clips in _shapes(se, picture, "", ()):
+        colour, unknown = _colour(shape)
+        if (colour is None and not unknown) or _hidden(shape):
+            continue
+        whole = _placed(se, shape)
+        parts = list(_parts(se, whole))
+        number += bool(parts)
+        for part, segments in parts:
+            name = f"'{shape.id}'" if shape.id else f"line {number} ({type(shape).__name__.lower()})"
+            if part:
+                name += f", part {part + 1}"
+            stroke = Stroke(
+                _sampler(se, segments),
+                name,
+                colour,
+                layer,
+                _dash(shape),
+                _opacity(shape),
+                unknown,
+                f"id:{shape.id}" if shape.id else "",
+            )
+            yield from _clipped(stroke, clips)
+
+
+def _placed(se: Any, shape: Any) -> Any:
+    """The path of a shape where it lies on the page; arcs that are sheared become Bezier curves before."""
+    path = se.Path(shape)
+    m = path.transform
+    if abs(m.a * m.c + m.b * m.d) > 1e-9 * (m.a**2 + m.b**2 + m.c**2 + m.d**2):
+        path.approximate_arcs_with_cubics(0.05)  # pieces of 18 degrees: 2e-8 of the radius off
+    return path.reify()
+
+
+def _parts(se: Any, path: Any) -> Iterator[tuple[int, list[Any]]]:
+    """Numbers and segments of the connected parts of a path."""
+    for part, subpath in enumerate(path.as_subpaths()):
+        segments = [s for s in se.Path(subpath) if not isinstance(s, se.Move)]
+        segments = [s for s in segments if s.start is not None and s.end is not None and s.start != s.end]
+        if segments:
+            yield part, segments
+
+
+def _shapes(
+    se: Any, group: Any, layer: str, clips: tuple[Any, ...]
+) -> Iterator[tuple[Any, str, tuple[Any, ...]]]:
+    """All shapes, the name of the innermost named group around them, and the regions that clip them."""
+    items = list(group)
+    if (getattr(group, "values", None) or {}).get("attributes", {}).get(CLIP) and items:
+        clips = (*clips, _region(se, items.pop(0)))
+    for item in items:
         if isinstance(item, se.Shape):
-            yield item, layer
+            yield item, layer, clips
         elif isinstance(item, se.Group | se.Use):
             attributes = item.values.get("attributes") or {}
             name = attributes.get(LABEL) or attributes.get("id") or layer
-            yield from _shapes(se, item, str(name))
+            yield from _shapes(se, item, str(name), clips)
+
+
+def _region(se: Any, group: Any) -> Any:
+    """The area of the shapes of a clip path, as one polygon of shapely."""
+    import shapely
+
+    if not (group.values.get("attributes") or {}).get(CLIP_SHAPE):
+        raise FileFormatError("a clip path cannot be understood; release the clipping in the drawing program")
+    areas = []
+    for shape, _, _ in _shapes(se, group, "", ()):
+        path = _placed(se, shape)
+        box = path.bbox()
+        size = max(box[2] - box[0], box[3] - box[1]) if box is not None else 0.0
+        for _, segments in _parts(se, path):
+            points = _sampler(se, segments)(max(FINE * size, 1e-12))
+            if len(points) > 2:
+                areas.append(shapely.make_valid(shapely.Polygon(points)))
+    return shapely.union_all(areas)
+
+
+def _clipped(stroke: Stroke, clips: tuple[Any, ...]) -> Iterator[Stroke]:
+    """What the regions leave of a stroke: itself where they cut nothing off."""
+    import shapely
+
+    if not clips:
+        yield stroke
+        return
+    rough = stroke.sample(np.inf)
+    size = float(np.ptp(rough, axis=0).max()) or 1.0
+    whole = shapely.LineString(stroke.sample(FINE * size))
+    left = whole
+    for region in clips:
+        left = left.intersection(region.buffer(1e-6 * size))
+    if left.length >= (1.0 - 1e-6) * whole.length:
+        yield stroke
+        return
+    left = shapely.line_merge(left) if left.geom_type == "MultiLineString" else left
+    for number, piece in enumerate(getattr(left, "geoms", [left])):
+        if piece.geom_type == "LineString" and piece.length > 0.0:
+            points = np.asarray(piece.coords)
+            name = stroke.name + (f", clipped part {number + 1}" if number else ", clipped")
+            yield replace(stroke, sample=_always(points), name=name)
+
+
+def _always(points: Array) -> Callable[[float], Array]:
+    return lambda tolerance: points
 
 
 def _hidden(shape: Any) -> bool:
     return str(shape.values.get("visibility", "")) in ("hidden", "collapse") or _opacity(shape) <= 0.0
 
 
-def _colour(shape: Any) -> Colour | None:
-    stroke = shape.stroke
-    if stroke is None or stroke.value is None:
-        return None
-    return int(stroke.red), int(stroke.green), int(stroke.blue)
+def _colour(shape: Any) -> tuple[Colour | None, str]:
+    """The colour of a line, None where it has no line; and what its colour says where that is not understood."""
+    from tinycss2 import color5
+
+    word = str(shape.values.get("stroke") or "none").replace("!important", "").strip()
+    if word.lower() in ("none", "transparent"):
+        return None, ""
+    if word.lower() == "currentcolor":
+        word = str(shape.values.get("color") or "black")
+    found = color5.parse_color(word)
+    try:
+        red, green, blue, alpha = found.to("srgb")
+    except (
+        AttributeError,
+        NotImplementedError,
+    ):  # nothing that is a colour, or one of a space without a formula
+        return None, word
+    if alpha <= 0.0:
+        return None, ""
+    red, green, blue = (round(255.0 * min(max(float(part), 0.0), 1.0)) for part in (red, green, blue))
+    return (red, green, blue), ""
 
 
 def _opacity(shape: Any) -> float:

@@ -1,0 +1,289 @@
+"""SVG text made into a tree that svgelements reads as a browser does.
+
+Symbols are placed by their viewBox, `use` is written out (counted first, so that a few lines cannot become millions),
+percentages become lengths, clip paths are laid beside what they clip, and namespaces cannot be taken for attributes.
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+from meshes.errors import FileFormatError
+
+Element = ElementTree.Element
+SVG = "{http://www.w3.org/2000/svg}"
+XLINK = "{http://www.w3.org/1999/xlink}href"
+MOST = 200_000  # elements once every `use` is written out
+DEEPEST = 200  # groups in groups
+CLIP, CLIP_SHAPE = "data-clip", "data-clip-shape"
+# which attributes are percentages of what: the viewport's width, its height, or its diagonal / sqrt(2)
+_PERCENT = {
+    "x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0,
+    "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1,
+    "r": 2,
+}  # fmt: skip
+_SIZED = {"rect", "circle", "ellipse", "line", "use", "svg", "image"}
+_UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "cm": 96.0 / 2.54, "mm": 96.0 / 25.4, "pt": 96.0 / 72.0, "pc": 16.0}
+
+
+@dataclass
+class Tree:
+    """A tree that can be handed to svgelements.
+
+    Attributes:
+        text: the SVG written out, UTF-8.
+        unit: whether the file states its size in a unit.
+        illustrator: whether Adobe Illustrator wrote it in pixels, which are 1/72 inch there.
+    """
+
+    text: bytes
+    unit: bool
+    illustrator: bool
+
+
+def svg_tree(data: bytes) -> Tree:
+    """Read SVG text and write it out.
+
+    Args:
+        data: the bytes of a file, in any encoding that XML states.
+
+    Returns:
+        the tree, see `Tree`.
+
+    Raises:
+        FileFormatError: it is no XML, has no <svg> element, refers to itself, or becomes too large.
+    """
+    try:
+        root = ElementTree.parse(io.BytesIO(data)).getroot()
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise FileFormatError(f"this is not XML ({error}); save the drawing as SVG again") from error
+    if _tag(root) != "svg":
+        raise FileFormatError("the file has no <svg> element; save the drawing as SVG")
+    writer = _Writer({e.get("id", ""): e for e in root.iter() if e.get("id")}, _clip_classes(root))
+    width, height = root.get("width", ""), root.get("height", "")
+    out = writer.write(root, _viewport(root, None), ())
+    pixels = all(re.fullmatch(r"\s*[\d.]+\s*(px)?\s*", value) for value in (width, height))
+    return Tree(
+        text=ElementTree.tostring(out, encoding="utf-8"),
+        unit=any(re.search(r"(mm|cm|in|pt|pc)\s*$", value) for value in (width, height)),
+        illustrator=pixels and b"Adobe Illustrator" in data[:2000],
+    )
+
+
+Viewport = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Where an svg within another lies: its box (x, y, width, height) and how its viewBox is placed in it."""
+
+    box: tuple[float, float, float, float]
+    transform: str
+    overflow: bool
+
+
+def _frame(element: Element, around: Viewport) -> _Frame:
+    given = [_length(element.get(key, "")) for key in ("x", "y", "width", "height")]
+    x, y = (value or 0.0 for value in given[:2])
+    width, height = (around[k] if value is None else value for k, value in enumerate(given[2:]))
+    overflow = bool(re.search(r"overflow\s*:\s*(visible|auto)", element.get("style", "")))
+    overflow = overflow or element.get("overflow") in ("visible", "auto")
+    box = (x, y, width, height)
+    numbers = [_number(word) for word in re.split(r"[\s,]+", element.get("viewBox", "").strip())]
+    if len(numbers) != 4 or None in numbers:
+        return _Frame(box, f"translate({x!r},{y!r})", overflow)
+    left, top, w, h = (float(value or 0.0) for value in numbers)
+    if not (w > 0.0 and h > 0.0):
+        return _Frame(box, "scale(0)", overflow)
+    words = element.get("preserveAspectRatio", "xMidYMid meet").split()
+    words = [word for word in words if word != "defer"] or ["xMidYMid"]
+    sx, sy = width / w, height / h
+    if words[0] != "none":
+        sx = sy = max(sx, sy) if words[-1] == "slice" else min(sx, sy)
+    shares = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
+    along, up = (shares.get(part, 0.5) for part in (words[0][1:4], words[0][5:8]))
+    dx = x + along * (width - sx * w) - sx * left
+    dy = y + up * (height - sy * h) - sy * top
+    return _Frame(box, f"translate({dx!r},{dy!r}) scale({sx!r},{sy!r})", overflow)
+
+
+@dataclass
+class _Writer:
+    by_id: dict[str, Element]
+    clip_of_class: dict[str, str]
+    written: int = 0
+    clips: int = 0
+
+    def write(self, element: Element, view: Viewport, inside: tuple[str, ...], deep: int = 0) -> Element:
+        """A copy of an element with everything in it; `inside` are the ids that are being written out around it."""
+        self.written += 1
+        if self.written > MOST:
+            raise FileFormatError(
+                f"the drawing has more than {MOST} elements once every <use> is written out; simplify it"
+            )
+        if deep > DEEPEST:
+            raise FileFormatError(f"the drawing has groups in groups, more than {DEEPEST} deep; ungroup it")
+        if _tag(element) == "use":
+            return self._used(element, view, inside, deep)
+        out = self._copied(element, view)
+        frame = None
+        if _tag(element) == "svg" and deep:
+            frame = _frame(out, view)
+            view = _viewport(out, view)
+        for child in element:
+            if isinstance(child.tag, str) and _tag(child) not in (
+                "symbol",
+                "clipPath",
+                "marker",
+                "pattern",
+                "mask",
+            ):
+                out.append(self.write(child, view, inside, deep + 1))
+        if frame is not None:
+            out = self._framed(out, frame)
+        return self._clipped(element, out, view, inside, deep)
+
+    def _framed(self, inner: Element, frame: _Frame) -> Element:
+        """An svg within another as a group, placed by its viewBox and clipped to its frame."""
+        inner.tag = f"{SVG}g"
+        for key in ("x", "y", "width", "height", "viewBox", "preserveAspectRatio"):
+            inner.attrib.pop(key, None)
+        placed = Element(f"{SVG}g", {"transform": frame.transform})
+        placed.append(inner)
+        if frame.overflow:
+            return placed
+        self.clips += 1
+        x, y, width, height = (repr(value) for value in frame.box)
+        shapes = Element(f"{SVG}g", {CLIP_SHAPE: str(self.clips)})
+        shapes.append(Element(f"{SVG}rect", {"x": x, "y": y, "width": width, "height": height}))
+        group = Element(f"{SVG}g", {CLIP: str(self.clips)})
+        group.extend([shapes, placed])
+        return group
+
+    def _copied(self, element: Element, view: Viewport) -> Element:
+        out = Element(element.tag, dict(element.attrib))
+        out.text, out.tail = element.text, element.tail
+        if _tag(element) in _SIZED:
+            for key, axis in _PERCENT.items():
+                value = out.get(key, "").strip()
+                if value.endswith("%"):
+                    share = _number(value[:-1])
+                    length = (*view, ((view[0] ** 2 + view[1] ** 2) / 2.0) ** 0.5)[axis]
+                    if share is not None:
+                        out.set(key, repr(share / 100.0 * length))
+        return out
+
+    def _used(self, element: Element, view: Viewport, inside: tuple[str, ...], deep: int) -> Element:
+        """`use` as a group; a symbol or an svg in it as an svg of the size that is asked for."""
+        name = (element.get("href") or element.get(XLINK) or "").removeprefix("#")
+        if name in inside:
+            raise FileFormatError(f"<use> of '{name}' contains itself; remove the reference in it")
+        wanted = self._copied(element, view)
+        move = f"translate({wanted.get('x', '0')},{wanted.get('y', '0')})"
+        keep = {
+            k: v for k, v in wanted.attrib.items() if k not in ("x", "y", "width", "height", "href", XLINK)
+        }
+        group = Element(f"{SVG}g", {**keep, "transform": f"{wanted.get('transform', '')} {move}".strip()})
+        target = self.by_id.get(name)
+        if target is not None:
+            if _tag(target) in ("symbol", "svg"):
+                target = _as_svg(target, wanted)
+            group.append(self.write(target, view, (*inside, name), deep + 1))
+        return self._clipped(element, group, view, inside, deep)
+
+    def _clipped(
+        self, element: Element, out: Element, view: Viewport, inside: tuple[str, ...], deep: int
+    ) -> Element:
+        """The element beside what clips it, in a group that a reader can tell (`CLIP`)."""
+        name = self._clip_of(element)
+        region = self.by_id.get(name) if name else None
+        if region is None or name in inside or _tag(region) != "clipPath":
+            return out
+        self.clips += 1
+        group = Element(f"{SVG}g", {CLIP: str(self.clips)})
+        if out.get("transform"):  # a clip path is in the coordinates of what it clips
+            group.set("transform", out.attrib.pop("transform"))
+        shapes = Element(f"{SVG}g", {CLIP_SHAPE: str(self.clips)})
+        if region.get("transform"):
+            shapes.set("transform", str(region.get("transform")))
+        for child in region:
+            if isinstance(child.tag, str):
+                shapes.append(self.write(child, view, (*inside, str(name)), deep + 1))
+        group.extend([shapes, out])
+        return group
+
+    def _clip_of(self, element: Element) -> str | None:
+        style = re.search(r"clip-path\s*:\s*([^;]+)", element.get("style", ""))
+        value = style.group(1) if style else element.get("clip-path")
+        for word in element.get("class", "").split():
+            value = value or self.clip_of_class.get(word)
+        found = re.match(r"""url\(\s*['"]?#([^)'"]+)""", (value or "").strip())
+        return found.group(1) if found else None
+
+
+def _clip_classes(root: Element) -> dict[str, str]:
+    """Clip paths of classes in style sheets, as Illustrator writes them."""
+    import tinycss2
+
+    found: dict[str, str] = {}
+    for sheet in _styles(root):
+        for rule in tinycss2.parse_stylesheet(sheet, skip_comments=True, skip_whitespace=True):
+            if rule.type != "qualified-rule":
+                continue
+            for item in tinycss2.parse_blocks_contents(rule.content):
+                if item.type == "declaration" and item.lower_name == "clip-path":
+                    for selector in tinycss2.serialize(rule.prelude).split(","):
+                        found[selector.strip().removeprefix(".")] = tinycss2.serialize(item.value)
+    return found
+
+
+def _styles(root: Element) -> Iterator[str]:
+    for element in root.iter():
+        if isinstance(element.tag, str) and _tag(element) == "style" and element.text:
+            yield element.text
+
+
+def _as_svg(target: Element, wanted: Element) -> Element:
+    """A symbol or svg as the svg element of the size that `use` asks for."""
+    out = copy.copy(target)
+    out.tag = f"{SVG}svg"
+    for key in ("width", "height"):
+        out.set(key, wanted.get(key) or target.get(key) or "100%")
+    return out
+
+
+def _viewport(element: Element, around: Viewport | None) -> Viewport:
+    """Width and height that percentages inside an svg element refer to, in its own units."""
+    numbers = [_number(word) for word in re.split(r"[\s,]+", element.get("viewBox", "").strip())]
+    if len(numbers) == 4 and None not in numbers[2:]:
+        return float(numbers[2] or 0.0), float(numbers[3] or 0.0)
+    sizes = [_length(element.get(key, "")) for key in ("width", "height")]
+    width, height = around or (100.0, 100.0)
+    return (sizes[0] if sizes[0] is not None else width), (sizes[1] if sizes[1] is not None else height)
+
+
+def _length(text: str) -> float | None:
+    """A CSS length in pixels, None for what is none (a percentage, nothing)."""
+    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*([a-z]*)\s*", text)
+    number = _number(found.group(1)) if found else None
+    return (
+        None
+        if found is None or number is None or found.group(2) not in _UNITS
+        else number * _UNITS[found.group(2)]
+    )
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _tag(element: Element) -> str:
+    return str(element.tag).rsplit("}", 1)[-1]
