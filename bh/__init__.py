@@ -61,7 +61,7 @@ _NAMES = {
     "bh.solving.trace": "trace",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
-_MODULES = {
+_SUBMODULES = {
     "contact": "bh.analysis.contact",
     "corrugation": "bh.applications.corrugation",
     "creases": "bh.analysis.creases",
@@ -142,8 +142,8 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(_HOME[name]), name)
         globals()[name] = value
         return value
-    if name in _MODULES:
-        return import_module(_MODULES[name])
+    if name in _SUBMODULES:
+        return import_module(_SUBMODULES[name])
     if name == "__version__":
         from importlib.metadata import version
 
@@ -152,4 +152,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME, *_MODULES])
+    return sorted([*globals(), *_HOME, *_SUBMODULES])

@@ -278,6 +278,12 @@ def _plots(
             f"{rows} rows of cells a side, alternating diagonals.",
         )
     )
+    _energy_plot(result, alphas, bars, converged)
+    _rows_plot(result, found, converged)
+
+
+def _energy_plot(result: CaseResult, alphas: tuple[float, ...], bars: list[Lift], converged: Lift) -> None:
+    """Energies by kind over the aspect ratio (Fig. 3.10 e, f)."""
     kinds = ("stretching", "bending", "folding", "total")
     series = [
         line(kind, list(alphas), [item.lifted.energy.as_dict()[kind] for item in bars]) for kind in kinds
@@ -297,6 +303,10 @@ def _plots(
             log="y",
         )
     )
+
+
+def _rows_plot(result: CaseResult, found: dict[tuple[float, int], Lift], converged: Lift) -> None:
+    """The force at the tip over the rows of cells."""
     fine = sorted({alpha for alpha, _ in found})
     series = [
         line(

@@ -230,29 +230,34 @@ def folded(pattern: CreasePattern, formulation: str, Lstar: float, size: float |
     return bh.trace(bh.Model(mesh, PAPER, formulation=formulation).fold("all", by=FOLD, Lstar=Lstar))
 
 
+def _folds(result: CaseResult, path: bh.Path, params: dict[str, Any]) -> None:
+    """Does a sheet fold all the way?"""
+    result.check(
+        "pattern folds with default settings",
+        path.reached,
+        reference=1.0,
+        source="the last rest angle is reached",
+        tolerance=0.0,
+        params=params,
+    )
+
+
 def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
     """The consistent formulation is the paper; bars and hinges try several L*, as the source did."""
     name = sample.name
     size = 6.0 if context.quick else 3.0
     paper = folded(sample.pattern, "consistent", PAPER_LSTAR, size)
     same = folded(sample.pattern, "bars-and-hinges", PAPER_LSTAR, size)
-    for path, formulation in ((paper, "consistent"), (same, "bars-and-hinges")):
-        result.check(
-            "pattern folds with default settings",
-            path.reached,
-            reference=1.0,
-            source="the last rest angle is reached",
-            tolerance=0.0,
-            params={"pattern": name, "formulation": formulation, "size_mm": size},
-        )
+    for solved, formulation in ((paper, "consistent"), (same, "bars-and-hinges")):
+        _folds(result, solved, {"pattern": name, "formulation": formulation, "size_mm": size})
     _same_mesh(result, name, paper[-1], same[-1], size)
     cloud = sampled(paper[-1], 0.2 * DENSITY if context.quick else DENSITY, 1)
     Lstars = (PAPER_LSTAR,) if context.quick else LSTARS
     series = []
     for mesh, length in (("gmsh", size), ("one row", None)):
-        paths = [(folded(sample.pattern, "bars-and-hinges", Lstar, length), Lstar) for Lstar in Lstars]
         tried = []
-        for path, Lstar in paths:
+        for Lstar in Lstars:
+            path = folded(sample.pattern, "bars-and-hinges", Lstar, length)
             if not path.reached:
                 continue
             try:
@@ -297,14 +302,10 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
             )
         series.append(line(mesh, [at for _, at in tried], [one.mean for (one, _), _ in tried]))
         if mesh == "gmsh" and not context.quick:
+            words = f"bars and hinges (L* = {Lstar:g} mm) against the consistent formulation (L* = 10 mm)"
+            file = f"scan_{name.replace(' ', '_')}_distances"
             _picture(
-                result,
-                context,
-                f"scan_{name.replace(' ', '_')}_distances",
-                back,
-                f"Distances, {name}",
-                f"{name}: bars and hinges (L* = {Lstar:g} mm) against the consistent "
-                "formulation (L* = 10 mm) in the place of paper.",
+                result, context, file, back, f"Distances, {name}", f"{name}: {words} in the place of paper."
             )
     result.plots.append(
         plot(

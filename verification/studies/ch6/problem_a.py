@@ -74,6 +74,13 @@ def run(context: Context) -> CaseResult:
         source=CURVES_IN + ": its curvature has the larger slope",
         tolerance=0.0,
     )
+    _plots(result, errors, best)
+    return result
+
+
+def _plots(result: CaseResult, errors: dict[str, list[float]], best: dict[str, Any]) -> None:
+    """Errors over segments, curvatures of the targets, and the fits."""
+    most = len(next(iter(errors.values())))
     counts = [float(i) for i in range(1, most + 1)]
     result.plots.append(
         plot(
@@ -118,7 +125,6 @@ def run(context: Context) -> CaseResult:
                 "Folded crease and target.",
             )
         )
-    return result
 
 
 def run_b(context: Context) -> CaseResult:

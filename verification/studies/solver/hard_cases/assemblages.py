@@ -201,10 +201,21 @@ def _refereed(result: CaseResult, given: Assemblage, path: Path, factor: float, 
 
 def assemblages(result: CaseResult) -> None:
     """The bistable Miura fold through both its limit points, and the eggbox, whose load only rises."""
-    published = (
-        "data of Liu and Paulino 2017 (Miura_Bistable), their Ogden bars and hinges, by an independent dense "
+    _miura(result)
+    _eggbox(result)
+
+
+def _published_by(name: str) -> str:
+    """Where the figures of an example of Liu and Paulino come from."""
+    return (
+        f"data of Liu and Paulino 2017 ({name}), their Ogden bars and hinges, by an independent dense "
         "implementation; bh has 1/2 k (l - L)^2 bars, and no hinge leaves the linear range"
     )
+
+
+def _miura(result: CaseResult) -> None:
+    """Load factors and places of the limit points of the bistable Miura fold."""
+    published = _published_by("Miura_Bistable")
     factor, node = 2.7, 60
     miura = miura_bistable()
     path = trace(miura.model(factor))
@@ -257,11 +268,15 @@ def assemblages(result: CaseResult) -> None:
             "5 x 5 cells pressed at the middle node: snap-through and snap-back (Liu and Paulino 2017).",
         )
     )
+
+
+def _eggbox(result: CaseResult) -> None:
+    """The eggbox under bending, whose load only rises."""
     eggbox, factor, node = eggbox_bending(), 2.6, 5
     path = trace(eggbox.model(factor))
     _refereed(result, eggbox, path, factor, "eggbox")
     their_load, their_fall = _published(eggbox, node, 0.25, factor)
-    source = published.replace("Miura_Bistable", "Eggbox_Bending")
+    source = _published_by("Eggbox_Bending")
     result.check(
         "eggbox: limit points",
         len(located(path, Critical.LIMIT)),
