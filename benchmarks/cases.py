@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import resource
 import sys
@@ -21,7 +20,6 @@ from bh.solvers import pardiso
 SHEET = bh.Sheet(E=4000.0, nu=0.0, t=0.127)
 STRIPS = (64, 142, 1428, 14_285, 42_856)  # cells along the crease: 456 to 300,000 unknowns
 SHEETS = (4, 6, 20, 65, 112)  # rows of cells a side, four times as many along: 440 to 302,510 unknowns
-PEERS = Path(__file__).resolve().parents[2] / "shared" / "peer_problems"
 
 
 def supported(mesh: meshes.SheetMesh) -> bh.Model:
@@ -42,20 +40,7 @@ def wide(rows: int) -> bh.Model:
     return supported(meshes.structured(meshes.annulus_sector(100.0, 30.0, 1.5), along=4 * rows, rows=rows))
 
 
-def array_problem(name: str) -> bh.Model | None:
-    """An array problem of other codes, None where its file is not there."""
-    file = PEERS / f"{name}.json"
-    if not file.is_file():
-        return None
-    data = json.loads(file.read_text())
-    model = bh.Model.from_arrays(
-        data["nodes"], data["triangles"], data["bars"], data["bar_k"], data["bend_hinges"], data["bend_k"],
-        data["fold_hinges"], data["fold_k"], data["supports"], green=True,
-    )  # fmt: skip
-    return model.fold("fold", rest=data["fold_rest_end"])
-
-
-def least(job: Callable[[], Any], seconds: float = 1.0, most: int = 200) -> float:
+def least(job: Callable[[], object], seconds: float = 1.0, most: int = 200) -> float:
     """Least processor time of a job that runs in this thread, s, over at least three runs and about `seconds`.
 
     On a quiet machine that is the wall time; on a busy one it leaves out the time of others.
@@ -111,8 +96,14 @@ def one_iteration(make: Callable[[], bh.Model]) -> dict[str, Any]:
     else:
         solver = "PARDISO" if pardiso.pays(system.size) else "multifrontal"
     return {
-        "unknowns": system.size, "solver": solver, "pattern": took_pattern, "analysis": max(first - factorise, 0.0),
-        "evaluate": evaluate, "assemble": assemble, "factorise": factorise, "solve": solve,
+        "unknowns": system.size,
+        "solver": solver,
+        "pattern": took_pattern,
+        "analysis": max(first - factorise, 0.0),
+        "evaluate": evaluate,
+        "assemble": assemble,
+        "factorise": factorise,
+        "solve": solve,
         "total": evaluate + assemble + factorise + solve,
         "memory": {phase: value - before for phase, value in memory.items()},
-    }  # fmt: skip
+    }

@@ -13,18 +13,21 @@ import time
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import bh.sweep
 from bh.applications.inverse.simulate import SegmentTask
+from bh.sweep.points import Value
+from bh.sweep.pools import Pool
+from bh.sweep.task import Task
 
 
-def nothing(point: Mapping[str, Any]) -> dict[str, float]:
+def nothing(point: Mapping[str, Value]) -> dict[str, float]:
     """A point that takes no time: all that is left is the sweep's own."""
     return {"value": float(point["x"])}
 
 
 def main() -> None:
+    """Print what a sweep costs a point, and how it scales from one process to two."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, default=120, help="segments a run")
     count = parser.parse_args().points
@@ -55,7 +58,9 @@ def main() -> None:
         print(f"efficiency {alone / (2.0 * both):.2f}; in CPU time {cpu / cpu_both:.2f}")
 
 
-def timed(task: Any, points: bh.sweep.Points, file: Path, pool: Any, chunk: int) -> tuple[float, float]:
+def timed(
+    task: Task, points: bh.sweep.Points, file: Path, pool: Pool | int, chunk: int
+) -> tuple[float, float]:
     """Wall and CPU seconds from the first point that is finished to the last, so without starting workers."""
     meter = Meter()
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -66,18 +71,24 @@ def timed(task: Any, points: bh.sweep.Points, file: Path, pool: Any, chunk: int)
 
 
 class Meter:
+    """Looks at the clock when the first and the last point are finished."""
+
     def __init__(self) -> None:
+        """No point is finished."""
         self.first = self.last = 0.0
 
-    def update(self, *_: Any) -> None:
+    def update(self, *_: float) -> None:
+        """A point is finished."""
         self.last = time.perf_counter()
         self.first = self.first or self.last
 
     def close(self) -> None:
+        """Nothing to close."""
         return
 
     @property
     def seconds(self) -> float:
+        """Time from the first finished point to the last, s."""
         return self.last - self.first
 
 

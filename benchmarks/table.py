@@ -17,12 +17,13 @@ from typing import Any
 import numpy as np
 
 import bh
-from benchmarks.cases import SHEETS, STRIPS, array_problem, least, one_iteration, strip, wide
+from benchmarks.cases import SHEETS, STRIPS, least, one_iteration, strip, wide
 from bh.commands.warm_up import warm_up
 from bh.paths.provenance import versions
 from bh.runtime.threads import one_blas_thread
 from bh.solvers import pardiso
 from verification.studies.app_b.appendix_b import model as appendix_b
+from verification.theory.array_annulus import ENERGIES, ROWS, array_annulus
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "performance.md"
@@ -35,14 +36,19 @@ def measure(kind: str, size: int, backend: str) -> dict[str, Any]:
     ones = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "1")
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.table", kind, str(size), backend],
-        capture_output=True, text=True, check=True, cwd=ROOT, env={**os.environ, **ones},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+        env={**os.environ, **ones},
+    )
     print(f"{kind} {size} {backend}: done", file=sys.stderr)
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return found
 
 
 def run_case(kind: str, size: int, backend: str) -> dict[str, Any]:
+    """One case in this process; `kind` and `backend` as for `measure`."""
     make = {"strip": strip, "wide": wide}[kind]
     warm_up()
     if backend != "chosen":
@@ -56,27 +62,36 @@ def near(unknowns: int) -> float | None:
 
 
 def row(found: dict[str, Any]) -> str:
+    """A case as a row of a table."""
     ms = {key: 1e3 * found[key] for key in ("evaluate", "assemble", "factorise", "solve", "total")}
     target = near(found["unknowns"])
     goal = "" if target is None else f"{target:g} ({'met' if ms['total'] <= target else 'missed'})"
     kilobytes = found["memory"]["iteration"] / found["unknowns"] / 1e3
     memory = f"{kilobytes:.1f}" if found["unknowns"] > 5_000 else ""
     cells = [
-        f"{found['unknowns']:,}", found["solver"], number(ms["evaluate"] + ms["assemble"]), number(ms["factorise"]),
-        number(ms["solve"]), number(ms["total"]), goal, number(1e3 * found["pattern"] + 1e3 * found["analysis"]),
+        f"{found['unknowns']:,}",
+        found["solver"],
+        number(ms["evaluate"] + ms["assemble"]),
+        number(ms["factorise"]),
+        number(ms["solve"]),
+        number(ms["total"]),
+        goal,
+        number(1e3 * found["pattern"] + 1e3 * found["analysis"]),
         memory,
-    ]  # fmt: skip
+    ]
     return "| " + " | ".join(cells) + " |"
 
 
 def number(value: float) -> str:
+    """Three digits, or whole numbers from 100 on."""
     return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def exponent(cases: list[dict[str, Any]]) -> float:
     """Slope of log time over log unknowns from about 1e3 to 3e5 unknowns, least squares."""
     points = [(case["unknowns"], case["total"]) for case in cases if case["unknowns"] > 900]
-    return float(np.polyfit(*np.log(np.array(points).T), 1)[0])
+    unknowns, seconds = np.log(np.array(points).T)
+    return float(np.polyfit(unknowns, seconds, 1)[0])
 
 
 HEAD = (
@@ -86,6 +101,7 @@ HEAD = (
 
 
 def tables() -> list[str]:
+    """Newton iterations of growing sheets, phase by phase."""
     lines: list[str] = []
     for kind, sizes, title in (
         ("strip", STRIPS, "Strips (one row of cells a side of the crease, as App. B)"),
@@ -108,8 +124,9 @@ def tables() -> list[str]:
         verdict = "met" if at["memory"]["iteration"] / at["unknowns"] / 1e3 <= MEMORY_TARGET else "missed"
         lines += [
             f"Peak memory at {at['unknowns']:,} unknowns after each phase, kB an unknown: {phases} "
-            f"(target {MEMORY_TARGET:g}: {verdict}).", "",
-        ]  # fmt: skip
+            f"(target {MEMORY_TARGET:g}: {verdict}).",
+            "",
+        ]
         if kind == "wide":
             lines += ["Wide sheets by who factorises:", "", HEAD]
             for backend in ("multifrontal", *(["PARDISO"] if pardiso.available() else [])):
@@ -123,10 +140,8 @@ def folds() -> list[str]:
     lines = ["## Whole folds from flat to 90 degrees", ""]
     lines += ["| case | unknowns | iterations | target | time, ms | target |", "|---|---|---|---|---|---|"]
     cases = [("App. B (a), 64 cells, staggered", appendix_b("a"), 22, 10.0)]
-    for name in ("annulus_5x31", "annulus_5x61"):
-        problem = array_problem(name)
-        if problem is not None:
-            cases.append((f"array problem {name}", problem, 30, 25.0))
+    for columns in ENERGIES:
+        cases.append((f"array problem annulus_{ROWS}x{columns}", array_annulus(columns).model(), 30, 25.0))
     for name, model, most, ms in cases:
         path = bh.trace(model)
         took = 1e3 * least(lambda model=model: bh.trace(model), 2.0)  # type: ignore[misc]
@@ -136,7 +151,7 @@ def folds() -> list[str]:
             f"| {name} | {path.unknowns} | {path.iterations} | {most} ({few}) | {took:.1f} | {ms:g} ({quick}) |"
         )
     path = bh.trace(appendix_b("a"))
-    system, record = path.system(0), path.records[-1]
+    system, record = path.solved()
 
     def iteration() -> None:
         now = system.evaluate(record.q, 0.95)  # a residual as in the middle of an increment
@@ -153,6 +168,7 @@ def folds() -> list[str]:
 
 
 def machine() -> str:
+    """What it was measured on."""
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.is_file():
@@ -173,6 +189,7 @@ TEXT = (Path(__file__).with_name("performance.txt")).read_text(encoding="utf-8")
 
 
 def main() -> None:
+    """Measure one case for `measure`, or all of them for the page."""
     if len(sys.argv) == 4:
         print(json.dumps(run_case(sys.argv[1], int(sys.argv[2]), sys.argv[3])))
         return

@@ -39,7 +39,7 @@ PAGES = {
 PUBLIC = ("bh", "meshes")
 USE = ("meshes.io",)
 EXTENSION = (
-    "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
+    "bh.model.step", "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
     "bh.formulations.protocols", "bh.formulations.registry", "bh.solvers.system",
 )  # fmt: skip
 

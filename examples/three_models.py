@@ -5,13 +5,13 @@ import meshes
 
 pattern = meshes.annulus_sector(radius=100, width=10, angle=0.785)
 sheet = bh.Sheet(E=4000, nu=0.38, t=0.127)
+sheets = {
+    "bars-and-hinges": meshes.structured(pattern, along=32, rows=1, kind="staggered"),
+    "consistent": meshes.structured(pattern, along=32, rows=4, kind="mirrored"),
+    "shell": meshes.structured(pattern, along=32, rows=2, kind="mirrored"),
+}
 paths = {}
-for formulation, rows, kind in (
-    ("bars-and-hinges", 1, "staggered"),
-    ("consistent", 4, "mirrored"),
-    ("shell", 2, "mirrored"),
-):
-    mesh = meshes.structured(pattern, along=32, rows=rows, kind=kind)
+for formulation, mesh in sheets.items():
     model = bh.Model(mesh, sheet, formulation=formulation)
     for fraction in (0.25, 0.5, 0.75, 1.0):
         model = model.fold("crease", by=1.571 * fraction)

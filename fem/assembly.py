@@ -72,10 +72,15 @@ class Pattern(Storage):
 
 
 def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
-    """Pattern of the unknowns `number` (all components, -1 if prescribed); unknowns of a node and of its edge stay
-    together.
+    """Where the element matrices go in the matrix of the unknowns.
 
-    A band or a sparse matrix, whichever is factorised faster, unless `banded` says which.
+    Unknowns of a node and of its edge stay together.
+
+    Args:
+        mesh: places that unknowns belong to.
+        components: (t, w) components of every element, -1 where it has none.
+        number: (k,) unknown of each component, -1 if prescribed.
+        banded: a band or a sparse matrix; None for whichever is factorised faster.
     """
     owner = _owners(mesh, components, number)
     free = np.flatnonzero(number >= 0)
@@ -90,7 +95,7 @@ def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: boo
         """Unknowns in the order of their nodes (rows of `used`)."""
         length = sizes[used][nodes]
         inside = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
-        return number[by_node[np.repeat(starts[nodes], length) + inside]]
+        return np.asarray(number[by_node[np.repeat(starts[nodes], length) + inside]])
 
     high, low = _pairs(vertex[mesh.carriers], len(used))
     order = unknowns(reverse_cuthill_mckee(high, low, len(used))[0])

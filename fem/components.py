@@ -29,12 +29,18 @@ class Components:
     """Numbering of one step; k components of which n are free.
 
     Attributes:
-        begin: (k,) their values in the state that the step begins with; prescribed: their values at lambda, where they
-            are prescribed.
-        free: (n,) components that are unknowns; number: (k,) unknown of each component, -1 if prescribed.
+        reference: (n, 3) nodes of the flat sheet, mm.
+        nodes: (t, n) nodes of every element.
+        constraints: supports, with the axes of oblique ones.
+        begin: (k,) values in the state that the step begins with, mm and rad.
+        prescribed: values at lambda, where they are prescribed.
+        free: (n,) components that are unknowns.
+        number: (k,) unknown of each component, -1 if prescribed.
         of_element: (t, 3 n + 6 r) see the module.
         sides: (t, 3 r) +-1 of alpha in gamma.
-        first_alpha, first_beta: where rotations and fold angles begin; rotations: r.
+        first_alpha: where rotations begin.
+        first_beta: where fold angles begin.
+        rotations: r, of an edge.
     """
 
     reference: Array
@@ -76,6 +82,7 @@ class Components:
         return self.to_global(components[: self.first_alpha].reshape(-1, 3))
 
     def to_global(self, local: Array) -> Array:
+        """(n, 3) nodal vectors in global axes from those in the local axes of oblique supports."""
         turned = np.flatnonzero(self.constraints.frame_of >= 0)
         if len(turned) == 0:
             return local
@@ -85,6 +92,7 @@ class Components:
         return out
 
     def to_local(self, vectors: Array) -> Array:
+        """(n, 3) nodal vectors in the local axes of oblique supports from those in global axes."""
         return local_axes(self.constraints, vectors)
 
     @property
@@ -135,7 +143,15 @@ def lay_out(
     beta: Array,
     clamped: Ints,
 ) -> Components:
-    """Number the components of a step that begins at `positions` (n, 3) and fold angles `beta` (m, r) of all hinges.
+    """Number the components of a step.
+
+    Args:
+        elements: of the sheet.
+        constraints: supports and prescribed displacements.
+        creases: creased edges, of which imposed angles are prescribed.
+        positions: (n, 3) of all nodes where the step begins, mm.
+        beta: (m, r) fold angles of all hinges there, rad.
+        clamped: edges whose rotation is zero.
 
     Raises:
         ModelError: nothing is free.
@@ -191,7 +207,12 @@ def _of_element(elements: ShellElements, creases: Connectors) -> Ints:
 
 
 def edge_set(mesh: SheetMesh, name: str) -> Ints:
-    """Edges of a named set; the error lists the sets there are."""
+    """Numbers of the edges of a named set.
+
+    Raises:
+        MeshError: an edge of the set is none of the mesh.
+        ModelError: there is no such set; the message lists those there are.
+    """
     if name not in mesh.edge_sets:
         raise ModelError(f"the sheet has no edge set '{name}'; use one of {', '.join(mesh.edge_sets)}")
     return mesh.topology.find_edges(mesh.edge_sets[name])

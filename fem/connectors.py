@@ -1,5 +1,7 @@
-"""Creases of the shell: a fold angle beta between the two sides of an edge, linear along it (r = 2 values, at the lower
-and the higher node), or constant where positions are linear (r = 1).
+"""Creases of the shell: a fold angle beta between the two sides of an edge.
+
+It is linear along the edge (r = 2 values, at the lower and the higher node), or constant where positions are linear
+(r = 1).
 
 The side rotations of an edge are gamma = +-alpha + beta / 2 (+ for the triangle on its left), alpha the rotation of
 the edge and beta the fold angle pi - phi, positive where the sides drop away from the crease (a mountain). Ordinary
@@ -38,11 +40,15 @@ class Connectors:
     """Creased edges of one step; c of them, r values of beta each, rad.
 
     Attributes:
-        hinges: (c,) rows of `mesh.topology.hinges`; edges: (c,) of `mesh.topology.edges`.
+        hinges: (c,) rows of `mesh.topology.hinges`.
+        edges: (c,) rows of `mesh.topology.edges`.
         of_edge: (e,) row of a creased edge, -1 elsewhere.
-        prescribed: (c,) True where beta is imposed; `angle` (c, r) what is imposed.
+        prescribed: (c,) True where beta is imposed.
+        angle: (c, r) what is imposed there, rad.
         mass: (c, r, r) int of the products of beta's shape functions, mm.
-        stiffness: (c,) k_f a length, N mm / (mm rad); rest: (c, r) beta_R; moment: (c,) couple a length, N.
+        stiffness: (c,) k_f a length, N mm / (mm rad).
+        rest: (c, r) beta_R, rad.
+        moment: (c,) couple a length, N.
     """
 
     hinges: Ints
@@ -56,6 +62,7 @@ class Connectors:
     moment: Ramp
 
     def __len__(self) -> int:
+        """Number of creased edges, c."""
         return len(self.edges)
 
     def energy(self, beta: Array, lam: float) -> Array:
@@ -97,7 +104,14 @@ class Connectors:
 def connectors(
     mesh: ElementMesh, model: Model, load_step: LoadStep, beta: Array, couple: Array
 ) -> Connectors:
-    """Creased edges of a step that begins with fold angles beta (m, r) and couples on them (m, r), N mm / rad.
+    """Creased edges of a step.
+
+    Args:
+        mesh: elements.
+        model: has the laws of its creases.
+        load_step: what the step imposes.
+        beta: (m, r) fold angles of all hinges where the step begins, rad.
+        couple: (m, r) couples on them there, N mm / rad.
 
     Raises:
         ModelError: a couple acts where there is no crease to turn.

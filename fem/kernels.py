@@ -31,13 +31,17 @@ class Frames(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """Arrays of the element loops; t triangles of n nodes, q points inside, p points on an edge (tables:
-    `fem.spaces.Tables`). q is zero where the shapes are linear, which do not bend inside.
+    """Arrays of the element loops.
+
+    t triangles of n nodes, q points inside, p points on an edge. The tables are those of `fem.spaces.Tables`; q is zero
+    where the shapes are linear, which do not bend inside.
 
     Attributes:
-        nodes: (t, n); edges: (t, 3) edge of the topology opposite each corner; sides: +1. where it runs
-            counter-clockwise, else -1.
-        inside: (t, q) weight over Jacobian; rim: (t, 3, p) weight over length of the edge's tangent.
+        nodes: (t, n) of every triangle.
+        edges: (t, 3) edge of the topology opposite each corner.
+        sides: (t, 3) +1. where it runs counter-clockwise, else -1.
+        inside: (t, q) weight over Jacobian.
+        rim: (t, 3, p) weight over length of the edge's tangent.
     """
 
     nodes: Ints

@@ -48,8 +48,15 @@ class Shell:
     ) -> ShellSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet).
 
+        Args:
+            model: a flat sheet with its supports and steps.
+            program: what the step imposes and loads.
+            start: the state that the step begins with.
+            moments: couples on boundary edges.
+
         Raises:
-            ModelError, MeshError: the model is not one that a shell can take.
+            ModelError: the model is not one that a shell can take.
+            MeshError: the sheet is not flat, or its mesh too coarse for its curves.
         """
         if start is not None and not isinstance(start, ShellState):
             raise ModelError(
@@ -70,7 +77,16 @@ class Shell:
         step: int = 0,
         stable: bool | None = None,
     ) -> ShellState:
-        """Everything that can be read from the unknowns `q` at `lam`."""
+        """Everything that can be read from the unknowns `q` at `lam`.
+
+        Args:
+            model: the model that `system` was made from.
+            system: of the step.
+            q: (size,) unknowns.
+            lam: how much of the step is applied, 0 to 1.
+            step: number of the step.
+            stable: whether the state is stable, None if that was not asked.
+        """
         return observe(model, system, q, lam, step, stable)
 
 
@@ -96,11 +112,16 @@ def follow(
     """Follow a model whose boundary edges are loaded by couples, which `bh.trace` cannot be told.
 
     Args:
+        model: a flat sheet with its supports and steps.
         moments: one a step, or none.
+        strategy: what chooses increments; None for `bh.Automatic`.
 
     Returns:
-        the state at the beginning and after every accepted increment, and all increments. The last increment's
-        outcome is "reached" only if every step was.
+        The state at the beginning and after every accepted increment, and all increments. The last
+        increment's outcome is "reached" only if every step was.
+
+    Raises:
+        ModelError: couples for other steps than the model has, or a model that a shell cannot take.
     """
     with one_blas_thread():
         return _follow(model, moments, strategy or LoadControl())

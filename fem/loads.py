@@ -27,8 +27,8 @@ class EdgeMoments:
     """Couples on boundary edges, which a model of bars and hinges cannot say.
 
     Attributes:
-        at: edge set and couple a length, N, at the start and at the end of the step; positive raises the outside of the
-            boundary edge toward the sheet's normal.
+        at: edge set, and couple a length, N, at the start and at the end of the step; positive raises the
+            outside of the boundary edge toward the sheet's normal.
     """
 
     at: tuple[tuple[str, float, float], ...] = ()
@@ -38,6 +38,11 @@ def constraints(mesh: ElementMesh, model: Model, step: int) -> Constraints:
     """Supports and prescribed displacements in step `step` on all nodes, middle nodes of named edges included.
 
     A support of listed nodes holds just these corners.
+
+    Args:
+        mesh: elements.
+        model: has supports and steps.
+        step: number of the step.
     """
     steps = tuple(
         replace(each, actuations=tuple(_plain(item) for item in each.actuations))
@@ -64,6 +69,16 @@ def forces(mesh: ElementMesh, model: Model, step: int, acting: Ramp, lengths: Ar
 
     They are those of `acting` (corners, 3), what the steps ask for, but that a `total` on a named set of edges is a
     uniform line load a length of edge instead of equal shares.
+
+    Args:
+        mesh: elements.
+        model: has the steps.
+        step: number of the step.
+        acting: (corners, 3) forces that the steps ask for, N.
+        lengths: (e,) of the edges of the flat sheet, mm.
+
+    Raises:
+        ModelError: a total on a named set that is no set of edges.
     """
     for each in model.steps[
         :step
@@ -108,7 +123,15 @@ def _line(mesh: ElementMesh, item: Force, lengths: Array) -> Array:
 
 
 def edge_moments(elements: ShellElements, moments: EdgeMoments) -> Ramp:
-    """(e, r) couples on the rotations alpha of edges, N mm / rad."""
+    """(e, r) couples on the rotations alpha of edges, N mm / rad.
+
+    Args:
+        elements: of the sheet.
+        moments: on named sets of boundary edges, N.
+
+    Raises:
+        ModelError: a set that does not exist, or edges inside the sheet.
+    """
     sheet = elements.mesh.sheet
     turns = elements.tables.rotations
     out = np.zeros((2, len(elements.lengths), turns))

@@ -22,7 +22,16 @@ MIDDLE = np.array([[1.0 / 3.0, 1.0 / 3.0]])
 def observe(
     model: Model, system: ShellSystem, q: Array, lam: float, step: int, stable: bool | None
 ) -> ShellState:
-    """Everything that can be read from the unknowns `q` at `lam`."""
+    """Everything that can be read from the unknowns `q` at `lam`.
+
+    Args:
+        model: the model that `system` was made from.
+        system: of the step.
+        q: (size,) unknowns.
+        lam: how much of the step is applied, 0 to 1.
+        step: number of the step.
+        stable: whether the state is stable, None if that was not asked.
+    """
     here = system.at(q, lam)
     e, mesh, creases = system.elements, model.mesh, system.creases
     strain, curvature = e.measures(here.x, system.side_rotations(here.components), system.frames)
@@ -46,15 +55,27 @@ def observe(
     reactions[system.constraints.fixed] = local[system.constraints.fixed]
     in_plane, bent = stresses(e, model.sheet, moments, strain)
     return ShellState(
-        mesh=mesh, step=step, lam=lam, points=here.x[: len(mesh.points)],
+        mesh=mesh,
+        step=step,
+        lam=lam,
+        points=here.x[: len(mesh.points)],
         energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum())),
         dihedral_angles=angles,
-        energy_density={"stretching": stretching / e.areas, "bending": bending / e.areas, "folding": by_triangle},
+        energy_density={
+            "stretching": stretching / e.areas,
+            "bending": bending / e.areas,
+            "folding": by_triangle,
+        },
         reactions=_to_corners(system, system.components.to_global(reactions)),
-        crease_moments=_crease_moments(system, couples), stable=stable, nodes=here.x,
-        frames=system.carried_frames(here.components), fold_angles=fold_angles, crease_couples=couples,
-        membrane_forces=in_plane, moments=bent,
-    )  # fmt: skip
+        crease_moments=_crease_moments(system, couples),
+        stable=stable,
+        nodes=here.x,
+        frames=system.carried_frames(here.components),
+        fold_angles=fold_angles,
+        crease_couples=couples,
+        membrane_forces=in_plane,
+        moments=bent,
+    )
 
 
 def _to_corners(system: ShellSystem, nodal: Array) -> Array:
@@ -105,7 +126,17 @@ def _jumps(system: ShellSystem, here: Here) -> Array:
 
 
 def stresses(elements: ShellElements, sheet: Sheet, moments: Array, strain: Array) -> tuple[Array, Array]:
-    """Membrane forces and moments (t, 3) at the middle of each triangle, components xx, yy, xy of the flat sheet."""
+    """Membrane forces and moments (t, 3) at the middle of each triangle, components xx, yy, xy of the flat sheet.
+
+    Args:
+        elements: of the sheet.
+        sheet: material and thickness.
+        moments: (t, 3 m) generalised moments.
+        strain: (t, 3 m) generalised strains.
+
+    Returns:
+        Membrane forces, N/mm, and moments, N.
+    """
     X = elements.mesh.nodes[elements.mesh.triangles, :2]
     slopes = gradients(MIDDLE)[0] if elements.mesh.degree == 2 else SLOPES
     F = np.einsum("tnc,nd->tcd", X, slopes)

@@ -33,6 +33,7 @@ OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 @njit(inline="always", **OPTIONS)
 def cross(a, b, out):  # type: ignore[no-untyped-def]
+    """Write the cross product a x b of two vectors (3,) into `out`."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
@@ -40,12 +41,13 @@ def cross(a, b, out):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def dot(a, b):  # type: ignore[no-untyped-def]
+    """Scalar product a . b of two vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(inline="always", **OPTIONS)
 def combine(weights, x, out):  # type: ignore[no-untyped-def]
-    """out = sum_i weights[i] x[i]."""
+    """Write sum_i weights[i] x[i] into `out` (3,); weights (n,), x (n, 3)."""
     for c in range(3):
         total = 0.0
         for i in range(len(x)):
@@ -55,7 +57,7 @@ def combine(weights, x, out):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def skew_times(v, A, sign, out):  # type: ignore[no-untyped-def]
-    """out = sign A [v]x with ([v]x w) = v x w, so that row i of out is sign (row i of A) x v."""
+    """Write sign A [v]x into `out`, with ([v]x w) = v x w, so that row i of it is sign (row i of A) x v."""
     for i in range(3):
         out[i, 0] = sign * (A[i, 1] * v[2] - A[i, 2] * v[1])
         out[i, 1] = sign * (A[i, 2] * v[0] - A[i, 0] * v[2])

@@ -19,6 +19,12 @@ def free_rigid_motions(components: Components, elements: ShellElements, x: Array
     """(n, r) orthonormal rates of the unknowns in the rigid motions left free at positions x (all nodes).
 
     Edges turn such that no curvature arises, with B (t, 6 m, w) the gradients there.
+
+    Args:
+        components: of the step.
+        elements: of the sheet.
+        x: (n, 3) positions of all nodes, mm.
+        B: (t, 6 m, w) gradients there.
     """
     motions = rigid_motions(x) @ free_motions(x, components.constraints)
     count = motions.shape[1]
@@ -51,7 +57,14 @@ def ground_triangle(components: Components, elements: ShellElements) -> int:
 def ground_stiffness(
     components: Components, elements: ShellElements, triangle: int, Z: Array
 ) -> tuple[Ints, Array]:
-    """Unknowns (3 n,) of a triangle (-1 if prescribed) and a stiffness (3 n, 3 n) against its rigid motions Z."""
+    """Unknowns (3 n,) of a triangle (-1 if prescribed) and a stiffness (3 n, 3 n) against its rigid motions Z.
+
+    Args:
+        components: of the step.
+        elements: of the sheet.
+        triangle: that is held.
+        Z: (n, r) orthonormal free rigid motions.
+    """
     number = components.number[components.of_element[triangle, : elements.moves]]
     rows = np.where(number[:, None] >= 0, Z[np.maximum(number, 0)], 0.0)
     Q = np.linalg.qr(rows)[0]
@@ -63,7 +76,11 @@ def describe_motion(mesh: ElementMesh, creases: Connectors, x: Array, moves: Arr
     """What moves, as a clause to be followed by how: the whole sheet, a crease, or a few nodes.
 
     Args:
-        x: (n, 3) positions of all nodes; moves: (n, 3) their motion; beta: (c, r) that of fold angles.
+        mesh: elements.
+        creases: creased edges.
+        x: (n, 3) positions of all nodes, mm.
+        moves: (n, 3) their motion, of any size.
+        beta: (c, r) the motion of fold angles.
     """
     size = float(np.linalg.norm(moves))
     if size > 0.0:

@@ -39,9 +39,11 @@ class ShellElements:
     """Elements of a flat sheet; t triangles, q points inside, p points on an edge.
 
     Attributes:
-        membrane, bending: (t, 3 m, 3 m) stiffness against generalised strains and curvatures.
+        membrane: (t, 3 m, 3 m) stiffness against generalised strains.
+        bending: (t, 3 m, 3 m) stiffness against generalised curvatures.
         strain0: (t, 3 m) strains that the metric of the flat sheet would have.
-        lengths: (e,) lengths of the (curved) edges, mm; areas: (t,), mm^2.
+        lengths: (e,) lengths of the (curved) edges, mm.
+        areas: (t,) of the flat triangles, mm^2.
     """
 
     mesh: ElementMesh
@@ -86,7 +88,14 @@ class ShellElements:
         )
 
     def tangent(self, x: Array, forces: Array, B: Array, frames: Frames) -> Array:
-        """(t, w, w) element tangents with the given forces (t, 6 m) in their geometric part."""
+        """(t, w, w) element tangents with the given forces (t, 6 m) in their geometric part.
+
+        Args:
+            x: (n, 3) positions of all nodes, mm.
+            forces: (t, 6 m) conjugate to strains and curvatures.
+            B: (t, 6 m, w) gradients there.
+            frames: of the step.
+        """
         K = np.zeros((len(self.areas), self.width, self.width))
         kernels.add_material(B, self.membrane, self.bending, K)
         kernels.add_geometric(x, forces, self.loops, frames, K)
@@ -94,7 +103,12 @@ class ShellElements:
 
 
 def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
-    """Elements of a sheet; the mesh says of which degree."""
+    """Elements of a sheet; the mesh says of which degree.
+
+    Args:
+        mesh: flat, of first or second order.
+        sheet: material and thickness.
+    """
     table = tables(mesh.degree)
     X = mesh.nodes[mesh.triangles, :2]
     F = np.einsum("tnc,qnd->tqcd", X, table.slopes)
@@ -109,13 +123,30 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
     lengths[edges] = speed @ table.edge_weights
     inside = table.weights / J if mesh.degree > 1 else np.empty((len(edges), 0))  # linear shapes do not bend
     loops = Loops(
-        mesh.triangles, np.ascontiguousarray(edges), sides, inside, table.edge_weights / speed,
-        table.Q, table.factors, table.slopes, table.bend, table.S, table.along, table.across, table.turn,
-    )  # fmt: skip
+        nodes=mesh.triangles,
+        edges=np.ascontiguousarray(edges),
+        sides=sides,
+        inside=inside,
+        rim=table.edge_weights / speed,
+        Q=table.Q,
+        factors=table.factors,
+        slopes=table.slopes,
+        bend=table.bend,
+        S=table.S,
+        along=table.along,
+        across=table.across,
+        turn=table.turn,
+    )
     elements = ShellElements(
-        mesh, table, loops, membrane_stiffness(table, metric, J, sheet), bending_stiffness(table, metric, J, sheet),
-        np.zeros((len(edges), table.measures)), lengths, J @ table.weights,
-    )  # fmt: skip
+        mesh,
+        table,
+        loops,
+        membrane_stiffness(table, metric, J, sheet),
+        bending_stiffness(table, metric, J, sheet),
+        np.zeros((len(edges), table.measures)),
+        lengths,
+        J @ table.weights,
+    )
     frames = flat_frames(mesh)
     strain0, _ = elements.measures(mesh.nodes, np.zeros((len(edges), 3, table.rotations)), frames)
     elements.strain0[:] = strain0
@@ -129,7 +160,17 @@ def _basis(table: Tables, tensors: Array) -> Array:
 
 
 def membrane_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> Array:
-    """(t, 3 m, 3 m) of int C:eps:eps dA; eps covariant, C = E t / (1 - nu^2) [(1 - nu) eps : eps + nu tr(eps)^2]."""
+    """Stiffness against generalised strains, with C = E t / (1 - nu^2) [(1 - nu) eps : eps + nu tr(eps)^2].
+
+    Args:
+        table: of the degree of the mesh.
+        metric: (t, q, 2, 2) of the flat sheet at the points inside, mm^2.
+        J: (t, q) Jacobian there, mm^2.
+        sheet: material and thickness.
+
+    Returns:
+        (t, 3 m, 3 m) of int C:eps:eps dA; eps covariant.
+    """
     stiffness = sheet.E * sheet.t / (1.0 - sheet.nu**2)
     raised = np.linalg.inv(metric)
     eps = _basis(table, STRAINS)
@@ -142,7 +183,18 @@ def membrane_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> 
 
 
 def bending_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> Array:
-    """(t, 3 m, 3 m) inverse of int 12 / (E t^3) [(1 + nu) sigma : sigma - nu tr(sigma)^2] dA, sigma = F s F^T / J^2."""
+    """Stiffness against generalised curvatures: the inverse of a compliance.
+
+    Args:
+        table: of the degree of the mesh.
+        metric: (t, q, 2, 2) of the flat sheet at the points inside, mm^2.
+        J: (t, q) Jacobian there, mm^2.
+        sheet: material and thickness.
+
+    Returns:
+        (t, 3 m, 3 m) inverse of int 12 / (E t^3) [(1 + nu) sigma : sigma - nu tr(sigma)^2] dA, sigma = F s
+        F^T / J^2.
+    """
     compliance = 12.0 / (sheet.E * sheet.t**3)
     lowered = np.einsum("tqab,qkbc->tqkac", metric, _basis(table, MOMENTS))
     trace = np.einsum("tqkaa->tqk", lowered)
@@ -161,10 +213,11 @@ def edge_tangents(mesh: ElementMesh, x: Array) -> Array:
     if mesh.degree == 1:
         return np.repeat((high - low)[:, None], len(s), axis=1)
     ds = np.stack((4.0 * s - 3.0, 4.0 - 8.0 * s, 4.0 * s - 1.0))
-    return np.einsum("kp,kec->epc", ds, np.stack((low, middle, high)))
+    return np.asarray(np.einsum("kp,kec->epc", ds, np.stack((low, middle, high))))
 
 
 def unit(vectors: Array) -> Array:
+    """Vectors (..., 3) of length one in the directions of the given ones."""
     out: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     return out
 
@@ -179,6 +232,12 @@ def carried_frames(mesh: ElementMesh, frames: Frames, x: Array, alpha: Array) ->
     """Frames that went with the edges to positions x and turned with their rotations alpha (e, r).
 
     With them the same state has alpha = 0 and the same measures, exactly.
+
+    Args:
+        mesh: elements.
+        frames: where the step begins.
+        x: (n, 3) positions of all nodes, mm.
+        alpha: (e, r) rotations of the edges, rad.
     """
     t = unit(edge_tangents(mesh, x))
     along = np.einsum("epc,epc->ep", frames.d0, t) / (1.0 + np.einsum("epc,epc->ep", frames.t0, t))

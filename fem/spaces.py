@@ -96,8 +96,7 @@ def regge_interpolation() -> Array:
         rows = []
         for k in range(3):
             stretch = np.einsum("q...ab,a,b->q...", tensor_at[k], EDGES[k], EDGES[k])
-            for weight in (1.0 - s[0], s[0]):
-                rows.append(np.einsum("q,q...->...", weights * weight, stretch))
+            rows += [np.einsum("q,q...->...", weights * weight, stretch) for weight in (1.0 - s[0], s[0])]
         for k in range(3):
             stretch = np.einsum("q...ab,a,b->q...", inside, EDGES[k], EDGES[k])
             rows.append(np.einsum("q,q...->...", area_weights, stretch))
@@ -105,7 +104,8 @@ def regge_interpolation() -> Array:
 
     def basis(at: Array) -> Array:
         b = barycentric(at)
-        return np.stack([b[:, i, None, None] * STRAINS[j] for i, j in order], axis=1)
+        functions: Array = np.stack([b[:, i, None, None] * STRAINS[j] for i, j in order], axis=1)
+        return functions
 
     def metric(at: Array) -> Array:
         g = gradients(at)
@@ -120,22 +120,31 @@ def regge_interpolation() -> Array:
 
 def edge_points(edge: int, s: Array) -> Array:
     """(q, 2) points at parameters s in [0, 1] on an edge, counter-clockwise."""
-    return CORNERS[(edge + 1) % 3] + s[:, None] * EDGES[edge]
+    return np.asarray(CORNERS[(edge + 1) % 3] + s[:, None] * EDGES[edge])
 
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """What the element loops need; n nodes, q points inside, p points on an edge, m functions with each of the tensors
-    S_j or R_j (3 m in all, number m j + k), r of which and of the rotations live on the edge.
+    """What the element loops need.
+
+    n nodes, q points inside, p points on an edge, m functions with each of the tensors S_j or R_j (3 m in all, number
+    m j + k), r of which and of the rotations live on the edge.
 
     Attributes:
-        Q: (3 m, n, n) the strain's coefficients are 1/2 sum_ij Q[c, i, j] x_i . x_j; see `regge_interpolation`.
-        weights: (q,) of the points inside (their sum is 1/2); `slopes` (q, n, 2) of the shapes.
-        factors: (q, 3, m) what tensor j is multiplied by; `middle` (m,) the same in the middle of the triangle.
+        Q: (3 m, n, n) the strain's coefficients are 1/2 sum_ij Q[c, i, j] x_i . x_j; see
+            `regge_interpolation`.
+        weights: (q,) of the points inside (their sum is 1/2).
+        slopes: (q, n, 2) derivatives of the shapes there.
+        factors: (q, 3, m) what tensor j is multiplied by.
+        middle: (m,) the same in the middle of the triangle.
         bend: (n, 3) second derivatives 11, 22, 12 of the shapes.
-        S: (3, 3) components 11, 22 and twice 12 of the tensors S_j, so that S . kappa is their double contraction.
-        s, edge_weights: (p,) points and weights on [0, 1]; `turn` (r, p) the functions of the edge there.
-        along, across: (3, p, n) derivatives of the shapes along r_j and toward the opposite corner.
+        S: (3, 3) components 11, 22 and twice 12 of the tensors S_j, so that S . kappa is their double
+            contraction.
+        s: (p,) points on [0, 1].
+        edge_weights: (p,) their weights.
+        turn: (r, p) the functions of the edge there.
+        along: (3, p, n) derivatives of the shapes along r_j.
+        across: (3, p, n) derivatives of the shapes toward the opposite corner.
     """
 
     Q: Array
@@ -153,16 +162,17 @@ class Tables:
 
     @property
     def nodes(self) -> int:
+        """Nodes of an element, n."""
         return len(self.bend)
 
     @property
     def measures(self) -> int:
-        """Strains, and as many curvatures, of an element."""
+        """Strains, and as many curvatures, of an element: 3 m."""
         return len(self.Q)
 
     @property
     def rotations(self) -> int:
-        """Of an edge."""
+        """Rotations of an edge, r."""
         return len(self.turn)
 
 

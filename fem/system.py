@@ -35,7 +35,18 @@ ROUNDING = 8.0 * np.finfo(float).eps
 
 @dataclass(frozen=True, eq=False)
 class Here:
-    """What has been computed at one (q, lambda)."""
+    """What has been computed at one (q, lambda).
+
+    Attributes:
+        q: (size,) unknowns.
+        lam: how much of the step is applied.
+        components: (k,) all components, see `Components`.
+        x: (n, 3) positions of all nodes, mm.
+        forces: (t, 6 m) forces conjugate to strains and curvatures.
+        energy: potential, N mm.
+        B: (t, 6 m, w) derivatives of strains and curvatures.
+        pull: (t, 3 n + 3 r) element forces by positions and side rotations.
+    """
 
     q: Array
     lam: float
@@ -44,11 +55,11 @@ class Here:
     forces: Array
     energy: float
     B: Array
-    pull: Array  # (t, 3 n + 3 r) element forces by positions and side rotations
+    pull: Array
 
 
 def root_mean_square(values: Array) -> float:
-    """Also of values whose squares overflow, which a wild trial step may have."""
+    """Root mean square, also of values whose squares overflow, which a wild trial step may have."""
     largest = float(np.abs(values).max(initial=0.0))
     if not 0.0 < largest < np.inf:
         return largest
@@ -71,6 +82,18 @@ class ShellSystem:
         elements: ShellElements,
         moments: EdgeMoments,
     ) -> None:
+        """Set up a step.
+
+        Args:
+            model: a sheet with supports and steps.
+            program: what the step imposes and loads.
+            start: the state that the step begins with; None is the flat sheet.
+            elements: of the sheet.
+            moments: couples on boundary edges.
+
+        Raises:
+            ModelError: the model is not one that a shell can take, or its loads turn a free sheet.
+        """
         if model.stiffness is not None:
             raise ModelError(
                 "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
@@ -111,14 +134,17 @@ class ShellSystem:
 
     @property
     def size(self) -> int:
+        """Number of unknowns."""
         return len(self.components.free)
 
     @property
     def primal(self) -> int:
+        """Number of unknowns: there are no multipliers."""
         return self.size
 
     @property
     def rotation(self) -> float:
+        """Largest angle that the step imposes on a crease, rad."""
         return self.load_step.rotation
 
     @cached_property
@@ -192,6 +218,7 @@ class ShellSystem:
     # ------------------------------------------------------------------------------- the System protocol
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
+        """Energy, residual and element forces at (q, lam)."""
         here = self.at(q, lam)
         beta = self.components.beta(here.components)
         energy = (
@@ -242,6 +269,7 @@ class ShellSystem:
         return float(np.abs(K[:, :moves, :moves]).max()), float(np.abs(K[:, moves:, :moves]).max())
 
     def element_tangents(self, here: Here, forces: Array) -> Array:
+        """(t, w, w) element tangents at a state, with the given forces in their geometric part."""
         return self.elements.tangent(here.x, forces.reshape(here.forces.shape), here.B, self.frames)
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
@@ -274,17 +302,19 @@ class ShellSystem:
         return forces + self.elements.forces(*np.hsplit(measure, 2)).ravel()
 
     def control_rate(self, q: Array, lam: float) -> Array:
+        """(size,) derivative of the residual by lambda."""
         out = self._times(self.at(q, lam), self.components.rate) - self.load.rate
         out[self.components.first_beta :] += self.creases.gradient_rate().ravel()
         return out[self.components.free]
 
     def power(self, q: Array, lam: float) -> float:
+        """Derivative of the potential by lambda at fixed q, N mm."""
         here = self.at(q, lam)
         total = float(self.gradient(here) @ self.components.rate) - float(self.load.rate @ here.components)
         return total + self.creases.power(self.components.beta(here.components), lam)
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        """Second derivative of the potential by lambda at fixed q, N mm."""
         c = self.creases
         total = float(self._times(self.at(q, lam), self.components.rate) @ self.components.rate)
         total -= 2.0 * float(self.load.rate @ self.components.rate)
@@ -304,6 +334,14 @@ class ShellSystem:
         return out
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Why an increment is not to be trusted; "" if it is.
+
+        Args:
+            q: (size,) unknowns before the increment.
+            lam: before the increment.
+            q_new: (size,) after it.
+            lam_new: after it.
+        """
         before, after = self.components.whole(q, lam), self.components.whole(q_new, lam_new)
         turn = float(np.abs(self.components.alpha(after) - self.components.alpha(before)).max())
         if turn > LARGEST_TURN:
@@ -316,14 +354,18 @@ class ShellSystem:
         return ""
 
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return ""  # the shell knows no contact: its sides may pass through each other
+        """Nothing: the shell knows no contact, and its sides may pass through each other."""
+        del q, lam, q_new, lam_new  # the arguments of every system
+        return ""
 
     def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        """What stands in the way of loads on a free sheet, with its outcome; None if nothing does."""
         if not self.constraints.rigid_body or not (self.load.start.any() or self.load.end.any()):
             return None
         return (Outcome.MECHANISM, TURNED) if grows_ahead(self, q, lam, self._unbalanced) else None
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
+        """What moves in an eigenvector (size,), as a clause."""
         c = self.components
         whole = np.zeros(len(c.number))
         whole[c.free] = motion

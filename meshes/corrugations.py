@@ -54,6 +54,15 @@ def corrugation_table(
 ) -> CorrugationTable:
     """Parameters of the five example patterns from W, H and n_s (Eq. 4.7-4.16).
 
+    Args:
+        kind: one of `KINDS`.
+        width: W along x, mm.
+        height: H along y, mm.
+        panels: n_s, sheets between creases, 2 to 100.
+
+    Returns:
+        The parameters of the curves 1 ... n_s, the last of which is the outer edge.
+
     Raises:
         PatternError: an unknown kind, or sizes that cannot be.
     """
@@ -88,9 +97,14 @@ def corrugation(
     """One of the five example patterns of the source: "straight", "parabolic-point", ... (Fig. 4.3).
 
     Args:
-        width, height: W along x and H along y, mm.
+        kind: one of `KINDS`.
+        width: W along x, mm.
+        height: H along y, mm.
         panels: n_s, sheets between creases; there are n_s - 1 creases, "crease-1" next to the straight edge.
         folds: one word a crease; None is alternately mountain and valley, mountain first.
+
+    Returns:
+        The pattern, with rails from the straight edge to the outer one.
 
     Raises:
         PatternError: an unknown kind, sizes that cannot be, or folds that are not one a crease.
@@ -117,9 +131,19 @@ def curved_corrugation(
     """Any pattern of the family above.
 
     Args:
-        exponent, root: p and q, from 1; larger ones make curves flatter in the middle and steeper at the ends.
+        exponent: p, from 1; larger ones make curves flatter in the middle and steeper at the ends.
+        root: q, from 1, with the same effect.
         spread: s in [0, 1], from "edge" to "point".
-        width, height, panels, folds: see `corrugation`.
+        width: W along x, mm.
+        height: H along y, mm.
+        panels: n_s, sheets between creases.
+        folds: one word a crease; None is alternately mountain and valley, mountain first.
+
+    Returns:
+        The pattern, with rails from the straight edge to the outer one.
+
+    Raises:
+        PatternError: an exponent, root, spread or size that cannot be, or folds that are not one a crease.
     """
     W, H, n = _sizes(width, height, panels)
     for name, value in (("exponent", exponent), ("root", root)):

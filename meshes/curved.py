@@ -1,8 +1,7 @@
-"""Nodes for elements of first and second order: the mesh as it is, or lifted, with a node in the middle of every edge
-on the curve that the edge lies on.
+"""Nodes for elements of first and second order: the mesh as it is, or lifted.
 
-High-order shells need it: with straight edges along a curved crease their energy is 10-40 % wrong and converges at
-first order only.
+A lifted mesh has a node in the middle of every edge, on the curve that the edge lies on. High-order shells need it:
+with straight edges along a curved crease their energy is 10-40 % wrong and converges at first order only.
 """
 
 from __future__ import annotations
@@ -32,28 +31,34 @@ class LinearMesh:
     sheet: SheetMesh
 
     def __post_init__(self) -> None:
+        """Refuse a sheet that is not flat."""
         check_flat(self.sheet)
 
     degree = 1
 
     @property
     def nodes(self) -> Array:
+        """(n, 3) node positions, mm."""
         return self.sheet.points
 
     @property
     def triangles(self) -> Ints:
+        """(t, 3) node numbers of every triangle."""
         return self.sheet.triangles
 
     @property
     def linear(self) -> SheetMesh:
+        """The sheet itself; `QuadraticMesh.linear` cuts its triangles up."""
         return self.sheet
 
     @cached_property
     def carriers(self) -> Ints:
+        """(t, 6) places that unknowns of an element belong to: its corners, then its edges, numbered from n."""
         return _with_edges(self.sheet)
 
     @cached_property
     def places(self) -> Array:
+        """(n + e, 3) where these are, mm: the nodes, then the middles of the edges."""
         return np.vstack((self.sheet.points, self.sheet.points[self.sheet.topology.edges].mean(axis=1)))
 
 
@@ -112,7 +117,11 @@ def _with_edges(mesh: SheetMesh) -> Ints:
 
 
 def check_flat(mesh: SheetMesh) -> None:
-    """Refuse a sheet that does not lie in z = 0 (MeshError)."""
+    """Refuse a sheet that does not lie in z = 0.
+
+    Raises:
+        MeshError: the sheet is not flat.
+    """
     if not mesh.flat:
         raise MeshError("the shell takes only a sheet that is flat in z = 0; unfold it first")
 
@@ -120,9 +129,15 @@ def check_flat(mesh: SheetMesh) -> None:
 def lift(mesh: SheetMesh) -> QuadraticMesh:
     """Lift a flat sheet to second order on the curves of its edge sets.
 
+    Args:
+        mesh: a flat sheet; `mesh.curves` holds the exact curve of an edge set where there is one.
+
+    Returns:
+        The mesh with a node in the middle of every edge. Edges without a curve stay straight.
+
     Raises:
-        MeshError: the sheet is not flat, an edge set does not lie on its curve, or a curved edge turns a triangle
-            inside out (the mesh is too coarse for its curves).
+        MeshError: the sheet is not flat, an edge set does not lie on its curve, or a curved edge turns a
+            triangle inside out (the mesh is too coarse for its curves).
     """
     check_flat(mesh)
     ends = mesh.points[mesh.topology.edges]

@@ -12,15 +12,18 @@ Array = NDArray[np.float64]
 
 
 class Curve(Protocol):
-    """A plane curve. `point(u)` maps (k,) parameters in [0, 1] to (k, 2) points, at constant speed (see `ArcChain`)."""
+    """A plane curve, mm; its points run at constant speed in the parameter (but see `ArcChain`)."""
 
     @property
-    def length(self) -> float: ...
+    def length(self) -> float:
+        """Length of the curve, mm."""
 
     @property
-    def closed(self) -> bool: ...
+    def closed(self) -> bool:
+        """True where the curve ends where it begins."""
 
-    def point(self, u: Array) -> Array: ...
+    def point(self, u: Array) -> Array:
+        """(k, 2) points, mm, at (k,) parameters in [0, 1]."""
 
 
 def arc_lengths(points: Array) -> Array:
@@ -29,7 +32,16 @@ def arc_lengths(points: Array) -> Array:
 
 
 def interpolated(at: Array, lengths: Array, values: Array) -> Array:
-    """(n, d) values (k, d), known at rising lengths (k,), linear between them, at lengths (n,)."""
+    """Values between samples, linear in the length.
+
+    Args:
+        at: (n,) lengths where they are wanted.
+        lengths: (k,) rising lengths of the samples.
+        values: (k, d) samples.
+
+    Returns:
+        (n, d).
+    """
     return np.column_stack([np.interp(at, lengths, column) for column in values.T])
 
 
@@ -42,20 +54,32 @@ class Line:
 
     @property
     def length(self) -> float:
+        """Distance between its ends, mm."""
         return float(np.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1]))
 
     @property
     def closed(self) -> bool:
+        """False: a segment never closes."""
         return False
 
     def point(self, u: Array) -> Array:
+        """(k, 2) points, mm, at (k,) parameters in [0, 1]."""
         u = np.asarray(u, dtype=float)[:, None]
-        return (1.0 - u) * np.asarray(self.start) + u * np.asarray(self.end)
+        return (1.0 - u) * np.asarray(self.start, dtype=np.float64) + u * np.asarray(
+            self.end, dtype=np.float64
+        )
 
 
 @dataclass(frozen=True)
 class Arc:
-    """A circular arc about `centre` from polar angle `start` through `sweep` (rad, counter-clockwise positive)."""
+    """A circular arc about `centre` from polar angle `start` through `sweep` (rad, counter-clockwise positive).
+
+    Attributes:
+        centre: (x, y), mm.
+        radius: mm.
+        start: polar angle of the first point, rad.
+        sweep: angle that the arc turns through, rad, counter-clockwise positive.
+    """
 
     centre: tuple[float, float]
     radius: float
@@ -64,13 +88,16 @@ class Arc:
 
     @property
     def length(self) -> float:
+        """Length of the arc, mm."""
         return float(self.radius * abs(self.sweep))
 
     @property
     def closed(self) -> bool:
+        """True for a whole turn."""
         return bool(abs(abs(self.sweep) - 2.0 * np.pi) < 1e-12)
 
     def point(self, u: Array) -> Array:
+        """(k, 2) points, mm, at (k,) parameters in [0, 1]."""
         angle = self.start + self.sweep * np.asarray(u, dtype=float)
         offset = self.radius * np.column_stack((np.cos(angle), np.sin(angle)))
         return np.asarray(self.centre) + offset
@@ -83,6 +110,7 @@ class Polyline:
     vertices: Array
 
     def __post_init__(self) -> None:
+        """Keep a read-only copy of the vertices."""
         vertices = np.array(self.vertices, dtype=float)
         vertices.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
@@ -93,13 +121,16 @@ class Polyline:
 
     @property
     def length(self) -> float:
+        """Sum of the lengths of the segments, mm."""
         return float(self._arc_length[-1])
 
     @property
     def closed(self) -> bool:
+        """True if the first vertex is the last one."""
         return bool(len(self.vertices) > 2 and np.allclose(self.vertices[0], self.vertices[-1]))
 
     def point(self, u: Array) -> Array:
+        """(k, 2) points, mm, at (k,) parameters in [0, 1], linear in the length."""
         s = self._arc_length
         at = np.asarray(u, dtype=float) * s[-1]
         return np.column_stack([np.interp(at, s, self.vertices[:, axis]) for axis in range(2)])
@@ -109,13 +140,15 @@ class Polyline:
 class ArcChain:
     """Circular arcs and straight pieces that run smoothly into one another, or a curve parallel to such a chain.
 
-    Attributes:
-        start: (x, y) where the chain begins, mm; heading: polar angle of its tangent there, rad.
-        curvatures: of the pieces, 1/mm, positive where the chain turns to the left; lengths: of the pieces, mm.
-        offset: of the curve to the left of the chain, mm; less than any radius on that side.
-
     The speed is constant along the chain itself, so that parallel curves have the points of one normal at one u; that
     of a curve at an offset is constant on each piece.
+
+    Attributes:
+        start: (x, y) where the chain begins, mm.
+        heading: polar angle of its tangent there, rad.
+        curvatures: of the pieces, 1/mm, positive where the chain turns to the left.
+        lengths: of the pieces, mm.
+        offset: of the curve to the left of the chain, mm; less than any radius on that side.
     """
 
     start: tuple[float, float]
@@ -126,6 +159,7 @@ class ArcChain:
 
     @property
     def length(self) -> float:
+        """Length of the curve at its offset, mm."""
         return float(
             sum(
                 piece_length * (1.0 - k * self.offset)
@@ -135,6 +169,7 @@ class ArcChain:
 
     @property
     def closed(self) -> bool:
+        """False: a chain is taken as open."""
         return False
 
     @property
@@ -144,6 +179,7 @@ class ArcChain:
         return np.asarray(s / s[-1])
 
     def point(self, u: Array) -> Array:
+        """(k, 2) points, mm, at (k,) parameters in [0, 1]."""
         s = np.atleast_1d(np.asarray(u, dtype=float)) * sum(self.lengths)
         knots = np.concatenate(([0.0], np.cumsum(self.lengths)))
         piece = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(self.lengths) - 1)
@@ -172,7 +208,12 @@ def _arc_step(heading: float, k: float, s: Array) -> Array:
 
 
 def sample(curve: Curve, tolerance: float = 1e-3) -> Array:
-    """Points (k, 2) on `curve` whose chords stay within about `tolerance` (mm) of it."""
+    """Points (k, 2) on `curve` whose chords stay within about `tolerance` (mm) of it.
+
+    Args:
+        curve: of any kind.
+        tolerance: mm; a `Polyline` gives its own vertices whatever it is.
+    """
     if isinstance(curve, Polyline):
         return curve.vertices
     if isinstance(curve, ArcChain):

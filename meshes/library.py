@@ -21,6 +21,16 @@ def strip(
     """A rectangle 0 <= x <= length, 0 <= y <= width, with straight creases along x at the heights `creases`.
 
     Edges are "inner" (y = 0), "outer" (y = width), "start" (x = 0) and "end" (x = length).
+
+    Args:
+        length: along x, mm.
+        width: along y, mm.
+        creases: rising heights y of the creases, mm.
+        folds: "mountain" or "valley" for all, or one word a crease.
+
+    Raises:
+        PatternError: sizes that cannot be, creases outside the sheet or out of order, or folds that are not
+            one a crease.
     """
     length = _positive("length", length)
     width = _positive("width", width)
@@ -38,13 +48,16 @@ def annulus_sector(
 ) -> CreasePattern:
     """A sector of an annulus with one or more concentric creases.
 
+    The first radial edge lies on the x axis and the centre at the origin.
+
     Args:
         radius: radius of the crease, or rising radii of several creases, mm.
         width: of the panel inside the first and outside the last crease, mm.
         angle: of the sector, rad, in (0, 2 pi).
         folds: "mountain" or "valley" for all, or one word a crease from the inside.
 
-    The first radial edge lies on the x axis and the centre at the origin.
+    Raises:
+        PatternError: sizes that cannot be, radii out of order, or folds that are not one a crease.
     """
     angle = _positive("angle", angle)
     if angle >= 2.0 * math.pi:
@@ -55,7 +68,16 @@ def annulus_sector(
 
 
 def full_annulus(radius: float | Sequence[float], width: float, folds: Folds = "mountain") -> CreasePattern:
-    """A whole annulus with concentric creases; arguments as for `annulus_sector`."""
+    """A whole annulus with concentric creases; arguments as for `annulus_sector`.
+
+    Args:
+        radius: radius of the crease, or rising radii of several creases, mm.
+        width: of the panel inside the first and outside the last crease, mm.
+        folds: "mountain" or "valley" for all, or one word a crease from the inside.
+
+    Raises:
+        PatternError: sizes that cannot be, radii out of order, or folds that are not one a crease.
+    """
     return between_rails([Arc((0.0, 0.0), r, 0.0, 2.0 * math.pi) for r in _radii(radius, width)], folds)
 
 
@@ -68,11 +90,17 @@ def two_arcs(
 ) -> CreasePattern:
     """A rectangle with circular creases across it that bulge the same way, upwards (source Fig. 3.7 c and 3.8 d).
 
+    The sheet and its edges are those of `strip`.
+
     Args:
+        width: along x, mm.
+        height: along y, mm.
         radii: of the creases from below, mm; each at least half the width.
         at: heights of their tops in the middle of the sheet, mm, rising.
+        folds: "mountain" or "valley" for both, or one word a crease.
 
-    The sheet and its edges are those of `strip`.
+    Raises:
+        PatternError: an arc that does not reach across the sheet, or creases that leave it or cross.
     """
     width = _positive("width", width)
     radii, at = [_positive("radius", r) for r in radii], [float(y) for y in at]
@@ -100,8 +128,15 @@ def sine_tessellation(
     """A rectangle with equally spaced sine creases along x, alternately mountain and valley (source Fig. 3.7 b).
 
     Args:
-        amplitude: of the sines, mm; waves: how many fit into the width.
-        folds: other than alternating.
+        width: along x, mm.
+        height: along y, mm.
+        creases: how many.
+        amplitude: of the sines, mm.
+        waves: how many fit into the width.
+        folds: one word a crease, or one for all; None is alternating, mountain first.
+
+    Raises:
+        PatternError: sizes that cannot be, or creases that leave the sheet or cross.
     """
     width, height = _positive("width", width), _positive("height", height)
     creases, amplitude = _count("creases", creases), _positive("amplitude", amplitude)
@@ -125,9 +160,15 @@ def parabolic_canopy(
     """A rectangle with one parabola repeated upwards, alternately mountain and valley (source Fig. 3.7 d).
 
     Args:
-        sag: how much lower the ends of the parabolas lie than their tops, mm; the tops are equally spaced about the
-            middle of the sheet.
-        folds: other than alternating.
+        width: along x, mm.
+        height: along y, mm.
+        creases: how many.
+        sag: how much lower the ends of the parabolas lie than their tops, mm; the tops are equally spaced
+            about the middle of the sheet.
+        folds: one word a crease, or one for all; None is alternating, mountain first.
+
+    Raises:
+        PatternError: sizes that cannot be, or creases that leave the sheet or cross.
     """
     width, height = _positive("width", width), _positive("height", height)
     creases, sag = _count("creases", creases), _positive("sag", sag)
@@ -146,7 +187,13 @@ def opposite_parabolas(
     """A square with two parabolas across it whose tops face each other in the middle (source Fig. 3.7 e).
 
     Args:
-        gap: between the tops, mm; sag: from a top to the ends of its parabola, towards the nearer edge, mm.
+        side: of the square, mm.
+        gap: between the tops, mm.
+        sag: from a top to the ends of its parabola, towards the nearer edge, mm.
+        folds: "mountain" or "valley" for both, or one word a crease.
+
+    Raises:
+        PatternError: sizes that cannot be, or creases that leave the sheet or cross.
     """
     side, gap, sag = _positive("side", side), _positive("gap", gap), _positive("sag", sag)
 
@@ -176,7 +223,7 @@ def _graph(width: float, y: Callable[[Array], Array]) -> Polyline:
 
 
 def alternating(count: int) -> list[FoldKind]:
-    """Mountain and valley in turn."""
+    """Mountain and valley in turn, mountain first."""
     return ["valley" if i % 2 else "mountain" for i in range(count)]
 
 
@@ -206,7 +253,18 @@ def _radii(radius: float | Sequence[float], width: float) -> list[float]:
 
 
 def between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
-    """A sheet between the first and the last of some curves, with creases along the others; these two may meet."""
+    """A sheet between the first and the last of some curves, with creases along the others; these two may meet.
+
+    Args:
+        rails: curves, mm, in order across the sheet, all run the same way.
+        folds: one word a crease, or one for all.
+
+    Returns:
+        The pattern; one crease is named "crease", several are "crease-1", "crease-2", ...
+
+    Raises:
+        PatternError: folds that are not one a crease, or creases that leave the sheet or cross.
+    """
     count = len(rails) - 2
     kinds: list[FoldKind] = [folds] * count if isinstance(folds, str) else list(folds)
     if len(kinds) != count:

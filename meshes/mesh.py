@@ -17,7 +17,7 @@ from meshes.topology import Ints, Topology, build
 
 
 def count(number: int, what: str) -> str:
-    """ "1 crease", "2 creases" """
+    """A number and its noun, as in "1 crease" and "2 creases"."""
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
@@ -30,6 +30,7 @@ class Origin:
 
     @classmethod
     def of(cls, pattern: CreasePattern, points: Array, triangles: Ints) -> Origin:
+        """The origin of a mesh with points (n, 2 or 3) and triangles (t, 3) that was made of `pattern`."""
         return cls(pattern, _mark(points, triangles))
 
 
@@ -70,6 +71,7 @@ class SheetMesh:
     origin: Origin | None = None
 
     def __post_init__(self) -> None:
+        """Check everything against everything else, and freeze the arrays."""
         points = np.array(self.points, dtype=float)
         if points.ndim == 2 and points.shape[1] == 2:
             points = np.column_stack((points, np.zeros(len(points))))
@@ -148,13 +150,14 @@ class SheetMesh:
 
     @cached_property
     def topology(self) -> Topology:
+        """Edges, hinges and boundary, found when they are first asked for."""
         return build(self.triangles, len(self.points))
 
     @cached_property
     def areas(self) -> Array:
         """(t,) triangle areas, mm^2."""
         a, b, c = (self.points[self.triangles[:, k]] for k in range(3))
-        return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
 
     @property
     def flat(self) -> bool:
@@ -168,12 +171,16 @@ class SheetMesh:
 
     @property
     def creases(self) -> tuple[str, ...]:
+        """Names of the creases, without "crease:"."""
         return tuple(name.removeprefix("crease:") for name in self.edge_sets if name.startswith("crease:"))
 
     def nodes(self, at: str) -> Ints:
         """Nodes of a place: "corner:inner-start", "edge:inner", "crease:NAME", "node:N", "near:X,Y" or "all".
 
         "near:X,Y" is the node nearest to that place of the stress-free sheet, mm, seen from +z.
+
+        Returns:
+            (k,) node numbers, in the order of the place.
 
         Raises:
             MeshError: there is no such place; the message lists those there are.

@@ -26,15 +26,15 @@ def parallel_creases(
     with curvature 0 the pattern is that of `strip`. One curvature gives concentric arcs, of which the first has the
     lowest curvature if that is positive (the source's annulus sectors); a list gives pieces that run into one another.
 
+    The edges are "inner" (right of the first crease), "outer" (left of the last one), "start" and "end"; one crease is
+    named `crease`, several are `crease-1`, `crease-2`, ... from the right.
+
     Args:
         curvature: kappa_0 of the first crease, 1/mm, of any sign; one number, or one a piece.
         length: of the first crease, mm; one number, or one a piece.
         spacing: between creases, and between the outermost creases and the edges, mm.
         creases: how many.
-        folds: by default alternating, the first one mountain.
-
-    The edges are "inner" (right of the first crease), "outer" (left of the last one), "start" and "end"; one crease is
-    named `crease`, several are `crease-1`, `crease-2`, ... from the right.
+        folds: one word a crease, or one for all; by default alternating, the first one mountain.
 
     Raises:
         PatternError: a curve is narrower than its offsets, or the sheet meets itself.

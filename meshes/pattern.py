@@ -18,9 +18,16 @@ FOLD_KINDS: tuple[FoldKind, ...] = ("mountain", "valley", "flat")
 
 @dataclass(frozen=True)
 class Crease:
-    """A named crease curve; `fold` says how it was drawn: mountain (dihedral < pi), valley (> pi) or flat.
+    """A named crease curve.
 
-    `angle` is how far it was drawn to fold, rad in [0, pi], or None.
+    Attributes:
+        name: without "crease:".
+        curve: mm.
+        fold: how it was drawn: mountain (dihedral < pi), valley (> pi) or flat.
+        angle: how far it was drawn to fold, rad in [0, pi], or None.
+
+    Raises:
+        PatternError: a fold that is not known.
     """
 
     name: str
@@ -29,6 +36,7 @@ class Crease:
     angle: float | None = None
 
     def __post_init__(self) -> None:
+        """Check the fold."""
         if self.fold not in FOLD_KINDS:
             raise PatternError(
                 f"crease '{self.name}': fold '{self.fold}' is not known; use one of {', '.join(FOLD_KINDS)}"
@@ -52,7 +60,7 @@ class CreasePattern:
         remarks: what was taken for granted when the pattern was read, one line each.
 
     Raises:
-        PatternError: a crease leaves the sheet, crosses itself or another one, or names are not unique.
+        PatternError: a crease leaves the sheet, intersects itself or another one, or names are not unique.
     """
 
     rings: tuple[Array, ...]
@@ -65,6 +73,7 @@ class CreasePattern:
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        """Check names and geometry."""
         if self.units != "mm":
             raise PatternError(f"units '{self.units}' are not known; give lengths in mm")
         names = [crease.name for crease in self.creases]
@@ -90,7 +99,12 @@ class CreasePattern:
 
 
 def with_groups(pattern: CreasePattern, sets: dict[str, Ints]) -> dict[str, Ints]:
-    """The edge sets of a mesh with those of the pattern's groups in front, whose members are joined."""
+    """The edge sets of a mesh with those of the pattern's groups in front, whose members are joined.
+
+    Args:
+        pattern: has the groups.
+        sets: (k, 2) node pairs by name, such as "crease:m1".
+    """
     joined = {
         name: np.vstack([sets[member] for member in members])
         for name, members in pattern.groups
@@ -100,7 +114,15 @@ def with_groups(pattern: CreasePattern, sets: dict[str, Ints]) -> dict[str, Ints
 
 
 def drawn_angles(pattern: CreasePattern, sets: Mapping[str, Ints]) -> dict[str, Array]:
-    """Drawn fold angles of the creases of a mesh (rad, mountain positive, nan unknown); none if no crease has one."""
+    """Drawn fold angles of the creases of a mesh; none if no crease has one.
+
+    Args:
+        pattern: has the angles.
+        sets: (k, 2) node pairs by name, such as "crease:m1".
+
+    Returns:
+        By crease (k,) angles, one an edge, rad, mountain positive, nan where a crease has none.
+    """
     sign = {"mountain": 1.0, "valley": -1.0, "flat": 0.0}
     each = {c.name: sign[c.fold] * (np.nan if c.angle is None else c.angle) for c in pattern.creases}
     if all(crease.angle is None for crease in pattern.creases):

@@ -20,21 +20,22 @@ from meshes.topology import Ints
 
 CORNER = 0.35  # rad; a line that turns by more at a vertex has a corner there
 ROUNDS = 4  # of crossings that show when lines have been moved
-RANK = (
-    "boundary",
-    "cut",
-    "mountain",
-    "valley",
-    "flat",
-    "facet",
-)  # what wins where lines are drawn over each other
+# what wins where lines are drawn over each other
+RANK = ("boundary", "cut", "mountain", "valley", "flat", "facet")
 RIM = ("boundary", "cut")
 FOLDED = ("mountain", "valley")
 
 
 @dataclass(frozen=True)
 class DrawnLine:
-    """Points (k, 2) of a line in mm, what it stands for (one of `RANK`), its name, and its fold angle (rad or nan)."""
+    """A line of a drawing, in mm.
+
+    Attributes:
+        points: (k, 2), mm.
+        kind: what it stands for, one of `RANK`.
+        name: for messages.
+        angle: drawn fold angle, rad, or nan.
+    """
 
     points: Array
     kind: str
@@ -44,9 +45,15 @@ class DrawnLine:
 
 @dataclass(frozen=True)
 class Graph:
-    """A plane graph: nodes (n, 2), edges (e, 2), and of every edge its kind and the number of its line.
+    """A plane graph.
 
-    `joined` counts the ends that were moved, `gap` is the distance that did it, mm.
+    Attributes:
+        points: (n, 2) nodes, mm.
+        edges: (e, 2) node numbers.
+        kinds: of the edges, each one of `RANK`.
+        lines: of every edge the number of its line.
+        joined: how many ends were moved.
+        gap: the distance that did it, mm.
     """
 
     points: Array
@@ -57,12 +64,20 @@ class Graph:
     gap: float
 
     def select(self, kinds: Sequence[str]) -> Ints:
-        """Numbers of the edges of some kinds."""
+        """Numbers of the edges of some kinds, rising."""
         return np.flatnonzero([kind in kinds for kind in self.kinds])
 
 
 def corners(points: Array, closed: bool = False) -> NDArray[np.bool_]:
-    """(k,) where a polyline turns sharply; its ends do not count."""
+    """Where a polyline turns by more than `CORNER`.
+
+    Args:
+        points: (k, 2) vertices, mm.
+        closed: the last vertex repeats the first one, which can then be a corner too.
+
+    Returns:
+        (k,) truth values; the ends of an open line are no corners.
+    """
     steps = np.diff(points, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
     turn = np.abs((np.diff(heading) + np.pi) % (2.0 * np.pi) - np.pi)
@@ -77,8 +92,13 @@ def corners(points: Array, closed: bool = False) -> NDArray[np.bool_]:
 def heal(lines: Sequence[DrawnLine], gap: float) -> Graph:
     """The plane graph of some lines.
 
+    Args:
+        lines: with two points or more each, mm.
+        gap: what misses by up to so much is joined, mm.
+
     Raises:
-        PatternError: mountain and valley lie over each other, or lines do not come apart within the tolerance.
+        PatternError: mountain and valley lie over each other, or lines do not come apart within the
+            tolerance.
     """
     web = _Web(lines, gap)
     web.attach(range(len(web.nodes)))
@@ -263,9 +283,13 @@ class _Web:
         )
 
     def _put(
-        self, found: dict[tuple[int, int], tuple[str, int]], pair: tuple[int, int], kind: str, number: int,
+        self,
+        found: dict[tuple[int, int], tuple[str, int]],
+        pair: tuple[int, int],
+        kind: str,
+        number: int,
         points: list[tuple[float, float]],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Remember an edge; of two lines that lie over each other the more telling one stays."""
         if pair not in found:
             found[pair] = kind, number

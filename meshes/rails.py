@@ -21,7 +21,11 @@ STRAIGHT = 1e-3  # of the sheet's size: the sides between rails may bulge by so 
 
 
 def find_rails(pattern: CreasePattern) -> CreasePattern:
-    """The pattern with rails, its creases in their order and its sides named, or as it is where it has none."""
+    """The pattern with rails, its creases in their order and its sides named, or as it is where it has none.
+
+    Args:
+        pattern: drawn, with creases in any order and direction.
+    """
     lines = [sample(crease.curve) for crease in pattern.creases]
     closed = [crease.curve.closed for crease in pattern.creases]
     if not lines or any(corners(line, ring).any() for line, ring in zip(lines, closed, strict=True)):
@@ -89,8 +93,8 @@ def _across(pattern: CreasePattern, lines: list[Array]) -> CreasePattern:
     count = len(lines)
     one = [places[k] for k in around[:count]]  # up one side ...
     two = [places[k] for k in around[count:][::-1]]  # ... and down the other
-    first = _third_side(loop, two[0], one[0], size)
-    last = _third_side(loop, one[-1], two[-1], size)
+    first = _third_side(loop, two[0], one[0])
+    last = _third_side(loop, one[-1], two[-1])
     if first is None or last is None:
         return pattern
     rails_ = [first[::-1], *(_run(lines[k], loop, one[i]) for i, k in enumerate(order)), last]
@@ -121,10 +125,10 @@ def _stretch(loop: Any, start: float, end: float) -> Array:
     head = np.asarray(substring(loop, 0.0, end).coords)
     joined = np.vstack((tail, head)) if len(tail) > 1 and len(head) > 1 else (tail if len(tail) > 1 else head)
     keep = np.append(True, np.linalg.norm(np.diff(joined, axis=0), axis=1) > 1e-12 * loop.length)
-    return joined[keep]
+    return np.asarray(joined[keep])
 
 
-def _third_side(loop: Any, start: float, end: float, size: float) -> Array | None:
+def _third_side(loop: Any, start: float, end: float) -> Array | None:
     """Between the two corners of the piece of the outline beyond the first (or last) crease, or None."""
     piece = _stretch(loop, start, end)
     sharp = np.flatnonzero(corners(piece))
@@ -167,9 +171,11 @@ def _from_lower_left(pattern: CreasePattern, order: list[int], rails: list[Curve
         rails = [Line(r.end, r.start) if isinstance(r, Line) else Polyline(sample(r)[::-1]) for r in rails]
     start, end = np.stack([rail.point(ends) for rail in rails], axis=1)
     edges: tuple[tuple[str, Curve], ...] = (
-        ("inner", rails[0]), ("outer", rails[-1]),
-        ("start", curve_through(start)), ("end", curve_through(end)),
-    )  # fmt: skip
+        ("inner", rails[0]),
+        ("outer", rails[-1]),
+        ("start", curve_through(start)),
+        ("end", curve_through(end)),
+    )
     return _named(pattern, order, rails, edges)
 
 
@@ -189,6 +195,9 @@ def _named(
     ]
     groups.append(("edge:boundary", tuple(f"edge:{name}" for name, _ in edges)))
     return replace(
-        pattern, creases=tuple(creases), rails=tuple(rails), edges=edges,
+        pattern,
+        creases=tuple(creases),
+        rails=tuple(rails),
+        edges=edges,
         groups=tuple((name, members) for name, members in groups if members),
-    )  # fmt: skip
+    )

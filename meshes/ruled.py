@@ -25,11 +25,13 @@ LETTERS = {"mountain": "M", "valley": "V", "flat": "U"}
 def ruled(pattern: CreasePattern, rulings: Sequence[Array], spacing: float) -> SheetMesh:
     """Mesh a pattern along given rulings.
 
-    Args:
-        rulings: straight lines (2, 2) from crease or edge to crease or edge, mm; they must not cross.
-        spacing: creases and edges are cut into edges of about that length, mm, and at the ends of the rulings.
-
     The names are those of `meshes.io.read_fold`; `edge:flat` are the rulings.
+
+    Args:
+        pattern: of which edges and creases are cut.
+        rulings: straight lines (2, 2) from crease or edge to crease or edge, mm; they must not cross.
+        spacing: creases and edges are cut into edges of about that length, mm, and at the ends of the
+            rulings.
 
     Raises:
         MeshError: a spacing that cannot be, or lines that cross.

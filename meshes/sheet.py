@@ -21,15 +21,24 @@ from meshes.rails import curve_through, find_rails
 from meshes.topology import Ints
 
 CREASES: dict[str, tuple[str, FoldKind]] = {
-    "mountain": ("m", "mountain"), "valley": ("v", "valley"), "flat": ("f", "flat"),
-}  # fmt: skip
+    "mountain": ("m", "mountain"),
+    "valley": ("v", "valley"),
+    "flat": ("f", "flat"),
+}
 SIDES = 12  # with more corners than that the sides of an outline get no names
 NEARLY = 20.0  # times the gap: a crease that ends so near another line was perhaps meant to meet it
 
 
 @dataclass(frozen=True)
 class Region:
-    """The sheet within a graph: its polygon, the rings of nodes that bound it, and the edges inside it."""
+    """The sheet within a graph.
+
+    Attributes:
+        polygon: shapely's, mm.
+        rings: nodes round the outside, counter-clockwise, then round every hole.
+        inside: numbers of the edges inside the sheet.
+        remarks: what was taken for granted, one line each.
+    """
 
     polygon: Any
     rings: list[list[int]]
@@ -40,9 +49,13 @@ class Region:
 def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
     """The crease pattern of a drawing.
 
+    Args:
+        graph: healed, see `meshes.planar.heal`.
+        lines: that its edges belong to.
+
     Raises:
-        PatternError: the outline is open, is no boundary line, or there are two; a line leaves the sheet; a cut
-            lies inside it. One line, with the name of the line and the place.
+        PatternError: the outline is open, is no boundary line, or there are two; a line leaves the sheet; a
+            cut lies inside it. One line, with the name of the line and the place.
     """
     region = region_of(graph, lines)
     creases: list[Crease] = []
@@ -53,8 +66,10 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
     facets = [e for e in region.inside.tolist() if graph.kinds[e] in ("facet", *RIM)]
     facet_chains = _chains(graph, lines, facets, _met(graph, region.inside.tolist()))
     edges, sides = _edges(graph.points, region.rings)
-    groups = [("crease:" + fold, tuple("crease:" + c.name for c in creases if c.fold == fold))
-              for _, fold in CREASES.values()]  # fmt: skip
+    groups = [
+        ("crease:" + fold, tuple("crease:" + c.name for c in creases if c.fold == fold))
+        for _, fold in CREASES.values()
+    ]
     if sides:
         groups.append(("edge:boundary", sides))
     pattern = CreasePattern(
@@ -72,7 +87,7 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
 
 
 def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
-    """What the lines enclose; see `pattern_of`."""
+    """What the lines enclose; arguments and errors as for `pattern_of`."""
     import shapely
 
     segments = shapely.linestrings(graph.points[graph.edges])
@@ -90,12 +105,12 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
     number = {tuple(pair): e for e, pair in enumerate(np.sort(graph.edges, axis=1).tolist())}
     around = [[number[min(a, b), max(a, b)] for ring in face for a, b in _sides(ring)] for face in faces]
     keep = _without_holes(graph, around)
+    sheet_faces = [face for face, kept in zip(faces, keep, strict=True) if kept]
     polygon = shapely.union_all(
-        [shapely.Polygon(graph.points[face[0]], [graph.points[r] for r in face[1:]])
-         for face, kept in zip(faces, keep, strict=True) if kept]
-    )  # fmt: skip
-    used = np.bincount([e for at, kept in zip(around, keep, strict=True) if kept for e in at],
-                       minlength=len(graph.edges))  # fmt: skip
+        [shapely.Polygon(graph.points[face[0]], [graph.points[r] for r in face[1:]]) for face in sheet_faces]
+    )
+    sides = [e for at, kept in zip(around, keep, strict=True) if kept for e in at]
+    used = np.bincount(sides, minlength=len(graph.edges))
     if polygon.geom_type != "Polygon":
         spots = ", ".join(_at(part.representative_point().coords[0]) for part in polygon.geoms)
         raise PatternError(

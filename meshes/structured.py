@@ -1,7 +1,7 @@
 """Ruling-aligned meshes of patterns that have rails.
 
-Between two neighbouring rails lie `rows` rows of cells; node lines across the sheet are rulings. How the cells
-are cut into triangles decides the accuracy of bars and hinges (DESIGN.md, section 5):
+Between two neighbouring rails lie `rows` rows of cells; node lines across the sheet are rulings. How the cells are cut
+into triangles decides the accuracy of bars and hinges (docs/decisions.md):
 
 - "staggered": neighbouring node lines are shifted by half a cell, triangles are isosceles;
 - "alternating": right triangles, the diagonal turns from cell to cell and is mirrored across every node line;
@@ -12,6 +12,7 @@ are cut into triangles decides the accuracy of bars and hinges (DESIGN.md, secti
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -38,10 +39,14 @@ def structured(
     """Mesh a pattern with rails.
 
     Args:
+        pattern: with rails, see `CreasePattern.rails`.
         aspect_ratio: alpha = H / W, cell height across over width along the crease; decides `along`.
         along: number of cells along the crease (instead of `aspect_ratio`).
         rows: rows of cells between neighbouring rails.
         kind: how cells are cut, see the module.
+
+    Returns:
+        The mesh, with every node line along a rail or between two of them.
 
     Raises:
         MeshError: no rails, both or none of `aspect_ratio` and `along`, counts below one.
@@ -77,7 +82,7 @@ def structured(
     lines, panels = _node_lines(pattern, int(along), int(rows), staggered=kind == "staggered")
     points = np.vstack([line for line, _ in lines])
     triangles, first = _triangles(lines, panels, int(along), kind, pattern.closed)
-    spans = _spans(points, triangles, lines, first, pattern.closed)
+    spans = _spans(points, triangles, lines, pattern.closed)
     alpha = float(np.mean((heights / rows) / (widths / along)))
     edge_sets, corners = _named_sets(pattern, lines, first, rows)
     curves: dict[str, Curve] = {f"edge:{name}": curve for name, curve in pattern.edges}
@@ -170,7 +175,7 @@ def _triangles(
     lines: Lines, panels: list[int], along: int, kind: Kind, closed: bool
 ) -> tuple[Ints, list[int]]:
     """Triangles between the node lines, and the first node of each line."""
-    first = np.concatenate(([0], np.cumsum([len(u) for _, u in lines]))).astype(int).tolist()
+    first: list[int] = np.concatenate(([0], np.cumsum([len(u) for _, u in lines]))).astype(int).tolist()
     triangles: list[tuple[int, int, int]] = []
     for row, panel in enumerate(panels):
         (_, below), (_, above) = lines[row], lines[row + 1]
@@ -199,7 +204,9 @@ def _triangles(
     return array, first[:-1]
 
 
-def _zip(below: Array, above: Array, row: int, node, closed: bool) -> list[tuple[int, int, int]]:  # type: ignore[no-untyped-def]
+def _zip(
+    below: Array, above: Array, row: int, node: Callable[[int, int], int], closed: bool
+) -> list[tuple[int, int, int]]:
     """Join two node lines whose parameters interleave, always advancing the line that lags behind."""
     n, m = len(below), len(above)
     low = np.append(below, below[0] + 1.0) if closed else below
@@ -221,7 +228,7 @@ def _zip(below: Array, above: Array, row: int, node, closed: bool) -> list[tuple
     return triangles
 
 
-def _spans(points: Array, triangles: Ints, lines: Lines, first: list[int], closed: bool) -> Array:
+def _spans(points: Array, triangles: Ints, lines: Lines, closed: bool) -> Array:
     """(e, 2) extents of every edge along and across the rails, mm."""
     edges = build(triangles, len(points)).edges
     line_of = np.repeat(np.arange(len(lines)), [len(u) for _, u in lines])

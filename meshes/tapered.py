@@ -30,7 +30,7 @@ Chain = list[int]
 
 
 def tapers(pattern: CreasePattern) -> bool:
-    """True if the last rail begins and ends on the first one."""
+    """True if the last rail begins and ends on the first one, so that panels come to points."""
     if len(pattern.rails) < 2 or pattern.closed:
         return False
     ends = np.array([0.0, 1.0])
@@ -41,12 +41,20 @@ def tapers(pattern: CreasePattern) -> bool:
 def tapered_mesh(
     pattern: CreasePattern, along: int, rows: int, *, staggered: bool
 ) -> tuple[Array, Ints, list[Chain]]:
-    """Points (n, 2), triangles (t, 3) and the chain of nodes of every rail.
+    """Nodes and triangles of panels that come to points.
 
     Args:
+        pattern: one that `tapers`.
         along: columns of cells over the whole width.
         rows: of cells in every panel where it is high enough.
-        staggered: neighbouring lines are shifted by half a cell; otherwise nodes of all lines lie on common columns.
+        staggered: neighbouring lines are shifted by half a cell; otherwise nodes of all lines lie on common
+            columns.
+
+    Returns:
+        Points (n, 2) in mm, triangles (t, 3), and the chain of nodes of every rail.
+
+    Raises:
+        MeshError: rails that end inside one another or turn back, or that are too close for their chords.
     """
     rails = [_Graph(rail) for rail in pattern.rails]
     ends = [rail.reach for rail in rails]
@@ -103,7 +111,7 @@ class _Nodes:
 
 
 def _columns(rails: list[_Graph], along: int) -> tuple[Array, Array]:
-    """x of the columns, and of those between them, from one end of the first rail to the other."""
+    """The x of the columns, and of those between them, from one end of the first rail to the other."""
     first, last = rails[0], rails[-1]
     turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 4001)
     x = 0.5 * (first.left + first.right) + 0.5 * first.reach * np.sin(turn)
@@ -266,7 +274,7 @@ def _badness(a: Array, b: Array, c: Array) -> Array:
 
 
 def smallest_angles(points: Array, triangles: Ints) -> Array:
-    """(t,) smallest angle of every triangle, rad; points (n, 2 or 3)."""
+    """(t,) smallest angle of every triangle (t, 3), rad; points (n, 2 or 3) in any unit."""
     corner = points[triangles]
     angles = []
     for k in range(3):

@@ -67,6 +67,10 @@ class Topology:
 def build(triangles: Ints, nodes: int) -> Topology:
     """Topology of (t, 3) `triangles` on `nodes` nodes.
 
+    Args:
+        triangles: (t, 3) node numbers.
+        nodes: how many nodes there are.
+
     Raises:
         MeshError: an index is out of range, a triangle repeats a node, an edge has more than two triangles
             (non-manifold) or neighbouring triangles are oriented against each other.
@@ -121,7 +125,15 @@ def build(triangles: Ints, nodes: int) -> Topology:
 
 
 def dihedral_angles(points: NDArray[np.float64], hinges: Ints) -> NDArray[np.float64]:
-    """(m,) dihedral angles of `hinges` (m, 4) with nodes at `points` (n, 3), rad in [0, 2 pi); flat is pi exactly."""
+    """(m,) dihedral angles of `hinges` (m, 4) with nodes at `points` (n, 3), rad in [0, 2 pi); flat is pi exactly.
+
+    Args:
+        points: (n, 3) node positions, in any unit.
+        hinges: (m, 4) rows (wing, edge, edge, wing).
+
+    Returns:
+        (m,) angles on the side away from the triangles' normals, rad in [0, 2 pi); flat is pi exactly.
+    """
     wing, tail, head, other = (points[hinges[:, k]] for k in range(4))
     edge = head - tail
     one, two = np.cross(edge, wing - tail), np.cross(other - tail, edge)
@@ -132,6 +144,9 @@ def dihedral_angles(points: NDArray[np.float64], hinges: Ints) -> NDArray[np.flo
 
 def boundary_loops(topology: Topology) -> list[Ints]:
     """The boundary as closed loops of nodes, longest first.
+
+    Returns:
+        Node numbers of every loop; the last one is joined to the first.
 
     Raises:
         MeshError: the boundary touches itself at a node, so that loops cannot be told apart.

@@ -23,9 +23,11 @@ from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.planar import corners
 from meshes.topology import Ints
 
-Faces = list[
-    tuple[list[list[int]], list[tuple[int, int]]]
-]  # of every face: its loops of nodes, and edges inside
+# of every face: its loops of nodes, and edges inside
+Faces = list[tuple[list[list[int]], list[tuple[int, int]]]]
+
+# gmsh is silent, gives the same mesh on every machine, and meshes fronts by the algorithm Frontal-Delaunay
+OPTIONS = (("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.Algorithm", 6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,10 @@ class Sizes:
     """Wanted edge length at any point: the smallest of `largest` and, for every line, its own plus growth x distance.
 
     Attributes:
-        largest: mm; near: names of lines and their lengths, mm; lines: shapely geometries of these; growth: mm a mm.
+        largest: edge length away from all lines, mm.
+        near: names of lines and the edge lengths on them, mm.
+        lines: shapely geometries of these, by name.
+        growth: of the edge length away from a line, mm a mm.
     """
 
     largest: float
@@ -52,7 +57,14 @@ class Sizes:
         return out
 
     def divide(self, curve: Curve, a: float, b: float, least: int = 1) -> list[float]:
-        """Parameters after `a` up to `b` that cut this part of a curve into edges of the wanted lengths."""
+        """Parameters after `a` up to `b` that cut this part of a curve into edges of the wanted lengths.
+
+        Args:
+            curve: the curve.
+            a: parameter in [0, 1] where the part begins.
+            b: parameter in [0, 1] where it ends.
+            least: number of edges at least.
+        """
         u = np.linspace(a, b, 257 if self.near else 2)
         density = curve.length / self.at(curve.point(u))
         count = np.concatenate(([0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(u))))
@@ -72,14 +84,18 @@ def unstructured(
     """Mesh a pattern with triangles of edge length about `size` (mm).
 
     Args:
+        pattern: with named boundary curves that enclose the sheet.
         size: wanted edge length; shorter where curves meet.
         near: shorter edge lengths at named creases and edges, mm: {"crease:crease": 1.0, "edge:start": 2.0}.
         growth: how fast the edge length grows away from these, mm a mm.
         seed: of gmsh's own small random shifts; the same seed gives the same mesh.
 
+    Returns:
+        The mesh, of kind "gmsh", with nodes exactly on creases and edges.
+
     Raises:
-        MeshError: a size that cannot be, a name that the pattern has not, an outline that its named edges do not make
-            up, or gmsh failed.
+        MeshError: a size that cannot be, a name that the pattern has not, an outline that its named edges do
+            not make up, or gmsh failed.
     """
     if not isinstance(pattern, CreasePattern):
         raise MeshError(
@@ -135,7 +151,7 @@ def _sizes(curves: dict[str, Curve], size: float, near: dict[str, float], growth
 
 
 def sheet_area(pattern: CreasePattern) -> float:
-    """Area of the flat sheet inside its outline, mm^2."""
+    """Area of the flat sheet inside its outline, without its holes, mm^2."""
     import shapely
 
     return float(shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).area)
@@ -154,8 +170,10 @@ def _chains(curves: dict[str, Curve], sizes: Sizes) -> tuple[Array, dict[str, In
         for a, b in pairwise(breaks):
             u += sizes.divide(curve, a, b, least=3 if curve.closed and len(breaks) == 2 else 1)
         fixed = set(breaks)
-        nodes = [_node(points, joints, at, near) if value in fixed else _new(points, at)
-                 for value, at in zip(u, curve.point(np.array(u)), strict=True)]  # fmt: skip
+        nodes = [
+            _node(points, joints, at, near) if value in fixed else _new(points, at)
+            for value, at in zip(u, curve.point(np.array(u)), strict=True)
+        ]
         chains[name] = np.column_stack((nodes[:-1], nodes[1:]))
     return np.array(points), chains
 
@@ -269,8 +287,7 @@ def _fill(
     broken_pipe = _BrokenPipe()
     gmsh.initialize(argv=["", "-v", "0"], readConfigFiles=False, interruptible=False)
     try:
-        for name, value in (("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.Algorithm", 6),
-                            ("Mesh.RandomSeed", seed), ("Mesh.MeshSizeMax", 1.15 * sizes.largest)):  # fmt: skip
+        for name, value in (*OPTIONS, ("Mesh.RandomSeed", seed), ("Mesh.MeshSizeMax", 1.15 * sizes.largest)):
             gmsh.option.setNumber(name, value)
         gmsh.model.add("sheet")
         wanted = sizes.at(points)
@@ -314,8 +331,10 @@ def _fill(
 
 
 class _BrokenPipe:
-    """How this process takes a broken pipe, kept from gmsh, which has SIGPIPE end the process without a word: a
-    sweep of which one worker dies would go down with it. Python's `signal` would do in the main thread only.
+    """How this process takes a broken pipe, kept from gmsh.
+
+    gmsh has SIGPIPE end the process without a word: a sweep of which one worker dies would go down with it. Python's
+    `signal` would do in the main thread only.
     """
 
     def __init__(self) -> None:

@@ -13,21 +13,11 @@ from typing import Any
 from bh.plotting import interactive
 from meshes.errors import FileFormatError
 from meshes.io.export import replacing
-from reports import words
+from reports import formatting
 from reports.changes import MOST, changes
 from reports.claims import Claim, claims, claims_csv
 from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
-from reports.records import (
-    Case,
-    CaseInfo,
-    Frames,
-    Results,
-    known_cases,
-    read,
-    schema,
-    shortfall,
-    validated,
-)
+from reports.records import Case, CaseInfo, Frames, Results, known_cases, read, schema, shortfall, validated
 from verification.framework.chapters import CHAPTERS, OTHER, Chapter, chapter_of
 
 SOURCE = (
@@ -51,6 +41,7 @@ class Page:
 
     @property
     def file(self) -> str:
+        """Its name beside the other chapters."""
         return f"{self.chapter.page}.html"
 
     @property
@@ -61,6 +52,7 @@ class Page:
 
     @property
     def scenes(self) -> bool:
+        """Whether it has sheets to be turned."""
         return any(case.scenes for case in self.cases)
 
 
@@ -116,6 +108,7 @@ class Site:
     """
 
     def __init__(self, folder: Path, chapters: str, front: str, *, whole: bool = False) -> None:
+        """Read the results of a folder; `ReportError` where they are missing or not valid."""
         self.whole, self.chapters, self.front = whole, chapters, front
         self.results = read(folder / "checks.json")
         self.cases = _cases(self.results, folder)
@@ -128,6 +121,7 @@ class Site:
 
     @property
     def scenes(self) -> bool:
+        """Whether any page has sheets to be turned."""
         return any(page.scenes for page in self.pages)
 
     def _page(self, chapter: Chapter) -> Page:
@@ -149,7 +143,7 @@ class Site:
                 source=SOURCE,
                 shortfall=shortfall(self.results),
                 others=_others(self.results),
-                date=words.date(self.results.date),
+                date=formatting.date(self.results.date),
                 seeds=_seeds(every),
                 machine=_machine(self.results.machine),
                 style=(TEMPLATES / "style.css").read_text(encoding="utf-8") + interactive.style(),
@@ -193,10 +187,15 @@ def _environment(link: Callable[[str, str], str]) -> Any:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "number": words.number, "share": words.share, "seconds": words.seconds, "plain": typeset, "date": words.date,
+        "number": formatting.number,
+        "share": formatting.share,
+        "seconds": formatting.seconds,
+        "plain": typeset,
+        "date": formatting.date,
         "unlike": lambda params, common: {key: v for key, v in params.items() if key not in common},
-        "text": lambda text: Markup(markup(text)), "params": lambda given: Markup(words.params(given)),
-    }  # fmt: skip
+        "text": lambda text: Markup(markup(text)),
+        "params": lambda given: Markup(formatting.params(given)),
+    }
     environment.globals["link"] = link
     return environment
 
@@ -221,7 +220,7 @@ def _others(results: Results) -> list[tuple[str, str]]:
     for info in results.cases:
         if info.date in (None, results.date):
             continue
-        told = [words.date(info.date or "")]
+        told = [formatting.date(info.date or "")]
         versions = results.versions if info.versions is None else info.versions
         for key, value in versions.items():
             if results.versions.get(key, value) != value:

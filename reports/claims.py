@@ -29,6 +29,7 @@ class Claim:
 
     @property
     def place(self) -> str:
+        """Where the source says it: chapter, figure, equation."""
         return (self.check.source or "").removeprefix(PREFIX).partition(": ")[0]
 
     @property
@@ -48,6 +49,7 @@ class Claim:
 
     @property
     def verdict(self) -> str:
+        """One of "holds", "differs" and "reported"."""
         return {True: "holds", False: "differs", None: "reported"}[self.check.passed]
 
 
@@ -70,17 +72,46 @@ def claims(cases: Iterable[Case]) -> list[Claim]:
 def claims_csv(found: Iterable[Claim]) -> str:
     """Link to the table as CSV."""
     rows: list[list[Any]] = [
-        ["case", "place", "claim", "quantity", "published", "ours", "error bar", "unit", "error", "tolerance",
-         "verdict", "of records", "unknowns", "wall_time_s", "command"]
-    ]  # fmt: skip
+        [
+            "case",
+            "place",
+            "claim",
+            "quantity",
+            "published",
+            "ours",
+            "error bar",
+            "unit",
+            "error",
+            "tolerance",
+            "verdict",
+            "of records",
+            "unknowns",
+            "wall_time_s",
+            "command",
+        ]
+    ]
     for claim in found:
         check = claim.check
         quick = " --quick" if claim.case.info.quick else ""
         rows.append(
-            [claim.case.name, claim.place, claim.words, check.quantity, check.reference, check.value, check.bar,
-             check.unit, check.error, check.tolerance, claim.verdict, claim.count, check.unknowns,
-             check.wall_time_s, f"bh verify {claim.case.name}{quick}"]
-        )  # fmt: skip
+            [
+                claim.case.name,
+                claim.place,
+                claim.words,
+                check.quantity,
+                check.reference,
+                check.value,
+                check.bar,
+                check.unit,
+                check.error,
+                check.tolerance,
+                claim.verdict,
+                claim.count,
+                check.unknowns,
+                check.wall_time_s,
+                f"bh verify {claim.case.name}{quick}",
+            ]
+        )
     return csv_link(rows)
 
 

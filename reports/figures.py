@@ -93,10 +93,21 @@ def svg(plot: Plot, prefix: str) -> str:
     from matplotlib.figure import Figure
 
     settings: Any = {
-        "svg.fonttype": "none", "svg.hashsalt": prefix, "font.size": 12.0, "text.color": INK, "axes.edgecolor": SOFT,
-        "axes.labelcolor": INK, "axes.linewidth": 0.8, "xtick.color": SOFT, "ytick.color": SOFT, "grid.color": RULE,
-        "xtick.labelcolor": INK, "ytick.labelcolor": INK, "text.parse_math": False, "axes.unicode_minus": True,
-    }  # fmt: skip
+        "svg.fonttype": "none",
+        "svg.hashsalt": prefix,
+        "font.size": 12.0,
+        "text.color": INK,
+        "axes.edgecolor": SOFT,
+        "axes.labelcolor": INK,
+        "axes.linewidth": 0.8,
+        "xtick.color": SOFT,
+        "ytick.color": SOFT,
+        "grid.color": RULE,
+        "xtick.labelcolor": INK,
+        "ytick.labelcolor": INK,
+        "text.parse_math": False,
+        "axes.unicode_minus": True,
+    }
     with rc_context(settings):
         figure = Figure(figsize=(WIDTH / 72.0, HEIGHT / 72.0), layout="constrained")
         axes = figure.subplots()
@@ -156,11 +167,7 @@ def picture_link(file: Path) -> tuple[str, int, int]:
         shown = shown.resize((WIDEST, round(shown.height * WIDEST / shown.width)), Image.Resampling.LANCZOS)
     sink = io.BytesIO()
     shown.save(sink, "WEBP", quality=90, method=6)
-    return (
-        "data:image/webp;base64," + base64.b64encode(sink.getvalue()).decode(),
-        shown.width,
-        shown.height,
-    )
+    return ("data:image/webp;base64," + base64.b64encode(sink.getvalue()).decode(), shown.width, shown.height)
 
 
 # --- drawing --------------------------------------------------------------------------------------------------
@@ -204,7 +211,7 @@ def _draw(axes: Axes, plot: Plot) -> None:
 
 
 def _values(values: Sequence[float | None], log: bool) -> list[float]:
-    """nan where there is nothing to draw."""
+    """Values to draw, nan where there is nothing to draw."""
     return [math.nan if v is None or (log and v <= 0.0) else float(v) for v in values]
 
 
@@ -304,6 +311,7 @@ def markup(text: str) -> str:
 
 
 def superscript(number: int) -> str:
+    """A whole number as superscript characters."""
     return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
@@ -313,7 +321,7 @@ def scientific(mantissa: str, power: int) -> str:
 
 
 def _inline(text: str, plot: Plot, prefix: str) -> str:
-    """matplotlib's file as an element: no prolog, no name spaces, ids of its own, the page's colours and font."""
+    """The file of matplotlib as an element: no prolog, no name spaces, ids of its own, the page's colours and font."""
     body = text[text.index("<svg") :]
     body = body[body.index(">") + 1 :]
     body = re.sub(r"<(metadata|style)\b.*?</\1>|<!--.*?-->", "", body, flags=re.DOTALL)

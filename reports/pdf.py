@@ -42,10 +42,21 @@ def print_report(results_folder: Path, out_file: Path) -> Path:
             # root may start it only without its sandbox; the page has no scripts
             alone = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
             done = subprocess.run(
-                [program, "--headless", *alone, "--disable-gpu", f"--user-data-dir={scratch}/profile",
-                 "--no-pdf-header-footer", f"--print-to-pdf={pdf}", html.as_uri()],
-                capture_output=True, text=True, timeout=SECONDS, check=False,
-            )  # fmt: skip
+                [
+                    program,
+                    "--headless",
+                    *alone,
+                    "--disable-gpu",
+                    f"--user-data-dir={scratch}/profile",
+                    "--no-pdf-header-footer",
+                    f"--print-to-pdf={pdf}",
+                    html.as_uri(),
+                ],
+                capture_output=True,
+                text=True,
+                timeout=SECONDS,
+                check=False,
+            )
             if not pdf.is_file():
                 told = done.stderr.strip().splitlines()
                 raise ReportError(

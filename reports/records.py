@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,32 +9,18 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.dataclasses import dataclass as validated_dataclass
 
 from reports.figures import Plot, ReportError, csv_link
+from verification.framework.records import Record
 
 REACHED = "reached"  # the outcome of a record that has a value; others say why there is none
 VERDICTS = ("holds", "reported", "differs")  # from the best to the worst
 
 
-class Check(BaseModel):
-    """One record: a figure, its reference, and how far they may be apart. `error` is relative, or absolute to 0."""
-
-    model_config = ConfigDict(strict=True)
-
-    case: str
-    quantity: str
-    params: dict[str, Any] = {}
-    value: float | None
-    unit: str = ""
-    reference: float | None = None
-    source: str | None = None
-    error: float | None = None
-    tolerance: float | None = None
-    passed: bool | None
-    unknowns: float | None = None
-    iterations: float | None = None
-    wall_time_s: float | None = None
-    outcome: str = REACHED
+@validated_dataclass(frozen=True, kw_only=True, config=ConfigDict(strict=True))
+class Check(Record):
+    """One stored record, and what the report reads off it."""
 
     @property
     def use(self) -> float:
@@ -54,6 +39,7 @@ class Check(BaseModel):
 
     @property
     def result(self) -> str:
+        """In words: "pass", "failed" with the outcome where that is why, or "reported"."""
         if self.passed is None:
             return "reported"
         if self.passed:
@@ -160,10 +146,12 @@ class Case:
 
     @property
     def name(self) -> str:
+        """As `bh verify` takes it."""
         return self.info.name
 
     @property
     def title(self) -> str:
+        """Its heading; the name where the case says none."""
         return self.info.title or self.name
 
     @property
@@ -172,10 +160,12 @@ class Case:
         return "case-" + "".join(letter if letter.isalnum() else "-" for letter in self.name)
 
     def count(self, passed: bool | None) -> int:
+        """How many records are passed (True), failed (False) or reported only (None)."""
         return sum(check.passed is passed for _, check in self.checks)
 
     @property
     def judged(self) -> int:
+        """How many records have a tolerance or did not reach their target."""
         return self.count(True) + self.count(False)
 
     @property
@@ -217,8 +207,20 @@ class Case:
     @property
     def csv(self) -> str:
         """Link to all records as CSV."""
-        names = ("quantity", "value", "unit", "reference", "error", "tolerance", "passed", "unknowns", "iterations",
-                 "wall_time_s", "outcome", "source")  # fmt: skip
+        names = (
+            "quantity",
+            "value",
+            "unit",
+            "reference",
+            "error",
+            "tolerance",
+            "passed",
+            "unknowns",
+            "iterations",
+            "wall_time_s",
+            "outcome",
+            "source",
+        )
         keys = list(dict.fromkeys(key for _, check in self.checks for key in check.params))
         rows: list[list[Any]] = [[*names, *keys]]
         for _, check in self.checks:
@@ -273,13 +275,11 @@ def validated(model: type[Stored], text: str, name: str) -> Stored:
         ReportError: not JSON, or not of this form; names the file and the entry.
     """
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ReportError(f"'{name}' is not JSON; run `bh verify` again") from error
-    try:
-        return model.model_validate(data)
+        return model.model_validate_json(text)
     except ValidationError as error:
         first = error.errors()[0]
+        if first["type"] == "json_invalid":
+            raise ReportError(f"'{name}' is not JSON; run `bh verify` again") from error
         place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"])
         entry = place.lstrip(".") or "the file"
         raise ReportError(f"'{name}': {entry}: {first['msg'].lower()}; run `bh verify` again") from error

@@ -104,7 +104,16 @@ def _binary(place: FilePath, suffix: str) -> Array:
 
 
 def checked(points: ArrayLike, name: str, least: int = 1) -> Array:
-    """Finite points (k, 3), at least so many."""
+    """Finite points (k, 3), at least so many.
+
+    Args:
+        points: (k, 3), mm.
+        name: of them, for messages.
+        least: how many there have to be.
+
+    Raises:
+        ScanError: another shape, too few, or not finite.
+    """
     try:
         found = np.array(points, dtype=float)
     except (TypeError, ValueError):
@@ -124,7 +133,12 @@ def checked(points: ArrayLike, name: str, least: int = 1) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """x -> rotation x + translation; a proper rotation (3, 3) and a translation (3,), mm."""
+    """A proper rigid motion x -> rotation x + translation.
+
+    Attributes:
+        rotation: (3, 3).
+        translation: (3,), mm.
+    """
 
     rotation: Array
     translation: Array
@@ -139,6 +153,7 @@ class Motion:
         return Motion(self.rotation @ first.rotation, self.apply(first.translation))
 
     def inverse(self) -> Motion:
+        """The motion back."""
         return Motion(self.rotation.T, -self.rotation.T @ self.translation)
 
     @property
@@ -150,7 +165,13 @@ class Motion:
 
     @classmethod
     def about(cls, centre: ArrayLike, rotation_vector: ArrayLike, translation: ArrayLike) -> Motion:
-        """Rotation by a vector (rad) about a centre, then a translation."""
+        """Rotation about a centre, then a translation.
+
+        Args:
+            centre: (3,), mm.
+            rotation_vector: (3,) axis times angle, rad.
+            translation: (3,), mm.
+        """
         from scipy.spatial.transform import Rotation
 
         R = Rotation.from_rotvec(np.asarray(rotation_vector, dtype=float)).as_matrix()
@@ -162,7 +183,12 @@ IDENTITY = Motion(np.eye(3), np.zeros(3))
 
 
 def align(points: ArrayLike, targets: ArrayLike, names: tuple[str, str] = ("points", "targets")) -> Motion:
-    """The rigid motion of `points` (k, 3) that brings them nearest to `targets` (k, 3), row by row (Kabsch 1976).
+    """The rigid motion that brings points nearest to targets, row by row (Kabsch 1976).
+
+    Args:
+        points: (k, 3), mm.
+        targets: (k, 3), mm.
+        names: of both, for messages.
 
     Raises:
         ScanError: fewer than three, not as many, not finite, or on one line.
@@ -181,9 +207,13 @@ def align(points: ArrayLike, targets: ArrayLike, names: tuple[str, str] = ("poin
 
 
 def picked(on_cloud: ArrayLike, on_sheet: ArrayLike) -> Motion:
-    """First guess from three or more points picked on the scan (k, 3) and the same ones of the sheet (k, 3).
+    """Initial guess from three or more points picked on the scan (k, 3) and the same ones of the sheet (k, 3).
 
     Corners and ends of creases serve best: `state.points[state.mesh.corners["corner:inner-start"]]`.
+
+    Args:
+        on_cloud: (k, 3) on the scan, mm.
+        on_sheet: (k, 3) the same places of the sheet, mm.
 
     Raises:
         ScanError: fewer than three, not finite, or on one line.

@@ -71,7 +71,7 @@ class Panels:
         return cls(labels, tuple(tuple(names[k] for k in sorted(found)) for found in bounding))
 
     def name(self, panel: int) -> str:
-        """ "panel 2 (between crease-1 and crease-2)", "panel 0 (at crease)", "panel 0" """
+        """A panel in words: "panel 2 (between crease-1 and crease-2)", "panel 0 (at crease)", "panel 0"."""
         creases = self.creases[panel]
         if not creases:
             return f"panel {panel}"
@@ -88,7 +88,9 @@ class Contact:
     """Self-contact in a state of a path.
 
     Attributes:
-        state: index of the state; `step` and `lam` where that is.
+        state: index of the state.
+        step: number of its step.
+        lam: lambda of the state.
         triangles: (k, 2) pairs of triangles that intersect, the lower one first.
         panels: pairs of panels that they belong to, in words, without repetition.
     """
@@ -141,7 +143,9 @@ def seen_once(points: Array, triangles: Ints, loops: Iterable[Ints]) -> bool:
     which. The same idea as for the self-collision of cloth (Volino and Magnenat Thalmann 1994).
 
     Args:
-        points: (n, 3), mm; triangles: (t, 3); loops: boundary loops of node indices.
+        points: (n, 3), mm.
+        triangles: (t, 3).
+        loops: boundary loops of node indices.
 
     Returns:
         True for a sheet that is proven free of self-contact; False means nothing.
@@ -166,7 +170,16 @@ def seen_once(points: Array, triangles: Ints, loops: Iterable[Ints]) -> bool:
 
 
 def candidates(points: Array, triangles: Ints, margin: float = 0.0) -> Ints:
-    """(k, 2) pairs of triangles whose boxes, wider by `margin` (mm), meet; the lower one first."""
+    """(k, 2) pairs of triangles whose boxes, wider by `margin` (mm), meet; the lower one first.
+
+    Args:
+        points: (n, 3), mm.
+        triangles: (t, 3).
+        margin: mm.
+
+    Returns:
+        (k, 2) pairs of triangles whose boxes, wider by the margin, meet; the lower one first.
+    """
     import shapely
 
     corners = points[triangles]
@@ -212,4 +225,4 @@ class _Detector:
         tolerance = TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
         found = candidates(points, triangles, tolerance)
         found = found[intersecting(points, triangles, found, tolerance)]
-        return found[np.lexsort((found[:, 1], found[:, 0]))]
+        return np.asarray(found[np.lexsort((found[:, 1], found[:, 0]))])

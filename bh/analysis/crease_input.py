@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,15 +13,31 @@ from bh.errors import ModelError
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], ArrayLike]
-Given = (
-    Function | ArrayLike | Any
-)  # any: symbolic expressions of a library that is only loaded by who uses it
 
 
-def parameters(
-    given: Given, u: ArrayLike | None, interval: tuple[float, float] | None, samples: int
-) -> Array:
-    """(k,) rising parameters: those that are given, or even ones on the interval."""
+@runtime_checkable
+class Symbolic(Protocol):
+    """An expression of sympy, which is only loaded by who uses it."""
+
+    @property
+    def free_symbols(self) -> object:
+        """The symbols in it."""
+
+
+Given = Function | ArrayLike | Symbolic | Sequence[Symbolic]
+
+
+def parameters(u: ArrayLike | None, interval: tuple[float, float] | None, samples: int) -> Array:
+    """(k,) rising parameters: those that are given, or even ones on the interval.
+
+    Args:
+        u: (k,) parameters that are given, or None.
+        interval: first and last parameter, where they are not.
+        samples: how many are taken on the interval.
+
+    Raises:
+        ModelError: too few, not rising or not finite, or neither of the two is given.
+    """
     if u is not None:
         at = np.asarray(u, dtype=float)
         if at.ndim != 1 or len(at) < 8 or not np.isfinite(at).all() or not (np.diff(at) > 0.0).all():
@@ -46,6 +62,14 @@ def derivatives(
 
     Symbolic expressions (sympy's) are differentiated exactly; functions and samples by `method`.
 
+    Args:
+        what: is given, for messages.
+        given: function of u (k,), expressions of sympy, or samples.
+        u: (k,) rising parameters.
+        columns: numbers for each of them.
+        method: differentiates functions and samples.
+        highest: order of the derivatives.
+
     Raises:
         ModelError: values that are not finite or do not fit.
     """
@@ -69,16 +93,16 @@ def derivatives(
     return method.derivatives(u, values, u, highest)
 
 
-def _expressions(given: Given) -> list[Any] | None:
+def _expressions(given: Given) -> list[object] | None:
     """The single expressions of something symbolic, or None."""
-    if hasattr(given, "free_symbols"):
+    if isinstance(given, Symbolic):
         return [given]
-    if not isinstance(given, Sequence) or not any(hasattr(item, "free_symbols") for item in given):
+    if not isinstance(given, Sequence) or not any(isinstance(item, Symbolic) for item in given):
         return None
     return list(given)
 
 
-def _symbolic(what: str, items: list[Any], u: Array, highest: int) -> Array:
+def _symbolic(what: str, items: list[object], u: Array, highest: int) -> Array:
     from sympy import Symbol, lambdify, sympify
 
     expressions = [sympify(item) for item in items]

@@ -30,9 +30,15 @@ STRAIGHT = (
 PADDING = 4  # samples that a closed crease is continued by at its seam
 
 __all__ = [
-    "CreaseCurve", "CreaseProfile", "FiniteDifferences", "Generators", "SmoothingSpline", "along", "curve_of",
+    "CreaseCurve",
+    "CreaseProfile",
+    "FiniteDifferences",
+    "Generators",
+    "SmoothingSpline",
+    "along",
+    "curve_of",
     "panel_generators",
-]  # fmt: skip
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +46,16 @@ class CreaseCurve:
     """A sampled space curve and its Frenet frame.
 
     Attributes:
-        u: (k,) parameters, mm; points: (k, 3), mm.
+        u: (k,) parameters, mm.
+        points: (k, 3), mm.
         speed: (k,) s = |c'| (A.3): 1 + strain where u is the flat length.
-        tangent, normal, binormal: (k, 3) unit vectors t, n, b (A.4). Where the curve is straight n and b are those of
-            the nearest curved place, turned into the plane across t.
-        curvature: (k,) kappa >= 0, 1/mm (A.6); torsion: (k,) tau, 1/mm (A.7), positive for a right-handed helix.
-            Where the curve is straight torsion has no value of its own and is interpolated (0 if it is straight
-            throughout).
+        tangent: (k, 3) unit vectors t (A.4).
+        normal: (k, 3) unit vectors n. Where the curve is straight n and b are those of the nearest curved
+            place, turned into the plane across t.
+        binormal: (k, 3) unit vectors b.
+        curvature: (k,) kappa >= 0, 1/mm (A.6).
+        torsion: (k,) tau, 1/mm (A.7), positive for a right-handed helix. Where the curve is straight torsion
+            has no value of its own and is interpolated (0 if it is straight throughout).
         one_sided: (k,) True where no centred stencil fits: three nodes at either end, where the end error of
             finite differences is to be expected.
     """
@@ -67,8 +76,10 @@ class CreaseProfile:
     """A crease of a solved sheet, at its nodes.
 
     Attributes:
-        crease: its name; curve: the folded crease with u measured in the flat sheet.
-        up, left: (k, 3) unit vectors: between the upper normals of both panels, and across the crease to the left.
+        crease: its name.
+        curve: the folded crease with u measured in the flat sheet.
+        up: (k, 3) unit vectors between the upper normals of both panels.
+        left: (k, 3) unit vectors across the crease to the left.
         signed_curvature: (k,) curvature, negative where the crease turns to the right, 1/mm.
         flat_curvature: (k,) kappa_0 of the crease in the flat sheet, signed alike, 1/mm.
         dihedral: (k,) phi, rad, from its values on the edges by the same differentiation.
@@ -121,10 +132,14 @@ def along(state: State, crease: str, method: Differentiation | None = None) -> C
     """Curvature, torsion, frames, fold angle and fold rate along a crease of a solved state.
 
     Args:
+        state: of a path, or of the shell.
+        crease: its name.
         method: `FiniteDifferences()` of fourth order, as the source, or a `SmoothingSpline()`.
 
     Raises:
-        MeshError: no such crease; InputError: it has too few nodes (7); ModelError: it branches.
+        MeshError: no such crease.
+        InputError: it has too few nodes (7).
+        ModelError: it branches.
     """
     method = method or FiniteDifferences()
     mesh = state.mesh
@@ -164,9 +179,12 @@ def curve_of(
     Args:
         points: (k, 3) or (k, 2), mm; of a closed one the last is the first again.
         u: (k,) rising parameters; by default the length of the chords.
+        method: `FiniteDifferences()` of fourth order, as the source, or a `SmoothingSpline()`.
+        closed: the curve closes smoothly at its ends.
 
     Raises:
-        InputError: fewer than 7 points; ModelError: arrays that do not fit.
+        InputError: fewer than 7 points.
+        ModelError: arrays that do not fit.
     """
     method = method or FiniteDifferences()
     x = np.asarray(points, dtype=float)

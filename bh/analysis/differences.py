@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import InputError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 Array = NDArray[np.float64]
 EVEN = 1e-6  # steps that differ by less, relatively, count as equal
@@ -24,10 +27,16 @@ class Differentiation(Protocol):
     """A way to differentiate samples."""
 
     def derivatives(self, u: Array, values: Array, at: Array, highest: int) -> Array:
-        """(highest + 1, len(at), c): the function itself and its derivatives at the parameters `at`.
+        """The function itself and its derivatives at some parameters.
 
         Args:
-            u: (k,) rising parameters of the samples; values: (k, c).
+            u: (k,) rising parameters of the samples.
+            values: (k, c) samples.
+            at: (a,) parameters.
+            highest: order of the derivatives, up to 3.
+
+        Returns:
+            (highest + 1, a, c), in the unit of the samples over powers of that of the parameters.
         """
         ...
 
@@ -43,6 +52,11 @@ class FiniteDifferences:
     """
 
     def derivatives(self, u: Array, values: Array, at: Array, highest: int) -> Array:
+        """See `Differentiation.derivatives`.
+
+        Raises:
+            InputError: too few samples for the highest derivative.
+        """
         if len(u) < (needed := UNEVEN[highest]):
             raise InputError(
                 f"{len(u)} points give no derivative of order {highest}; give at least {needed}, by more cells"
@@ -51,7 +65,7 @@ class FiniteDifferences:
 
     def _derivative(self, u: Array, values: Array, at: Array, order: int) -> Array:
         rows, weights = stencils(u, at, CENTRED[order], order)
-        out = np.einsum("ap,apc->ac", weights, values[rows])
+        out: Array = np.einsum("ap,apc->ac", weights, values[rows])
         if UNEVEN[order] != CENTRED[order]:
             loose = ~_even(u, at, rows)
             if loose.any():
@@ -64,6 +78,12 @@ def stencils(u: Array, at: Array, count: int, order: int) -> tuple[NDArray[np.in
     """The `count` samples nearest to each place, (a, count), and the weights of the derivative there.
 
     Weights are those of the polynomial through the samples (Fornberg 1988).
+
+    Args:
+        u: (k,) rising parameters of the samples.
+        at: (a,) parameters.
+        count: samples of a stencil.
+        order: of the derivative.
     """
     middle = np.interp(at, u, np.arange(len(u)))
     first = np.clip(np.ceil(middle - 0.5 * count - 1e-9).astype(np.int64), 0, len(u) - count)
@@ -85,7 +105,13 @@ def _even(u: Array, at: Array, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def one_sided(u: Array, at: Array, order: int = 3) -> NDArray[np.bool_]:
-    """(a,) where no centred stencil for that derivative fits: there the end error is to be expected."""
+    """(a,) where no centred stencil for that derivative fits: there the end error is to be expected.
+
+    Args:
+        u: (k,) rising parameters of the samples.
+        at: (a,) parameters.
+        order: of the derivative.
+    """
     rows, _ = stencils(u, at, CENTRED[order], order)
     middle = np.interp(at, u, np.arange(len(u)))
     return np.asarray(np.abs(rows.mean(axis=1) - middle) > 0.75)
@@ -106,12 +132,18 @@ class SmoothingSpline:
     deviation: float | None = None
 
     def __post_init__(self) -> None:
+        """Check the deviation."""
         if self.deviation is not None and not (math.isfinite(self.deviation) and self.deviation >= 0.0):
             raise InputError(
                 f"deviation = {self.deviation} of a smoothing spline cannot be; give 0 or a positive number"
             )
 
     def derivatives(self, u: Array, values: Array, at: Array, highest: int) -> Array:
+        """See `Differentiation.derivatives`.
+
+        Raises:
+            InputError: too few samples for a quintic spline.
+        """
         from scipy.interpolate import splev, splrep
 
         if len(u) < 7:
@@ -140,11 +172,24 @@ class InterpolatingSpline:
     degree: int = 7
 
     def derivatives(self, u: Array, values: Array, at: Array, highest: int) -> Array:
+        """See `Differentiation.derivatives`.
+
+        Raises:
+            InputError: too few samples for the degree.
+        """
         made = self.through(u, values)
         return np.array([made(at, order) for order in range(highest + 1)])
 
-    def through(self, u: Array, values: Array) -> Any:
-        """The spline itself, of arrays (k, ...) along their first axis (`scipy.interpolate.BSpline`)."""
+    def through(self, u: Array, values: Array) -> BSpline:
+        """The spline itself, of arrays (k, ...) along their first axis (`scipy.interpolate.BSpline`).
+
+        Args:
+            u: (k,) rising parameters.
+            values: (k, ...) samples.
+
+        Raises:
+            InputError: too few samples for the degree.
+        """
         from scipy.interpolate import make_interp_spline
 
         if len(u) <= self.degree:
@@ -155,5 +200,8 @@ class InterpolatingSpline:
 
 
 def deviation_of(values: Array) -> float:
-    """Root mean square of the noise in even samples, from sixth differences: sqrt(924) is what they make of noise."""
+    """Root mean square of the noise in even samples (k, c), in their unit.
+
+    It is read from sixth differences, which multiply noise by sqrt(924).
+    """
     return float(np.sqrt(np.mean(np.diff(values, 6) ** 2) / 924.0)) if len(values) > 6 else 0.0

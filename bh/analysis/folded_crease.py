@@ -25,11 +25,18 @@ class FoldedCrease:
     """A crease that is folded isometrically, sampled at k parameters u.
 
     Attributes:
-        u: (k,); points: (k, 3) c, mm; speed: (k,) s = |c'|, mm a unit of u (A.3).
-        tangent, normal, binormal: (k, 3) t, n, b (A.4 but for the sign of n and b).
-        curvature: (k,) signed kappa, 1/mm (A.6); torsion: (k,) tau, 1/mm (A.7).
-        dihedral: (k,) phi, rad; fold_rate: (k,) phi', rad a unit of u.
-        start, heading: place (x, y) in mm and direction in rad of the flat crease at its first point.
+        u: (k,) parameters.
+        points: (k, 3) c, mm.
+        speed: (k,) s = |c'|, mm a unit of u (A.3).
+        tangent: (k, 3) unit vectors t (A.4).
+        normal: (k, 3) unit vectors n (A.4 but for the sign).
+        binormal: (k, 3) unit vectors b (A.4 but for the sign).
+        curvature: (k,) signed kappa, 1/mm (A.6).
+        torsion: (k,) tau, 1/mm (A.7).
+        dihedral: (k,) phi, rad.
+        fold_rate: (k,) phi', rad a unit of u.
+        start: place (x, y) of the flat crease at its first point, mm.
+        heading: its direction there, rad.
         method: how derivatives of what is sampled are taken.
     """
 
@@ -113,6 +120,7 @@ class FoldedCrease:
 
     @property
     def panels(self) -> tuple[Panel, Panel]:
+        """The panels on the left and on the right."""
         return self.left, self.right
 
     def _panel(self, side: str) -> Panel:
@@ -149,16 +157,30 @@ class FoldedCrease:
         return min(self.left.largest_width, self.right.largest_width)
 
     def reach(self, width: float | tuple[float, float], trim: bool = False) -> tuple[Array, Array]:
-        """Distances along the generators to the edges of a strip, (k,) each; see `Panel.reach`."""
+        """Distances along the generators to the edges of a strip, (k,) each; see `Panel.reach`.
+
+        Args:
+            width: of the strip on either side, or (left, right), mm.
+            trim: end before the regression curve; see `Panel.reach`.
+
+        Raises:
+            ModelError: the strip reaches a regression curve (unless `trim`).
+        """
         left, right = width if isinstance(width, tuple) else (width, width)
         return self.left.reach(left, trim), self.right.reach(right, trim)
 
     def bending_energy(
         self, sheet: Sheet, width: float | tuple[float, float], nu: float | None = None, trim: bool = False
     ) -> float:
-        """Bending energy of a strip of that width on either side, N mm; `nu` overrides the sheet's.
+        """Bending energy of a strip, N mm.
 
         What no generator of the crease covers at the ends goes on flat and stores nothing.
+
+        Args:
+            sheet: material and thickness.
+            width: of the strip on either side, or (left, right), mm.
+            nu: Poisson's ratio in place of the sheet's.
+            trim: end before the regression curve; see `Panel.reach`.
 
         Raises:
             ModelError: the strip reaches a regression curve (unless `trim`).
@@ -171,7 +193,12 @@ class FoldedCrease:
     def mesh(
         self, width: float | tuple[float, float], along: int = 64, rows: int = 4
     ) -> tuple[SheetMesh, Array]:
-        """A strip of that width (left and right) in columns across the flat crease: flat mesh and folded nodes (n, 3).
+        """A strip in columns across the flat crease: flat mesh and folded nodes (n, 3), mm.
+
+        Args:
+            width: of the strip on either side, or (left, right), mm.
+            along: cells along the crease.
+            rows: of cells on either side.
 
         Raises:
             ModelError: the strip reaches a regression curve.
@@ -188,7 +215,11 @@ class FoldedCrease:
         """Both panels meshed along generators of one length, as in the source's Fig. A.7: flat mesh and folded nodes.
 
         Args:
-            length: of the generators, mm; with `trim` they end just before the regression curve where it lies within.
+            length: of the generators, mm; with `trim` they end just before the regression curve where it lies
+                within.
+            along: cells along the crease.
+            rows: of cells on either side.
+            trim: end generators before the regression curve.
 
         Raises:
             ModelError: a generator reaches the regression curve.

@@ -36,8 +36,8 @@ class Generators:
         u: (k,) flat length along the crease where each of them meets it, mm.
         angle: (k,) gamma from the crease's tangent, rad in (0, pi), in the flat sheet.
         places: (k, 2) flat places at which the panel was looked at, mm.
-        kappa_1, kappa_2: (k,) principal curvatures there, 1/mm, |kappa_1| <= |kappa_2|; positive where the panel is
-            hollow on its upper side. kappa_1 is zero on a developable surface.
+        kappa_1: (k,) the smaller principal curvature there by size, 1/mm; zero on a developable surface.
+        kappa_2: (k,) the larger one, 1/mm, positive where the panel is hollow on its upper side.
     """
 
     u: Array
@@ -52,16 +52,19 @@ def panel_generators(
 ) -> Generators:
     """Generators of the panel on one side of a crease, one for each place beside a node of it.
 
-    Args:
-        side: "left" or "right" of the crease's direction, seen from above.
-        distance: of the places from the crease, mm; by default half the mean width of the panel.
-        radius: of the fits, mm; by default the distance, but at least 2.5 edges of the crease. At corners a fit takes
-            more, until it has eight triangles.
-
     Places whose generator leaves the panel before it meets the crease are left out.
 
+    Args:
+        state: of a path.
+        crease: its name.
+        side: "left" or "right" of the crease's direction, seen from above.
+        distance: of the places from the crease, mm; by default half the mean width of the panel.
+        radius: of the fits, mm; by default the distance, but at least 2.5 edges of the crease. At corners a
+            fit takes more, until it has eight triangles.
+
     Raises:
-        ModelError: a side that is neither; a sheet that is not flat when stress-free; a panel of too few triangles.
+        ModelError: a side that is neither; a sheet that is not flat when stress-free; a panel of too few
+            triangles.
     """
     mesh = state.mesh
     if side not in SIDES:

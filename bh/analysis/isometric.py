@@ -10,7 +10,7 @@ inflections, where Frenet's turns over.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from bh.analysis import relations
 from bh.analysis.crease_input import Given, derivatives, parameters
 from bh.analysis.differences import Differentiation, InterpolatingSpline, SmoothingSpline
 from bh.analysis.folded_crease import FoldedCrease
+from bh.analysis.initial_guess import Relaxed, relax
 from bh.analysis.isometric_mesh import Placed
 from bh.analysis.relations import (
     dihedral_of,
@@ -30,23 +31,47 @@ from bh.analysis.relations import (
     torsion_of,
 )
 from bh.analysis.ruled import Panel
-from bh.analysis.starts import Relaxed, relax
 from bh.errors import ModelError
 from meshes import SheetMesh
 from meshes.curves import Arc, Line, arc_lengths
 
 Array = NDArray[np.float64]
 SAMPLES = 401
-STRAIGHT = (
-    1e-5  # of the largest curvature, or rad over the whole length: below it torsion has no value of its own
-)
+# of the largest curvature, or rad over the whole length: below it torsion has no value of its own
+STRAIGHT = 1e-5
 TURN = 1e-12  # of an integrated frame, relative
 
 __all__ = [
-    "FoldedCrease", "InterpolatingSpline", "Panel", "Placed", "Relaxed", "SmoothingSpline", "dihedral_of",
-    "flat_curvature", "fold_rate_of", "folded_curvature", "generator_angles", "of_crease", "of_flat", "of_mesh",
-    "relax", "torsion_from_fold_rate", "torsion_of",
-]  # fmt: skip
+    "FoldedCrease",
+    "InterpolatingSpline",
+    "Panel",
+    "Placed",
+    "Relaxed",
+    "SmoothingSpline",
+    "dihedral_of",
+    "flat_curvature",
+    "fold_rate_of",
+    "folded_curvature",
+    "generator_angles",
+    "of_crease",
+    "of_flat",
+    "of_mesh",
+    "relax",
+    "torsion_from_fold_rate",
+    "torsion_of",
+]
+
+
+class FlatStart(TypedDict, total=False):
+    """Where the flat crease begins.
+
+    Attributes:
+        start: place (x, y) of its first point, mm; the origin by default.
+        heading: its direction there, rad; along x by default.
+    """
+
+    start: tuple[float, float]
+    heading: float
 
 
 def of_crease(
@@ -58,27 +83,28 @@ def of_crease(
     samples: int = SAMPLES,
     up: ArrayLike | None = None,
     method: Differentiation | None = None,
-    start: tuple[float, float] = (0.0, 0.0),
-    heading: float = 0.0,
+    **flat: Unpack[FlatStart],
 ) -> FoldedCrease:
     """From the already-deformed crease c(u) and the dihedral angle phi(u) (source A.1).
 
     Args:
-        crease: function of u (k,) that gives (k, 3), three expressions of one symbol (sympy), or samples (k, 3) at `u`;
-            mm.
+        crease: function of u (k,) that gives (k, 3), three expressions of one symbol (sympy), or samples (k,
+            3) at `u`; mm.
         dihedral: a number, function, expression or samples (k,), rad in (0, 2 pi), below the sheet.
-        interval: first and last u; `samples` are taken evenly there. Or `u` (k,) itself.
-        up: direction that the upper side of the sheet faces on the whole; by default such that the crease turns to the
-            left on the whole.
-        method: derivatives of functions and samples; by default splines of degree 7 through them. Samples with noise
-            need `SmoothingSpline()`.
-        start, heading: place (mm) and direction (rad) of the flat crease at its first point.
+        interval: first and last u.
+        u: (k,) parameters themselves, in place of an interval.
+        samples: how many parameters are taken evenly on the interval.
+        up: direction that the upper side of the sheet faces on the whole; by default such that the crease
+            turns to the left on the whole.
+        method: derivatives of functions and samples; by default splines of degree 7 through them. Samples
+            with noise need `SmoothingSpline()`.
+        **flat: start and heading of the flat crease, see `FlatStart`.
 
     Raises:
         ModelError: input that does not fit, a crease that stops (c' = 0), dihedral angles outside (0, 2 pi).
     """
     method = method or InterpolatingSpline()
-    at = parameters(crease, u, interval, samples)
+    at = parameters(u, interval, samples)
     c, c1, c2, c3 = derivatives("the crease", crease, at, 3, method, 3)
     phi, rate = derivatives("the dihedral angle", dihedral, at, 1, method, 1)[:, :, 0]
     _check_dihedral(phi, at)
@@ -101,9 +127,19 @@ def of_crease(
     if up is None and float(np.trapezoid(sign * kappa * speed, at)) < 0.0:
         binormal, sign = -binormal, -sign
     return FoldedCrease(
-        at, c, speed, tangent, np.cross(binormal, tangent), binormal, sign * kappa, torsion, phi, rate, start, heading,
-        method,
-    )  # fmt: skip
+        u=at,
+        points=c,
+        speed=speed,
+        tangent=tangent,
+        normal=np.cross(binormal, tangent),
+        binormal=binormal,
+        curvature=sign * kappa,
+        torsion=torsion,
+        dihedral=phi,
+        fold_rate=rate,
+        method=method,
+        **flat,
+    )
 
 
 def _smooth_binormal(
@@ -152,10 +188,15 @@ def of_flat(
     a single crease the least, but for the free ends.
 
     Args:
-        curvature: kappa_0 of the flat crease over its length, 1/mm, positive to the left: a number, function of the
-            length (k,), expression, or `samples` values.
-        dihedral, torsion: likewise, rad in (0, 2 pi) and 1/mm.
+        curvature: kappa_0 of the flat crease over its length, 1/mm, positive to the left: a number, function
+            of the length (k,), expression, or `samples` values.
+        dihedral: likewise, rad in (0, 2 pi).
         length: of the crease, mm.
+        torsion: likewise, 1/mm.
+        samples: how many points the crease is computed at.
+        start: place (x, y) of the flat crease at its first point, mm.
+        heading: its direction there, rad.
+        method: differentiates the dihedral angle; by default splines of degree 7.
 
     Raises:
         ModelError: input that does not fit.
@@ -163,7 +204,7 @@ def of_flat(
     if not (np.isfinite(length) and length > 0.0):
         raise ModelError(f"length = {length} of a crease cannot be; give a positive length in mm")
     method = method or InterpolatingSpline()
-    at = parameters(None, None, (0.0, length), samples)
+    at = parameters(None, (0.0, length), samples)
     flat = derivatives("the curvature of the flat crease", curvature, at, 1, method, 0)[0, :, 0]
     phi, rate = derivatives("the dihedral angle", dihedral, at, 1, method, 1)[:, :, 0]
     tau = derivatives("the torsion", torsion, at, 1, method, 0)[0, :, 0]
@@ -174,9 +215,20 @@ def of_flat(
     )
     points, frames = _integrate_frame(at, kappa, tau, np.array([*start, 0.0]), frame)
     return FoldedCrease(
-        at, points, np.ones_like(at), frames[:, 0], frames[:, 1], frames[:, 2], kappa, tau, phi, rate, start, heading,
-        method,
-    )  # fmt: skip
+        u=at,
+        points=points,
+        speed=np.ones_like(at),
+        tangent=frames[:, 0],
+        normal=frames[:, 1],
+        binormal=frames[:, 2],
+        curvature=kappa,
+        torsion=tau,
+        dihedral=phi,
+        fold_rate=rate,
+        start=start,
+        heading=heading,
+        method=method,
+    )
 
 
 def _integrate_frame(s: Array, kappa: Array, tau: Array, start: Array, frame: Array) -> tuple[Array, Array]:
@@ -202,19 +254,24 @@ def of_mesh(
 ) -> FoldedCrease:
     """Fold the crease of a flat mesh: `place(mesh.points[:, :2])` of the result puts its nodes on the folded sheet.
 
-    Args:
-        dihedral, torsion: as for `of_flat`, over the length of the flat crease.
-
     The crease's exact curve is taken where it is an arc or a line, else splines through its nodes.
 
+    Args:
+        mesh: flat.
+        crease: its name.
+        dihedral: as for `of_flat`, over the length of the flat crease, rad.
+        torsion: as for `of_flat`, over the length of the flat crease, 1/mm.
+        samples: how many points the crease is computed at.
+
     Raises:
-        ModelError: the mesh is not flat, or the crease is closed: an isometric fold of one needs a curve that closes.
+        ModelError: the mesh is not flat, or the crease is closed: an isometric fold of one needs a curve that
+            closes.
     """
     if not mesh.flat:
         raise ModelError("isometric folding begins with a flat sheet; this mesh is not flat")
     pairs = mesh.crease_edges(crease)
     nodes = mesh.points[np.append(pairs[:, 0], pairs[-1, 1]), :2]
-    curve: Any = mesh.curves.get(f"crease:{crease}")
+    curve = mesh.curves.get(f"crease:{crease}")
     ends = nodes[0], nodes[-1]
     if np.linalg.norm(ends[1] - ends[0]) < 1e-9 * mesh.size:
         raise ModelError(f"crease '{crease}' is closed; isometric theory folds open creases, so cut it")
@@ -236,18 +293,28 @@ def of_mesh(
         way = ends[1] - ends[0]
         start = (float(ends[0][0]), float(ends[0][1]))
         return of_flat(
-            0.0, dihedral, curve.length, torsion=torsion, samples=samples, start=start,
+            0.0,
+            dihedral,
+            curve.length,
+            torsion=torsion,
+            samples=samples,
+            start=start,
             heading=float(np.arctan2(way[1], way[0])),
-        )  # fmt: skip
+        )
     drawn = of_crease(
         np.column_stack((nodes, np.zeros(len(nodes)))), np.pi, u=arc_lengths(nodes), up=(0.0, 0.0, 1.0)
     )
     arc = InterpolatingSpline(7).through(drawn.arc_length, drawn.curvature)
     first = drawn.tangent[0]
     return of_flat(
-        lambda s: arc(s), dihedral, float(drawn.arc_length[-1]), torsion=torsion, samples=samples,
-        start=(float(nodes[0, 0]), float(nodes[0, 1])), heading=float(np.arctan2(first[1], first[0])),
-    )  # fmt: skip
+        lambda s: arc(s),
+        dihedral,
+        float(drawn.arc_length[-1]),
+        torsion=torsion,
+        samples=samples,
+        start=(float(nodes[0, 0]), float(nodes[0, 1])),
+        heading=float(np.arctan2(first[1], first[0])),
+    )
 
 
 def _same_way(curve: Arc, nodes: Array) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from bh.analysis.differences import InterpolatingSpline
 from bh.analysis.ruled import Panel, feet
 from bh.errors import ModelError
 from meshes import SheetMesh
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 Array = NDArray[np.float64]
 CHUNK = 2_000_000  # pairs of points and generators that are looked at at once
@@ -23,10 +26,13 @@ def ruled_mesh(
 ) -> tuple[SheetMesh, Array]:
     """Mesh of two panels with nodes on generators: the flat sheet, and the (n, 3) folded places of its nodes.
 
-    Args:
-        lengths: (k,) each, how far the generators go, mm.
-
     Edge sets are those of `grid_mesh`; "edge:left" and "edge:right" are the far ends of the generators.
+
+    Args:
+        panels: left and right.
+        lengths: (k,) each, how far the generators go, mm.
+        along: cells along the crease.
+        rows: of cells on either side.
     """
     u = panels[0].u
     at = np.linspace(u[0], u[-1], along + 1)
@@ -46,7 +52,14 @@ def ruled_mesh(
 
 
 def strip_mesh(panel: Panel, widths: tuple[float, float], along: int, rows: int) -> SheetMesh:
-    """Flat mesh between lines at the distances `widths` (left, right) from the crease, in columns across it."""
+    """Flat mesh between lines beside the crease, in columns across it.
+
+    Args:
+        panel: on either side of the crease.
+        widths: distances of the lines (left, right) from the crease, mm.
+        along: cells along the crease.
+        rows: of cells on either side.
+    """
     u = panel.u
     made = InterpolatingSpline(7).through(u, panel.flat_crease)
     at = np.linspace(u[0], u[-1], along + 1)
@@ -61,6 +74,11 @@ def grid_mesh(lines: Array, rows: int, kind: str) -> SheetMesh:
     """Triangles between node lines (2 rows + 1, along + 1, 2) from the right to the left, diagonals alternating.
 
     Edge sets are "crease:crease" (the line in the middle), "edge:left", "edge:right", "edge:start" and "edge:end".
+
+    Args:
+        lines: (2 rows + 1, along + 1, 2) nodes, mm.
+        rows: of cells on either side of the middle line.
+        kind: of the mesh, see `SheetMesh.kind`.
     """
     count, columns = lines.shape[:2]
     number = np.arange(count * columns).reshape(count, columns)
@@ -94,7 +112,11 @@ class Placed:
     panels: tuple[Panel, Panel]
 
     def __call__(self, points: Array) -> Array:
-        """(n, 3) folded places of flat points (n, 2) or (n, 3) with z = 0, mm."""
+        """(n, 3) folded places of flat points (n, 2) or (n, 3) with z = 0, mm.
+
+        Raises:
+            ModelError: a point lies beyond a regression curve.
+        """
         points = np.asarray(points, dtype=float)
         if points.ndim != 2 or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
             raise ModelError("points of the flat sheet must be a finite array (n, 2) in mm")
@@ -166,7 +188,7 @@ class Placed:
         return np.asarray(value[:, 4:7] + v[:, None] * value[:, 7:10])
 
     @cached_property
-    def _splines(self) -> dict[str, Any]:
+    def _splines(self) -> dict[str, BSpline]:
         spline = InterpolatingSpline(7)
         return {
             panel.side: spline.through(

@@ -28,7 +28,8 @@ class MidPlane:
 
     Attributes:
         u: (k,) parts of the length from the edge "start", 0 to 1.
-        inner, outer: (k, 3) ends of its lines, mm.
+        inner: (k, 3) inner ends of its lines, mm.
+        outer: (k, 3) outer ends of its lines, mm.
     """
 
     u: Array
@@ -41,8 +42,10 @@ class MidPlane:
         return np.asarray(0.5 * (self.inner + self.outer))
 
     def bending(self, at: float = 0.5) -> float:
-        """Angle between the lines from the centre at `at` to those at both ends, rad; pi if the mid-line is "
-        "straight."""
+        """Angle between the lines from the centre at `at` to both ends, rad; pi if the mid-line is straight.
+
+        `at` is a part of the length, 0 to 1.
+        """
         start, here, end = self._at(self.centre, [0.0, at, 1.0])
         a, b = start - here, end - here
         return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
@@ -72,8 +75,13 @@ class MidPlane:
 def midplane(state: State, stations: int = STATIONS) -> MidPlane:
     """The mid-plane of a solved sheet whose creases run from its edge "start" to its edge "end".
 
+    Args:
+        state: of a path.
+        stations: how many lines.
+
     Raises:
-        MeshError: the sheet has no edges "inner" and "outer"; ModelError: it has no crease.
+        MeshError: the sheet has no edges "inner" and "outer".
+        ModelError: it has no crease.
     """
     mesh = state.mesh
     if not mesh.creases:

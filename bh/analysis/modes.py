@@ -48,6 +48,13 @@ class Response:
     """
 
     def __init__(self, solve: Callable[[Array], Array], held: Array, rigid: Array) -> None:
+        """Take over what the tangent and the supports say.
+
+        Args:
+            solve: response (size, m) to loads (size, m) in equilibrium.
+            held: (size, h) unit loads along held directions.
+            rigid: (size, r) orthonormal motions that cost nothing.
+        """
         self._solve, self._held, self._rigid = solve, held, rigid
         h, r = held.shape[1], rigid.shape[1]
         self.free = rigid
@@ -83,8 +90,10 @@ def lowest(
     """(eigenvalue, motion (size,), free) of the `count` lowest modes by size, free motions first, of unit mass.
 
     Args:
+        response: K^+ with supports and free motions taken care of.
         stiffness: K u, the tangent times a motion.
         weigh: W u, the root of the (lumped) mass times a motion.
+        count: how many modes.
         typical: size of an eigenvalue of the tangent; rounding is measured in it.
     """
     free = response.free

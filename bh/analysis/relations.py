@@ -27,39 +27,76 @@ VANISHING = 1e-9  # of the largest: smaller ones count as zero
 
 
 def folded_curvature(flat: ArrayLike, dihedral: ArrayLike) -> Array:
-    """kappa = kappa_0 / sin(phi / 2) of the folded crease (Eq. 5.3), 1/mm."""
+    """Curvature of the folded crease, kappa = kappa_0 / sin(phi / 2) (Eq. 5.3), 1/mm.
+
+    Args:
+        flat: kappa_0, 1/mm.
+        dihedral: phi, rad.
+    """
     return np.asarray(flat, dtype=float) / np.sin(0.5 * np.asarray(dihedral, dtype=float))
 
 
 def flat_curvature(folded: ArrayLike, dihedral: ArrayLike) -> Array:
-    """kappa_0 = kappa sin(phi / 2): the geodesic curvature of the crease, which folding keeps (Eq. 5.3), 1/mm."""
+    """Geodesic curvature kappa_0 = kappa sin(phi / 2) of the crease, which folding keeps (Eq. 5.3), 1/mm.
+
+    Args:
+        folded: kappa, 1/mm.
+        dihedral: phi, rad.
+    """
     return np.asarray(folded, dtype=float) * np.sin(0.5 * np.asarray(dihedral, dtype=float))
 
 
 def dihedral_of(flat: ArrayLike, folded: ArrayLike, valley: bool = False) -> Array:
-    """phi from the curvatures before and after (Eq. 5.3), rad; mountain in (0, pi], valley in [pi, 2 pi)."""
+    """Dihedral angle phi from the curvatures before and after (Eq. 5.3), rad.
+
+    Args:
+        flat: kappa_0, 1/mm.
+        folded: kappa, 1/mm.
+        valley: phi in [pi, 2 pi) in place of (0, pi].
+    """
     half = np.arcsin(np.asarray(flat, dtype=float) / np.asarray(folded, dtype=float))
-    return 2.0 * (np.pi - half) if valley else 2.0 * half
+    return np.asarray(2.0 * (np.pi - half) if valley else 2.0 * half)
 
 
 def torsion_of(flat: ArrayLike, dihedral: ArrayLike, left: ArrayLike, right: ArrayLike) -> Array:
-    """tau = -1/2 kappa_0 cot(phi / 2) (cot gamma_L + cot gamma_R) (Eq. 5.4 with the signs above), 1/mm."""
+    """Torsion tau = -1/2 kappa_0 cot(phi / 2) (cot gamma_L + cot gamma_R) (Eq. 5.4 with the signs above), 1/mm.
+
+    Args:
+        flat: kappa_0, 1/mm.
+        dihedral: phi, rad.
+        left: gamma_L, rad.
+        right: gamma_R, rad.
+    """
     return -0.5 * _bending(flat, dihedral) * (_cot(left) + _cot(right))
 
 
 def fold_rate_of(
     flat: ArrayLike, dihedral: ArrayLike, left: ArrayLike, right: ArrayLike, speed: ArrayLike = 1.0
 ) -> Array:
-    """phi' = -s kappa_0 cot(phi / 2) (cot gamma_L - cot gamma_R) (Eq. 5.5 with the signs above), rad a unit of u."""
+    """Fold rate phi' = -s kappa_0 cot(phi / 2) (cot gamma_L - cot gamma_R) (Eq. 5.5, signs above), rad a unit of u.
+
+    Args:
+        flat: kappa_0, 1/mm.
+        dihedral: phi, rad.
+        left: gamma_L, rad.
+        right: gamma_R, rad.
+        speed: s, mm a unit of u.
+    """
     return -np.asarray(speed, dtype=float) * _bending(flat, dihedral) * (_cot(left) - _cot(right))
 
 
 def torsion_from_fold_rate(
     fold_rate: ArrayLike, left: ArrayLike, right: ArrayLike, speed: ArrayLike = 1.0
 ) -> Array:
-    """tau = phi' (cot gamma_L + cot gamma_R) / (2 s (cot gamma_L - cot gamma_R)) (Eq. 5.6, signs above), 1/mm.
+    """Torsion tau = phi' (cot gamma_L + cot gamma_R) / (2 s (cot gamma_L - cot gamma_R)) (Eq. 5.6, signs above), 1/mm.
 
     Where the generator angles are equal the fold rate is zero and says nothing of the torsion: nan.
+
+    Args:
+        fold_rate: phi', rad a unit of u.
+        left: gamma_L, rad.
+        right: gamma_R, rad.
+        speed: s, mm a unit of u.
     """
     total, difference = _cot(left) + _cot(right), _cot(left) - _cot(right)
     none = np.abs(difference) <= VANISHING * (1.0 + np.abs(total))
@@ -82,7 +119,10 @@ def generator_angles(
     has. Where a side twists without bending along the crease its generators run along the crease: 0 or pi.
 
     Args:
-        curvature: (k,) signed, 1/mm; torsion: (k,) 1/mm; dihedral: (k,) rad; fold_rate: (k,) rad a unit of u.
+        curvature: (k,) signed, 1/mm.
+        torsion: (k,), 1/mm.
+        dihedral: (k,), rad.
+        fold_rate: (k,), rad a unit of u.
         speed: |c'|, mm a unit of u.
         smallest: curvatures and torsions up to this one count as zero, 1/mm.
     """

@@ -30,13 +30,16 @@ class Panel:
 
     Attributes:
         side: "left" or "right" of the crease, seen from above.
-        u: (k,) parameters; speed: (k,) s = |c'|, mm a unit of u.
-        crease: (k, 3) the folded crease c, mm; flat_crease: (k, 2) the same in the flat sheet.
+        u: (k,) parameters.
+        speed: (k,) s = |c'|, mm a unit of u.
+        crease: (k, 3) the folded crease c, mm.
+        flat_crease: (k, 2) the same in the flat sheet, mm.
         normal: (k, 3) unit normals N on the upper side (A.11).
         angle: (k,) generator angles gamma from the tangent, rad in [0, pi] (A.12).
-        generator: (k, 3) unit vectors g (A.13); flat_generator: (k, 2) the same in the flat sheet.
-        convergence: (k,) q, 1/mm: positive where generators come together on this side, inf where they run along the
-            crease.
+        generator: (k, 3) unit vectors g (A.13).
+        flat_generator: (k, 2) the same in the flat sheet.
+        convergence: (k,) q, 1/mm: positive where generators come together on this side, inf where they run
+            along the crease.
         kappa: (k,) kappa_2 at the crease, 1/mm; positive where the panel is hollow on its upper side.
     """
 
@@ -103,6 +106,7 @@ class Panel:
         ends. A generator that meets one of these ends there.
 
         Args:
+            width: of the strip, mm.
             trim: end just before the regression curve where it lies inside; otherwise that is an error.
 
         Raises:
@@ -126,7 +130,11 @@ class Panel:
         return v
 
     def bending_energy(self, stiffness: float, reach: ArrayLike) -> float:
-        """1/2 D int kappa_2^2 dA of the panel up to `reach` (k,) along the generators, N mm; `stiffness` D in N mm.
+        """Bending energy 1/2 D int kappa_2^2 dA of the panel, N mm.
+
+        Args:
+            stiffness: D, N mm.
+            reach: (k,) distances along the generators up to which it counts, mm.
 
         Raises:
             ModelError: a generator reaches the regression curve, where the energy has no bound.
@@ -192,7 +200,13 @@ class Panel:
 
 
 def feet(points: Array, line: Array, u: Array) -> tuple[Array, Array]:
-    """Nearest points on a sampled plane curve, continued straight, and its left normals there, (p, 2) each."""
+    """Nearest points on a sampled plane curve, continued straight, and its left normals there, (p, 2) each.
+
+    Args:
+        points: (p, 2), mm.
+        line: (k, 2) samples of the curve, mm.
+        u: (k,) their parameters.
+    """
     from scipy.interpolate import make_interp_spline
 
     made = make_interp_spline(u, line, k=5)
@@ -215,7 +229,12 @@ def feet(points: Array, line: Array, u: Array) -> tuple[Array, Array]:
 
 
 def distances(points: Array, line: Array) -> Array:
-    """(p,) distances of points from a polyline's vertices, mm."""
+    """(p,) distances of points from a polyline's vertices, mm.
+
+    Args:
+        points: (p, 2), mm.
+        line: (k, 2) vertices, mm.
+    """
     from scipy.spatial import KDTree
 
     return np.asarray(KDTree(line).query(points)[0])

@@ -55,6 +55,10 @@ def rulings(state: State, spacing: float) -> list[Array]:
     From the triangle that bends most on, a ruling goes through its centroid in the direction of least curvature, if the
     sheet bends about that direction all along it, and it keeps away from those that are there.
 
+    Args:
+        state: of a path.
+        spacing: between rulings where the sheet bends most, mm.
+
     Raises:
         ModelError: the stress-free sheet is not flat, or a spacing that cannot be.
     """

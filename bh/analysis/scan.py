@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,9 +34,14 @@ SETTLED = 0.02  # of the standard error: the motion has settled when a step is s
 
 
 class Surface:
-    """The triangles of a solved sheet, ready to be asked for nearest points (a cell locator of VTK)."""
+    """The triangles of a solved sheet, ready to be asked for nearest points (a cell locator of VTK).
+
+    Args:
+        state: the sheet.
+    """
 
     def __init__(self, state: State) -> None:
+        """Make the locator of a state."""
         import pyvista as pv
 
         if not (hasattr(state, "points") and hasattr(state, "mesh")):
@@ -50,12 +55,24 @@ class Surface:
         self._free = alone.reshape(-1, 3)  # is the side opposite to each corner an edge of the sheet?
 
     def nearest(self, points: Array) -> tuple[Array, Ints]:
-        """(k, 3) nearest points of the sheet, and the triangles (k,) that they lie on."""
+        """(k, 3) nearest points of the sheet, and the triangles (k,) that they lie on.
+
+        Args:
+            points: (k, 3), mm.
+        """
         cells, found = self._data.find_closest_cell(points, return_closest_point=True)
         return np.asarray(found, dtype=float).reshape(-1, 3), np.asarray(cells, dtype=np.int64).reshape(-1)
 
     def on_edge(self, found: Array, cells: Ints) -> NDArray[np.bool_]:
-        """(k,) do these points of triangles `cells` lie on an edge of the sheet?"""
+        """Whether points lie on an edge of the sheet, to rounding.
+
+        Args:
+            found: (k, 3) points of the sheet, mm.
+            cells: (k,) the triangles that they lie on.
+
+        Returns:
+            (k,) truth values.
+        """
         p = self.points[self.triangles[cells]]
         height = np.empty((len(found), 3))  # of the point over each side, relative to the triangle's
         for corner in range(3):
@@ -66,7 +83,11 @@ class Surface:
         return on
 
     def enriched(self, spacing: float) -> Array:
-        """Points (k, 3) of the sheet, its nodes among them: edges longer than `spacing` (mm) are halved."""
+        """Points (k, 3) of the sheet, its nodes among them: edges longer than `spacing` (mm) are halved.
+
+        Raises:
+            ScanError: a spacing that cannot be, or that makes too many points.
+        """
         if not (math.isfinite(spacing) and spacing > 0.0):
             raise ScanError(f"spacing = {spacing} cannot be; give a positive distance in mm")
         p = self.points[self.triangles]
@@ -107,15 +128,18 @@ class Registration:
 def register(
     cloud: ArrayLike, state: State | Surface, start: Motion = IDENTITY, trim: float = TRIM
 ) -> Registration:
-    """The rigid motion that brings a scan (k, 3) onto a solved sheet, from the first guess `start`; see the module.
+    """The rigid motion that brings a scan (k, 3) onto a solved sheet, from the initial guess `start`; see the module.
 
     Args:
-        trim: robust standard deviations (1.4826 times the median distance) beyond which a point takes no part; infinite
-            for plain least squares, fit for clean clouds that differ from the sheet.
+        cloud: (k, 3), mm.
+        state: the sheet, or its `Surface`.
+        start: initial guess of the motion.
+        trim: robust standard deviations (1.4826 times the median distance) beyond which a point takes no
+            part; infinite for plain least squares, fit for clean clouds that differ from the sheet.
 
     Raises:
-        ScanError: no points, not finite, the sheet can slide in itself (a flat or round one without edges in the scan),
-            or no convergence.
+        ScanError: no points, not finite, the sheet can slide in itself (a flat or round one without edges in
+            the scan), or no convergence.
     """
     points = checked(cloud, "the scan", 6)
     if not trim >= 1.0:
@@ -153,10 +177,10 @@ class _Fit:
 
 def _rounds(
     points: Array, surface: Surface, motion: Motion, trim: float, coarse: bool = False
-) -> tuple[Motion, int, Any, float, Array, Array]:
+) -> tuple[Motion, int, NDArray[np.bool_], float, Array, Array]:
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     arm = 0.5 * size
-    kept: Any = None
+    kept = np.zeros(len(points), dtype=bool)
     best: _Fit | None = None
     frozen, damping = False, 0.0
     most = COARSE_ROUNDS if coarse else MOST_ROUNDS
@@ -196,7 +220,14 @@ def _rounds(
 
 
 def _fit(
-    motion: Motion, cost: float, x: Array, near: Array, cells: Ints, kept: Any, surface: Surface, arm: float
+    motion: Motion,
+    cost: float,
+    x: Array,
+    near: Array,
+    cells: Ints,
+    kept: NDArray[np.bool_],
+    surface: Surface,
+    arm: float,
 ) -> _Fit:
     rows, right, centre = _equations(x, near, cells, kept, surface)
     rows = rows / np.repeat((1.0, arm), 3)
@@ -240,26 +271,34 @@ def _equations(
 
 @dataclass(frozen=True, eq=False)
 class Distances:
-    """Distances `values` (k,) of `points` (k, 3) to the other set, mm."""
+    """Distances of points to the other set.
+
+    Attributes:
+        points: (k, 3), mm.
+        values: (k,), mm.
+    """
 
     points: Array
     values: Array
 
     @property
     def mean(self) -> float:
+        """Mean distance, mm."""
         return float(self.values.mean())
 
     @property
     def median(self) -> float:
+        """Median distance, mm."""
         return float(np.median(self.values))
 
     @property
     def standard_deviation(self) -> float:
-        """Of the distances about their mean, as the source has it."""
+        """Standard deviation of the distances about their mean, as the source has it, mm."""
         return float(self.values.std())
 
     @property
     def max(self) -> float:
+        """Largest distance, mm."""
         return float(self.values.max())
 
     def of(self, which: ArrayLike) -> Distances:
@@ -284,11 +323,17 @@ def distances(
     """Distances between a registered scan (k, 3) and a solved sheet, mm.
 
     Args:
-        way: "cloud-to-sheet" (the default) is the distance of every scan point to the surface: exact, the same for any
-            density of the scan, blind to holes, and sees stray points. "sheet-to-cloud" is the source's: from every
-            point of the enriched mesh to the nearest scan point. A hole counts there as an error as large as itself,
-            and noise as less than it is, since of many scan points the nearest is taken.
+        cloud: (k, 3), registered, mm.
+        state: the sheet, or its `Surface`.
+        way: "cloud-to-sheet" (the default) is the distance of every scan point to the surface: exact, the
+            same for any density of the scan, blind to holes, and sees stray points. "sheet-to-cloud" is the
+            source's: from every point of the enriched mesh to the nearest scan point. A hole counts there as
+            an error as large as itself, and noise as less than it is, since of many scan points the nearest
+            is taken.
         spacing: of the enriched mesh, mm.
+
+    Raises:
+        ScanError: an unknown way, or no points.
     """
     points = checked(cloud, "the scan")
     surface = state if isinstance(state, Surface) else Surface(state)

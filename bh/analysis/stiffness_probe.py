@@ -21,7 +21,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -110,6 +109,13 @@ class Probe:
     """
 
     def __init__(self, path: Path, index: int = -1, hold: Place | Sequence[Place] = ()) -> None:
+        """Factorise the tangent of a state.
+
+        Args:
+            path: solved.
+            index: of the state.
+            hold: places that are held besides the supports.
+        """
         if not isinstance(path, Path):
             raise ModelError(
                 f"a probe takes a solved path, not a {type(path).__name__}; give bh.trace(model)"
@@ -194,6 +200,12 @@ class Probe:
 
         A load of unit size asks for the mean displacement that it is conjugate to; a point between nodes is a load that
         they share. N/mm.
+
+        Args:
+            loads: (m, n, 3) nodal loads.
+
+        Raises:
+            ModelError: loads that do not fit, or that do no work.
         """
         rows = np.asarray(loads, dtype=float)
         if rows.ndim != 3 or rows.shape[1:] != self.points.shape or not np.isfinite(rows).all():
@@ -206,8 +218,9 @@ class Probe:
         """The lowest modes, by the size of their eigenvalues; free motions come first.
 
         Args:
-            density: kg / m^3. Masses are lumped: each node has a third of the triangles around it. None for the modes
-                of the stiffness alone.
+            count: how many.
+            density: kg / m^3. Masses are lumped: each node has a third of the triangles around it. None for
+                the modes of the stiffness alone.
 
         Raises:
             ModelError: a count or density that cannot be.
@@ -279,7 +292,9 @@ class Probe:
         K = K[:m, :m]
         return np.asarray(0.5 * (K + K.T))
 
-    def _components(self, parts: Sequence[tuple[Place, Any]]) -> list[tuple[int, Array]]:
+    def _components(
+        self, parts: Sequence[tuple[Place, str | Sequence[Sequence[float]]]]
+    ) -> list[tuple[int, Array]]:
         found = []
         seen: dict[int, list[Array]] = {}
         for place, fix in parts:

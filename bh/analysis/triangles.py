@@ -122,12 +122,13 @@ def _overlap_in_plane(A, B, n, tolerance):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(**OPTIONS)
+@njit(**OPTIONS)  # type: ignore[untyped-decorator]
 def intersecting(points: Array, triangles: Ints, pairs: Ints, tolerance: float) -> NDArray[np.bool_]:
     """(k,) whether the two triangles of each pair (k, 2) intersect.
 
     Args:
-        points: (n, 3) node positions, mm; triangles: (t, 3) node indices, none degenerate.
+        points: (n, 3) node positions, mm.
+        triangles: (t, 3) node indices, none degenerate.
         pairs: (k, 2) rows of `triangles`; the order within a pair does not matter.
         tolerance: mm; distances and overlaps up to this are none.
     """

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,10 +45,14 @@ class Pinching:
     """How sheets are made, folded and pinched.
 
     Attributes:
-        sheet: its material; Lstar: of all creases, mm.
-        fold: fold angle before the pinch, rad; left: dihedral angle that is left until closed in the pinch, rad.
-        zone: length of the pinched zone, mm; profile: see `bh.Pinch`.
-        cell: length of a cell along the first crease, mm; rows: of cells a panel.
+        sheet: material and thickness.
+        Lstar: of all creases, mm.
+        fold: fold angle before the pinch, rad.
+        left: dihedral angle that is left until closed in the pinch, rad.
+        zone: length of the pinched zone, mm.
+        profile: see `bh.Pinch`.
+        cell: length of a cell along the first crease, mm.
+        rows: of cells a panel.
         formulation: bars and hinges are far too stiff in torsion for a pinch (docs/pinching.md).
     """
 
@@ -105,6 +108,10 @@ class Response:
 def respond(pattern: CreasePattern, how: Pinching | None = None) -> Response:
     """Fold and pinch a pattern.
 
+    Args:
+        pattern: with edges "start", "end", "inner" and "outer".
+        how: it is made, folded and pinched; None for the defaults.
+
     Raises:
         ModelError: the sheet did not get there; the message says how far.
     """
@@ -120,29 +127,55 @@ def respond(pattern: CreasePattern, how: Pinching | None = None) -> Response:
 
 
 def twists(length: float = 100.0, spacing: float = 5.0, curvature: float = 0.01) -> CreasePattern:
-    """Twist without bend (Fig. 5.12 a): two creases, straight in the middle half and curved towards the ends."""
+    """Twist without bend (Fig. 5.12 a): two creases, straight in the middle half and curved towards the ends.
+
+    Args:
+        length: of the first crease, mm.
+        spacing: between creases and to the edges, mm.
+        curvature: kappa_0 towards the ends, 1/mm.
+    """
     pieces = (0.25 * length, 0.5 * length, 0.25 * length)
     return meshes.parallel_creases((curvature, 0.0, curvature), pieces, spacing, 2)
 
 
 def bends(length: float = 100.0, spacing: float = 5.0, curvature: float = 0.01) -> CreasePattern:
-    """Bend without twist (Fig. 5.12 b): seven concentric arcs."""
+    """Bend without twist (Fig. 5.12 b): seven concentric arcs.
+
+    Args:
+        length: of the first crease, mm.
+        spacing: between creases and to the edges, mm.
+        curvature: kappa_0 of the first crease, 1/mm.
+    """
     return meshes.parallel_creases(curvature, length, spacing, 7)
 
 
 def stays(length: float = 100.0, spacing: float = 5.0) -> CreasePattern:
-    """Neither (Fig. 5.12 c): five straight creases."""
+    """Neither (Fig. 5.12 c): five straight creases.
+
+    Args:
+        length: of the creases, mm.
+        spacing: between creases and to the edges, mm.
+    """
     return meshes.parallel_creases(0.0, length, spacing, 5)
 
 
 def bends_and_twists(length: float = 100.0, spacing: float = 5.0, curvature: float = 0.01) -> CreasePattern:
-    """Both (Fig. 5.12 d): one arc."""
+    """Both (Fig. 5.12 d): one arc.
+
+    Args:
+        length: of the crease, mm.
+        spacing: to the edges, mm.
+        curvature: kappa_0, 1/mm.
+    """
     return meshes.parallel_creases(curvature, length, spacing, 1)
 
 
 PATTERNS: dict[str, Callable[..., CreasePattern]] = {
-    "twist": twists, "bend": bends, "neither": stays, "both": bends_and_twists,
-}  # fmt: skip
+    "twist": twists,
+    "bend": bends,
+    "neither": stays,
+    "both": bends_and_twists,
+}
 
 
 # ------------------------------------------------------------------------------- measured map and design
@@ -150,7 +183,16 @@ PATTERNS: dict[str, Callable[..., CreasePattern]] = {
 
 @dataclass(frozen=True, eq=False)
 class ResponseMap:
-    """Bend and twist of `creases` (n,) by `spacings` (s,) by `curvatures` (k,), rad, all of one length (mm)."""
+    """Measured bend and twist of sheets with parallel creases.
+
+    Attributes:
+        creases: (n,) numbers of creases.
+        spacings: (s,), mm.
+        curvatures: (k,) kappa_0 of the first crease, 1/mm.
+        bend: (n, s, k), rad.
+        twist: (n, s, k), rad.
+        length: of the first crease, mm.
+    """
 
     creases: Array
     spacings: Array
@@ -160,7 +202,16 @@ class ResponseMap:
     length: float
 
     def at(self, creases: int, spacing: float, curvature: float) -> tuple[float, float]:
-        """Bend and twist by cubic splines over the curvature, straight lines over the spacing."""
+        """Bend and twist by cubic splines over the curvature, straight lines over the spacing.
+
+        Args:
+            creases: one of those of the map.
+            spacing: mm.
+            curvature: kappa_0 of the first crease, 1/mm.
+
+        Returns:
+            Bend and twist, rad.
+        """
         from scipy.interpolate import CubicSpline
 
         n = int(np.flatnonzero(self.creases == creases)[0])
@@ -178,7 +229,18 @@ def measure(
     curvatures: tuple[float, ...] = (0.0, 0.0025, 0.005, 0.0075, 0.01, 0.0125, 0.015),
     length: float = 100.0,
 ) -> ResponseMap:
-    """Measure a map by simulations: some hundred, a minute or two."""
+    """Measure a map by simulations: some hundred, a minute or two.
+
+    Args:
+        how: sheets are made, folded and pinched.
+        creases: numbers of creases.
+        spacings: mm.
+        curvatures: kappa_0 of the first crease, 1/mm.
+        length: of the first crease, mm.
+
+    Raises:
+        ModelError: a sheet did not get there.
+    """
     shape = (len(creases), len(spacings), len(curvatures))
     bend, twist = np.empty(shape), np.empty(shape)
     for i, n in enumerate(creases):
@@ -191,9 +253,7 @@ def measure(
 
 def store(measured: ResponseMap) -> str:
     """A map as JSON."""
-    data: dict[str, Any] = {
-        key: np.asarray(getattr(measured, key)).tolist() for key in measured.__dataclass_fields__
-    }
+    data = {key: np.asarray(getattr(measured, key)).tolist() for key in measured.__dataclass_fields__}
     return json.dumps(data)
 
 
@@ -210,7 +270,11 @@ class Design:
     """A pattern for a bend and a twist, with the simulation that verifies it.
 
     Attributes:
-        creases, curvature, spacing, length: of `meshes.parallel_creases`; first: how its first crease is drawn.
+        creases: how many.
+        curvature: kappa_0 of the first one, 1/mm.
+        spacing: between them, mm.
+        length: of the first one, mm.
+        first: how it is drawn.
         expected: (bend, twist) that the map promised, rad.
         response: the simulation; `response.bend` and `response.twist` are what the pattern does.
         error: largest difference to what was asked for, rad.
@@ -235,8 +299,15 @@ def design(
     The map proposes number, curvature and spacing; a simulation tells what they do, and what is missed is asked of the
     map in addition, up to four times. A valley first turns the twist round.
 
+    Args:
+        bend: wanted, rad.
+        twist: wanted, rad.
+        how: sheets are made, folded and pinched.
+        tolerance: of both, rad.
+
     Raises:
-        DesignError: no pattern of the map comes within `tolerance` (rad) of it; the message names the nearest one.
+        DesignError: no pattern of the map comes within `tolerance` (rad) of it; the message names the nearest
+            one.
     """
     if not (math.isfinite(bend) and math.isfinite(twist)):
         raise DesignError(f"bend {bend} and twist {twist} must be numbers in rad")
@@ -300,9 +371,15 @@ def _nearest(table: ResponseMap, n: int, sign: int, aim: Array) -> tuple[float, 
 
 
 def _simulate(
-    table: ResponseMap, n: int, sign: int, curvature: float, spacing: float, expected: tuple[float, float],
-    asked: Array, how: Pinching | None,
-) -> Design:  # fmt: skip
+    table: ResponseMap,
+    n: int,
+    sign: int,
+    curvature: float,
+    spacing: float,
+    expected: tuple[float, float],
+    asked: Array,
+    how: Pinching | None,
+) -> Design:
     names = ("mountain", "valley")
     folds = [names[(i + (sign < 0)) % 2] for i in range(n)]
     pattern = meshes.parallel_creases(curvature, table.length, spacing, n, folds)  # type: ignore[arg-type]

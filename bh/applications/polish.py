@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,13 +28,36 @@ SHORTEST = 1e-5
 SMALL = 1e-3  # square root of what the size of a step weighs against the targets
 
 
-@dataclass(frozen=True, eq=False)
-class Polished:
-    """What came of a start.
+class Solving(TypedDict, total=False):
+    """How often and how models are solved.
 
     Attributes:
-        design: (k,) the best parameters that were found; path: its solved model.
-        values: (m,) of the observables there; missed: (m,) values less targets.
+        most: solves of the model at most, 20 by default.
+        steps: of the differences, see `bh.sensitivities.of`.
+        strategy: of `bh.trace`.
+    """
+
+    most: int
+    steps: ArrayLike | None
+    strategy: Strategy | None
+
+
+@dataclass(frozen=True)
+class _Solving:
+    most: int = 20
+    steps: ArrayLike | None = None
+    strategy: Strategy | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Polished:
+    """What came of an initial guess.
+
+    Attributes:
+        design: (k,) the best parameters that were found.
+        path: its solved model.
+        values: (m,) of the observables there.
+        missed: (m,) values less targets.
         solves: of the model, failed ones included.
         history: the largest miss over its tolerance, at the start and after each step that was taken.
         outcome: "reached", "limit of solves", or "no descent" where no step helps.
@@ -56,9 +80,7 @@ def polish(
     *,
     scale: ArrayLike | None = None,
     bounds: tuple[ArrayLike, ArrayLike] | None = None,
-    most: int = 20,
-    steps: ArrayLike | None = None,
-    strategy: Strategy | None = None,
+    **solving: Unpack[Solving],
 ) -> Polished:
     """Change a design until observables of its solved model are what they are to be.
 
@@ -69,13 +91,12 @@ def polish(
         tolerance: how far each may stay off, in its unit; one number or (m,).
         scale: (k,) typical changes of the parameters, by default their sizes at the start.
         bounds: least and largest values of the parameters.
-        most: solves of the model at most.
-        steps: of the differences, see `bh.sensitivities.of`.
-        strategy: of `bh.trace`.
+        **solving: most, steps and strategy, see `Solving`.
 
     Raises:
         ModelError: the start cannot be solved, or input that does not fit.
     """
+    how = _Solving(**solving)
     p = np.atleast_1d(np.array(design, dtype=float))
     wanted = np.array([value for _, value in targets], dtype=float)
     allowed = np.broadcast_to(np.asarray(tolerance, dtype=float), wanted.shape)
@@ -89,7 +110,7 @@ def polish(
     if not ((low <= p) & (p <= high)).all():
         raise ModelError("the start lies outside its bounds; move it inside")
     observables = [observable for observable, _ in targets]
-    path = trace(build(p), strategy=strategy)
+    path = trace(build(p), strategy=how.strategy)
     if not path.reached:
         raise ModelError(f"the start cannot be solved ({path.outcome}): {path.reason}")
     missed = _values(path, observables) - wanted
@@ -98,18 +119,18 @@ def polish(
         if history[-1] <= 1.0:
             outcome = Outcome.REACHED
             break
-        found = of(path, build, p, observables, steps=steps)
+        found = of(path, build, p, observables, steps=how.steps)
         J = np.array([item.gradient for item in found]) / allowed[:, None] * sizes
         better = None
         while not outcome and better is None:
             room = (np.maximum((low - p) / sizes, -trust), np.minimum((high - p) / sizes, trust))
             step = _step(J, missed / allowed, room)
-            if solves >= most:
+            if solves >= how.most:
                 outcome = "limit of solves"
             elif trust < SHORTEST or np.abs(step).max() < SHORTEST:
                 outcome = "no descent"
             else:
-                better = _better(build, p + step * sizes, observables, wanted, allowed, missed, strategy)
+                better = _better(build, p + step * sizes, observables, wanted, allowed, missed, how.strategy)
                 solves += 1
                 trust *= 2.0 if better else 0.25
         if better is not None:

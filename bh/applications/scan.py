@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +20,27 @@ from bh.formulations.state import State
 from bh.plotting.offscreen import PlotError, render
 from meshes.io.export import replacing
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pyvista import Plotter
+
 __all__ = [
-    "IDENTITY", "TRIM", "Comparison", "Distances", "Motion", "Registration", "ScanError", "Surface", "align", "compare",
-    "distances", "picked", "picture", "read_cloud", "register",
-]  # fmt: skip
+    "IDENTITY",
+    "TRIM",
+    "Comparison",
+    "Distances",
+    "Motion",
+    "Registration",
+    "ScanError",
+    "Surface",
+    "align",
+    "compare",
+    "distances",
+    "picked",
+    "picture",
+    "read_cloud",
+    "register",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +69,12 @@ class Comparison:
 def compare(
     cloud: ArrayLike, state: State, start: Motion = IDENTITY, spacing: float = 1.0, trim: float = TRIM
 ) -> Comparison:
-    """Register a scan (k, 3) on a solved sheet from the first guess `start` and measure the distances both ways.
+    """Register a scan (k, 3) on a solved sheet from the initial guess `start` and measure the distances both ways.
 
     Args:
-        start: of `picked`, or of an earlier registration.
+        cloud: (k, 3) scan points, mm.
+        state: the sheet.
+        start: initial guess of the motion, of `picked` or of an earlier registration.
         spacing: of the enriched mesh, mm.
         trim: see `register`.
 
@@ -83,9 +102,14 @@ def picture(
     """Write a picture of measured points coloured by their distance, without a window.
 
     Args:
+        measured: points and their distances.
         file: to write, .png; appears whole or not at all.
         top: distance where the colours end, mm; the 99.5th percentile if None.
         caption: a line of text; True for mean, median, standard deviation and maximum.
+        size: width and height, pixels.
+
+    Returns:
+        The absolute path of the file.
 
     Raises:
         PlotError: not a .png, a size or top that cannot be, or no library to draw with.
@@ -128,13 +152,19 @@ def _image(measured: Distances, top: float, size: tuple[int, int]) -> NDArray[np
     own = float(np.prod(np.ptp(seen, axis=0))) / len(points)
     dot = min(max(2.4 * np.sqrt(own) * 0.5 * size[1] / half, 4.0), 24.0)
 
-    def draw(plotter: Any) -> None:
+    def draw(plotter: Plotter) -> None:
         import pyvista as pv
 
         plotter.add_mesh(
-            pv.PolyData(points), scalars=measured.values, clim=(0.0, top), cmap="viridis", lighting=False,
-            point_size=dot, render_points_as_spheres=False, show_scalar_bar=False,
-        )  # fmt: skip
+            pv.PolyData(points),
+            scalars=measured.values,
+            clim=(0.0, top),
+            cmap="viridis",
+            lighting=False,
+            point_size=dot,
+            render_points_as_spheres=False,
+            show_scalar_bar=False,
+        )
         plotter.set_background("white")
         plotter.enable_parallel_projection()
         plotter.camera.focal_point = centre
@@ -148,7 +178,7 @@ def _image(measured: Distances, top: float, size: tuple[int, int]) -> NDArray[np
 
 def _framed(
     image: NDArray[np.float64], size: tuple[int, int], foot: int, title: str, top: float, cut: bool
-) -> Any:
+) -> Figure:
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

@@ -15,7 +15,7 @@ try:
     from collections.abc import Callable, Sequence
     from importlib.metadata import EntryPoint, entry_points, version
     from pathlib import Path
-    from typing import TYPE_CHECKING, Annotated, Any
+    from typing import TYPE_CHECKING, Annotated
 
     import typer
 except KeyboardInterrupt:  # `main` tells of it from here on
@@ -39,7 +39,15 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_mar
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line (without the program's name; by default that of the process); returns the exit code."""
+    """Run a command line.
+
+    Args:
+        arguments: without the program's name; None for those of the process.
+
+    Returns:
+        The exit code: 0, 1 where a result was not reached, 2 for bad input, 3 for a fault of the program, 130 where
+        it was interrupted.
+    """
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in (words[: words.index("--")] if "--" in words else words)
     if debug:  # it may stand anywhere, also behind a command
@@ -102,6 +110,7 @@ def _options(
     debug: Annotated[bool, typer.Option("--debug", help="Show where an error comes from.")] = False,
 ) -> None:
     """Bar-and-hinge simulation of sheets folded along curved creases."""
+    del show_version, debug  # the one has its own callback, `main` looks for the other
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 
@@ -327,8 +336,8 @@ def _add_commands() -> None:
         app.command(entry.name, help=about, add_help_option=False, context_settings=settings)(_proxy(entry))
 
 
-def _proxy(entry: EntryPoint) -> Callable[[typer.Context], Any]:
-    def call(context: typer.Context) -> Any:
+def _proxy(entry: EntryPoint) -> Callable[[typer.Context], None]:
+    def call(context: typer.Context) -> None:
         from bh.errors import InputError
 
         try:

@@ -22,8 +22,7 @@ from bh.applications.inverse.simulate import Simulated, simulate
 from bh.applications.inverse.surrogate import Surrogate, read, shipped
 from bh.errors import InputError
 from bh.paths.provenance import versions
-from bh.scene.reading import Table, check_keys, one_line, read_table, read_toml
-from bh.scene.tables import Vector
+from bh.scene.reading import Table, Vector, check_keys, one_line, read_table, read_toml
 from meshes import parallel_creases
 from meshes.curves import arc_lengths, interpolated
 from meshes.io import write_pattern
@@ -48,12 +47,15 @@ class TargetTable(Table):
 
     @model_validator(mode="after")
     def one_target(self) -> TargetTable:
+        """Check that one thing is asked for."""
         if (self.point is not None) + (self.curve is not None) + self.move_tip != 1:
             raise ValueError("needs exactly one of point, curve and move_tip = true")
         return self
 
 
 class SearchTable(Table):
+    """How the design is looked for."""
+
     segments: Annotated[int, Field(ge=1, le=8)] = Field(
         4, description="the largest number of segments, 1 to 8"
     )
@@ -69,7 +71,10 @@ class Answer:
     """A design with its simulated strip, and what it was judged by.
 
     Attributes:
-        measure: name, value and unit of what was asked for, by the surrogate and by the simulation of the strip.
+        design: crease and pinches.
+        strip: the simulated strip.
+        measure: name, value and unit of what was asked for, by the surrogate and by the simulation of the
+            strip.
         goal: (k, 3) point or curve to be drawn beside it, mm.
     """
 
@@ -182,6 +187,11 @@ def read_curve(file: str | Path) -> Array:
 
 def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Path]:
     """Write pattern.svg, pattern.dxf, path.bh, design.png and design.json; returns the files.
+
+    Args:
+        answer: of `solve`.
+        folder: for the files; made if need be.
+        data: what the data set is called in design.json.
 
     Raises:
         DesignError: the folder cannot be written.

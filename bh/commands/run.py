@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import tempfile
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,7 +33,14 @@ FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "resul
 
 
 class Solved(NamedTuple):
-    """A path, the names of its files, whether it had been finished before, and its first self-contact if any."""
+    """What a run has come to.
+
+    Attributes:
+        path: solved, as far as it goes.
+        names: of its two files in the folder.
+        before: whether it had been finished before.
+        contact: its first self-contact, if any.
+    """
 
     path: Trace
     names: tuple[str, str]
@@ -50,6 +56,8 @@ def solve(
     Pictures, series and FOLD files that `bh run` has written there of other states are removed.
 
     Args:
+        scene: to be solved.
+        folder: for the files.
         resume: go on from the states in the folder.
         progress: as for `bh.trace`.
 
@@ -65,9 +73,13 @@ def solve(
         (folder / names[1]).unlink(missing_ok=True)
     try:
         path = trace(
-            scene.model, progress=progress, file=file, resume=resume, accuracy=scene.accuracy,
+            scene.model,
+            progress=progress,
+            file=file,
+            resume=resume,
+            accuracy=scene.accuracy,
             symmetry=scene.symmetry,
-        )  # fmt: skip
+        )
     except (InputError, KeyboardInterrupt):
         if not resume and not holds_states(file):
             _take_back(file, made)
@@ -188,11 +200,17 @@ def _take_back(file: Path | None, made: Sequence[Path]) -> None:
 def _move(file: Path, place: Path) -> None:
     # a journal that a killed run left there belongs to the file that goes
     place.with_name(place.name + "-journal").unlink(missing_ok=True)
-    os.replace(file, place)
+    file.replace(place)
 
 
-def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, Any]:
-    """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact."""
+def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, object]:
+    """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact.
+
+    Args:
+        path: solved, as far as it goes.
+        scene: that it is of.
+        contact: the path's first self-contact, if any.
+    """
     model = path.model
     mesh, last = model.mesh, path[-1]
     folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
@@ -248,9 +266,9 @@ def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, Any]
     }
 
 
-def _contact(path: Trace, contact: Contact | None) -> dict[str, Any]:
+def _contact(path: Trace, contact: Contact | None) -> dict[str, object]:
     """Whether the sheet passes through itself, and where first; of very many triangle pairs the first hundred."""
-    found: dict[str, Any] = {"found": contact is not None, "states": len(path)}
+    found: dict[str, object] = {"found": contact is not None, "states": len(path)}
     if contact is not None:
         found |= {
             "about": "reported, not prevented: from this state on the sheet passes through itself",
@@ -270,7 +288,12 @@ def _number(value: float) -> float | None:
 
 
 def remove_extras(folder: Path, mark: str) -> None:
-    """Remove what `extras` has written for another run, as far as it can be removed; nothing else."""
+    """Remove what `extras` has written for another run, as far as it can be removed; nothing else.
+
+    Args:
+        folder: of the run.
+        mark: "" or "-unfinished", as in the names of the files.
+    """
     with contextlib.suppress(OSError):
         for name in (f"folded{mark}.png", f"path{mark}.pvd", *(f"folded{mark}{suffix}" for suffix in FOLDED)):
             (folder / name).unlink(missing_ok=True)
@@ -282,8 +305,19 @@ def remove_extras(folder: Path, mark: str) -> None:
 
 def extras(
     path: Trace, scene: Scene, folder: Path, pictures: bool, vtu: bool
-) -> dict[str, Callable[[], Any]]:
-    """What is written on request beside the result, by name (marked where a finished result is kept)."""
+) -> dict[str, Callable[[], object]]:
+    """What is written on request beside the result, by name (marked where a finished result is kept).
+
+    Args:
+        path: solved, as far as it goes.
+        scene: whose outputs are written.
+        folder: for the files.
+        pictures: also draw the folded sheet.
+        vtu: also write all states for ParaView.
+
+    Returns:
+        By the name of the file what writes it.
+    """
     mark = "-unfinished" if not path.reached and _is_finished(folder) else ""
 
     def draw() -> None:
@@ -310,7 +344,7 @@ def extras(
         f"path{mark}.pvd": (series, vtu or scene.outputs.vtu),
         f"folded{mark}.fold": (fold, scene.outputs.fold),
     }
-    files: dict[str, Callable[[], Any]] = {name: write for name, (write, asked) in wanted.items() if asked}
+    files: dict[str, Callable[[], object]] = {name: write for name, (write, asked) in wanted.items() if asked}
     for suffix in scene.outputs.folded:
         name = f"folded{mark}.{suffix}"
         files[name] = partial(write_state, folder / name, [path[-1]], scene.name)

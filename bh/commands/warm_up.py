@@ -18,8 +18,8 @@ from bh.solving.trace import trace
 def warm_up() -> None:
     """Fold a tiny sheet in every way that has kernels of its own, in every formulation that is installed."""
     mesh = meshes.structured(meshes.annulus_sector(10.0, 1.0, 0.3), along=2)
-    for formulation in names():
-        path = _fold(Model(mesh, Sheet(E=1.0, t=0.1), formulation=formulation))
+    for name in names():
+        path = _fold(Model(mesh, Sheet(E=1.0, t=0.1), formulation=name))
     clamped = Model(mesh, Sheet(E=1.0, t=0.1), formulation="consistent").support(
         "edge:start", "xyz", clamp=True
     )

@@ -20,6 +20,14 @@ from bh.plotting.offscreen import PlotError, has_display
 from bh.plotting.pictures import export_series, picture, show
 
 __all__ = [
-    "PlotError", "animation", "curves", "export_series", "fold_angles", "has_display", "pattern", "picture", "response",
+    "PlotError",
+    "animation",
+    "curves",
+    "export_series",
+    "fold_angles",
+    "has_display",
+    "pattern",
+    "picture",
+    "response",
     "show",
-]  # fmt: skip
+]

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,28 +28,32 @@ if TYPE_CHECKING:
     from meshes.mesh import SheetMesh
 
 Array = NDArray[np.float64]
+Dashes = str | tuple[float, tuple[float, ...]]  # a line style of matplotlib
 
 INK = "#1b1b1f"
 # Okabe and Ito's colours, told apart with any colour vision; dashes tell the lines apart in grey
-CURVES = {
+CURVES: dict[str, tuple[str, Dashes]] = {
     "total": (INK, "-"),
     "bending": ("#0072b2", "-"),
     "stretching": ("#d55e00", (0, (5, 1.5))),
     "folding": ("#009e73", (0, (1.2, 1.2))),
 }
-FOLDS = {
+FOLDS: dict[str, tuple[str, Dashes]] = {
     "mountain": ("#d55e00", "-"),
     "valley": ("#0072b2", (0, (5, 2))),
     "flat": ("#8a8a8a", (0, (1.2, 1.2))),
 }
 STABLE, UNSTABLE = "#0072b2", "#d55e00"
-CRITICAL = {"limit": "^", Critical.BIFURCATION: "D"}
+CRITICAL = {Critical.LIMIT: "^", Critical.BIFURCATION: "D"}
 FEW_NODES = 12  # whose marks do not hide what they stand on
 MOST_ANGLES = 7  # states of a path that are drawn along a crease
 
 
 def curves(path: Path) -> Figure:
     """Energy by kind, N mm, against step + lambda, as a matplotlib figure; kinds that stay zero are left out.
+
+    Args:
+        path: solved, as far as it goes.
 
     Raises:
         PlotError: the path has no states.
@@ -83,6 +88,8 @@ def fold_angles(path: Path, crease: str, count: int = MOST_ANGLES) -> Figure:
     """Fold angle along a crease, degrees, against arc length of the flat crease, mm, in some states of a path.
 
     Args:
+        path: solved, as far as it goes.
+        crease: its name.
         count: how many states, evenly taken, the last one among them.
 
     Raises:
@@ -103,10 +110,8 @@ def fold_angles(path: Path, crease: str, count: int = MOST_ANGLES) -> Figure:
         # from dark to light, but not to the yellow that paper swallows
         colour = colormaps["viridis"](0.85 * place / max(len(chosen) - 1, 1))
         state = path[index]
-        axes.plot(
-            middle, np.degrees(state.fold_angle(crease)), color=colour, linewidth=1.8,
-            label=f"step {state.step + 1}, λ = {state.lam:.3g}",
-        )  # fmt: skip
+        label = f"step {state.step + 1}, λ = {state.lam:.3g}"
+        axes.plot(middle, np.degrees(state.fold_angle(crease)), color=colour, linewidth=1.8, label=label)
     axes.set_xlim(0.0, float(length.sum()))
     axes.legend(frameon=False, fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
@@ -125,11 +130,12 @@ def response(
     triangles and bifurcations diamonds at the last state before them. A jump to another branch is not joined.
 
     Args:
-        at: the place whose mean displacement is the abscissa, and whose reaction the ordinate; None for the energy
-            against step + lambda.
+        path: solved, as far as it goes.
+        at: the place whose mean displacement is the abscissa, and whose reaction the ordinate; None for the
+            energy against step + lambda.
         along: the direction of both, "x", "y", "z" or three numbers.
-        force: "reaction" (N, of the supports at the place on the sheet), "lambda" for step + lambda, or a function of
-            a state.
+        force: "reaction" (N, of the supports at the place on the sheet), "lambda" for step + lambda, or a
+            function of a state.
 
     Raises:
         PlotError: the path has no states, or `along` or `force` is not known.
@@ -144,17 +150,14 @@ def response(
         if jumped[index]:
             continue
         whole = stable[index - 1] and stable[index]
-        axes.plot(
-            x[index - 1 : index + 1], y[index - 1 : index + 1], zorder=1, linewidth=1.6,
-            color=STABLE if whole else UNSTABLE, linestyle="-" if whole else (0, (4, 2)),
-        )  # fmt: skip
-    look: dict[str, Any] = {"linestyle": "none", "markersize": 4.5, "zorder": 2}
+        colour, dashes = (STABLE, "-") if whole else (UNSTABLE, (0, (4, 2)))
+        ends = slice(index - 1, index + 1)
+        axes.plot(x[ends], y[ends], zorder=1, linewidth=1.6, color=colour, linestyle=dashes)
+    dots = partial(axes.plot, linestyle="none", markersize=4.5, zorder=2)
     if stable.any():
-        axes.plot(x[stable], y[stable], "o", color=STABLE, label="stable", **look)
+        dots(x[stable], y[stable], "o", color=STABLE, label="stable")
     if not stable.all():
-        axes.plot(
-            x[~stable], y[~stable], "o", color=UNSTABLE, markerfacecolor="white", label="not stable", **look
-        )
+        dots(x[~stable], y[~stable], "o", color=UNSTABLE, markerfacecolor="white", label="not stable")
     for kind, marker in CRITICAL.items():
         before = [
             index - 1
@@ -162,9 +165,7 @@ def response(
             if index > 0 and any(kind in point.kind for point in record.critical)
         ]
         if before:
-            axes.plot(
-                x[before], y[before], marker, color=INK, label=f"{kind} point", **look | {"markersize": 8.0}
-            )
+            dots(x[before], y[before], marker, color=INK, label=f"{kind} point", markersize=8.0)
     axes.legend(frameon=False, fontsize="small", loc="best")
     return figure
 
@@ -209,6 +210,9 @@ def pattern(model: Model) -> Figure:
 
     A support is marked by the letters that it fixes, once a place; a triangle stands on its nodes, a square where the
     slope is held too.
+
+    Args:
+        model: of which mesh and supports are drawn.
     """
     mesh = model.mesh
     figure, axes = _axes_of("x, mm", "y, mm")
@@ -251,7 +255,7 @@ def _edges(
     mesh: SheetMesh,
     pairs: NDArray[np.int64],
     colour: str,
-    dashes: Any,
+    dashes: Dashes,
     width: float,
     label: str | None = None,
 ) -> None:

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 from functools import cache
 from html import escape
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bh.plotting.camera import best_view, viewing_axes
 from bh.plotting.offscreen import PlotError
 from bh.plotting.panels import cut_open
 from meshes.io.export import replacing
@@ -35,11 +36,53 @@ FORMAT = 1
 FOLDER = FilePath(__file__).with_name("viewer")
 
 
+class ModelFrames(TypedDict):
+    """One model in all frames; arrays are little-endian float32 or int32 in base64.
+
+    Attributes:
+        name: of the model.
+        nodes: (m,) of the points that are corners of the sheet cut open along its creases.
+        triangles: (t, 3) of those corners.
+        outline: (k, 2) pairs of nodes along boundary and creases.
+        points: (f, n, 3), mm.
+        density: by kind (f, n), N mm / mm^2.
+        energy: by kind, one a frame, N mm.
+    """
+
+    name: str
+    nodes: str
+    triangles: str
+    outline: str
+    points: str
+    density: dict[str, str]
+    energy: dict[str, list[float]]
+
+
+class Frames(TypedDict):
+    """What the viewer draws.
+
+    Attributes:
+        format: of this data.
+        label: the name of what the slider reads.
+        lambdas: what it reads, one a frame.
+        tops: by kind the energy density where colours end, N mm / mm^2.
+        eye: [x, y, z] that the sheets are looked at from.
+        models: side by side.
+    """
+
+    format: int
+    label: str
+    lambdas: list[float]
+    tops: dict[str, float]
+    eye: list[float]
+    models: list[ModelFrames]
+
+
 def frames(
     models: Mapping[str, Sequence[State]],
     lambdas: Sequence[float],
     label: str = "\N{GREEK SMALL LETTER LAMDA}",
-) -> dict[str, Any]:
+) -> Frames:
     """The states of one or several models as JSON data that the viewer draws.
 
     Args:
@@ -48,17 +91,11 @@ def frames(
         label: the name of what the slider reads.
 
     Returns:
-        {"format", "label", "lambdas": [...], "tops": {kind: N mm / mm^2}, "eye": [x, y, z], "models": [...]}; of
-        each model its "name", "nodes" (m,) of the points that are corners of the sheet cut open along its creases,
-        "triangles" (t, 3) of those corners, "outline" (k, 2) pairs of nodes along boundary and creases, and by
-        frame "points" (f, n, 3) mm, "density" {kind: (f, n)} and "energy" {kind: (f,)} N mm. Arrays are
-        little-endian float32 or int32 in base64.
+        The frames, as plain JSON data.
 
     Raises:
         PlotError: no models, no states, or not as many states as lambdas.
     """
-    from bh.plotting.pictures import _axes, _view
-
     if not models or not lambdas:
         raise PlotError("there are no states to show; trace the model first")
     for name, states in models.items():
@@ -76,12 +113,12 @@ def frames(
             kind: float(np.percentile(np.concatenate([s.nodal_energy_density(kind) for s in last]), BRIGHT))
             for kind in kinds
         },
-        "eye": _axes(*_view(last[0], 4.0 / 3.0))[2].tolist(),
+        "eye": viewing_axes(*best_view(last[0], 4.0 / 3.0))[2].tolist(),
         "models": [_model(name, states, kinds) for name, states in models.items()],
     }
 
 
-def _model(name: str, states: Sequence[State], kinds: Sequence[str]) -> dict[str, Any]:
+def _model(name: str, states: Sequence[State], kinds: Sequence[str]) -> ModelFrames:
     mesh = states[0].mesh
     nodes, triangles = cut_open(mesh)
     creases = [mesh.crease_edges(crease) for crease in mesh.creases]
@@ -100,15 +137,26 @@ def _model(name: str, states: Sequence[State], kinds: Sequence[str]) -> dict[str
 
 
 def packed(values: ArrayLike, kind: str) -> str:
-    """An array as base64 text of its values in C order; `kind` is "<f4" or "<i4"."""
+    """An array as base64 text of its values in C order; `kind` is "<f4" or "<i4".
+
+    Args:
+        values: of any shape.
+        kind: "<f4" or "<i4".
+    """
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
 
 
 @dataclass(frozen=True, repr=False)
 class View:
-    """Frames that show themselves in a notebook, or as a page of their own."""
+    """Frames that show themselves in a notebook, or as a page of their own.
 
-    data: dict[str, Any]
+    Attributes:
+        data: what is drawn, see `frames`.
+        title: of the page.
+        height: of the frame in a notebook, CSS pixels.
+    """
+
+    data: Frames
     title: str = "Folded sheet"
     height: int = 520  # of the frame in a notebook, CSS pixels
 
@@ -149,7 +197,9 @@ def view(paths: Path | Mapping[str, Path], title: str = "Folded sheet") -> View:
     """All states of a path to turn with the mouse, or of several paths side by side.
 
     Args:
-        paths: a path; or paths by name, of which the states at every step + lambda that all of them have are shown.
+        paths: a path; or paths by name, of which the states at every step + lambda that all of them have are
+            shown.
+        title: of the page.
 
     Raises:
         PlotError: a path has no states, the paths have none in common, or plotly is not installed.
@@ -172,8 +222,15 @@ def view(paths: Path | Mapping[str, Path], title: str = "Folded sheet") -> View:
 # --- what a page is made of ------------------------------------------------------------------------------------
 
 
-def figure(data: Mapping[str, Any], name: str, title: str, still: str = "") -> str:
-    """The HTML of a viewer with its data; `name` begins its ids, `still` is shown until it draws (an <img>)."""
+def figure(data: Frames, name: str, title: str, still: str = "") -> str:
+    """The HTML of a viewer with its data; `name` begins its ids, `still` is shown until it draws (an <img>).
+
+    Args:
+        data: see `frames`.
+        name: begins the ids of its elements; each once a page.
+        title: for readers who do not see it.
+        still: HTML shown until it draws (an <img>).
+    """
     kinds = [*data["tops"], *(["total"] if len(data["tops"]) > 1 else [])]
     shown = "bending" if "bending" in kinds else (kinds or ["none"])[0]
     options = "".join(

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ def animation(
     """Write the states of a path as a moving picture, seen from one place and on one scale of colours.
 
     Args:
+        path: solved, as far as it goes.
         file: to write, .gif or .mp4; appears whole or not at all.
         colour: as for `picture`.
         size: width and height, pixels.
@@ -41,7 +42,7 @@ def animation(
         states: which states, all by default.
 
     Returns:
-        the absolute path of the file.
+        The absolute path of the file.
 
     Raises:
         PlotError: no states, a size or rate that cannot be, or no ffmpeg for .mp4.
@@ -93,7 +94,7 @@ def _gif(pictures: Sequence[NDArray[np.uint8]], file: FilePath, fps: int) -> Non
 
 
 def _ffmpeg() -> str:
-    """ffmpeg of the system, or that of the package imageio-ffmpeg."""
+    """The ffmpeg of the system, or that of the package imageio-ffmpeg."""
     found = shutil.which("ffmpeg")
     if found:
         return found
@@ -109,14 +110,10 @@ def _ffmpeg() -> str:
 
 def _mp4(pictures: Sequence[NDArray[np.uint8]], file: FilePath, fps: int, program: str) -> None:
     height, width, _ = pictures[0].shape
-    options: list[Any] = [
-        program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-        "-r", fps, "-i", "-", "-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-f", "mp4", file,
-    ]  # fmt: skip
-    done = subprocess.run(
-        [str(option) for option in options],
-        input=b"".join(picture.tobytes() for picture in pictures), capture_output=True, check=False,
-    )  # fmt: skip
+    options = f"-y -loglevel error -f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {fps} -i - -an".split()
+    options += ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-f", "mp4", str(file)]
+    raw = b"".join(picture.tobytes() for picture in pictures)
+    done = subprocess.run([program, *options], input=raw, capture_output=True, check=False)
     if done.returncode != 0:
         told = done.stderr.decode(errors="replace").strip().splitlines()
         raise PlotError(f"ffmpeg could not write the animation ({told[-1] if told else 'no reason given'})")

@@ -12,12 +12,15 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshes.errors import InputError
+
+if TYPE_CHECKING:
+    from pyvista import Plotter
 
 Array = NDArray[np.float64]
 
@@ -26,8 +29,12 @@ class PlotError(InputError):
     """A picture, curve or series that cannot be made or written."""
 
 
-def render(size: tuple[int, int], draw: Callable[[Any], None]) -> Array:
+def render(size: tuple[int, int], draw: Callable[[Plotter], None]) -> Array:
     """What `draw` puts into a pyvista plotter, as a picture (height, width, 3) with values in [0, 1].
+
+    Args:
+        size: width and height, pixels.
+        draw: puts things into the plotter and sets its camera.
 
     Raises:
         PlotError: there is no library to draw with.

@@ -8,18 +8,21 @@ import tempfile
 import uuid
 from collections.abc import Sequence
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.plotting.camera import Camera, camera_of
 from bh.plotting.charts import INK
 from bh.plotting.offscreen import PlotError, has_display, render
 from bh.plotting.panels import cut_open
 from meshes.io.export import replacing, write_mesh
 
 if TYPE_CHECKING:
+    from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
+    from pyvista import Actor, Plotter, PolyData
 
     from bh.formulations.state import State
     from bh.paths.path import Path
@@ -27,6 +30,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 KINDS = ("stretching", "bending", "folding")
+# of a collection of VTU files
+HEAD = (
+    '<?xml version="1.0"?>',
+    '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
+    "  <Collection>",
+)
+FOOT = ("  </Collection>", "</VTKFile>", "")
 PAPER, BLANK_SHEET, COLOURS = "white", "#b9c4cf", "viridis"
 MOST_EDGES = 20_000  # triangles of a mesh whose edges can still be told apart in a picture
 
@@ -52,16 +62,17 @@ def picture(
     """Write a picture of the folded sheet, coloured by energy density, without a window.
 
     Args:
+        state: of a path.
         file: to write, .png; appears whole or not at all.
-        colour: "stretching", "bending", "folding" or "total" energy density averaged to nodes,
-            N mm / mm^2; None for the plain sheet (also drawn where there is no such energy at all).
+        colour: "stretching", "bending", "folding" or "total" energy density averaged to nodes, N mm / mm^2;
+            None for the plain sheet (also drawn where there is no such energy at all).
         size: width and height, pixels.
         caption: a line of text; True for lambda and the energies, False for none.
         camera: azimuth and elevation that it looks from, rad; None for where most of the sheet is seen.
         top: energy density where the colours end, to compare pictures; None for the largest there is.
 
     Returns:
-        the absolute path of the file.
+        The absolute path of the file.
 
     Raises:
         PlotError: not a state, an unknown colour, a size that cannot be, or no library to draw with.
@@ -76,7 +87,7 @@ def picture(
     unit = _unit(width, height)
     head, foot = int(64 * unit) if title else 0, int(118 * unit) if colouring is not None else 0
     inner = height - head - foot
-    image = _render(state, colouring, (width, inner), _camera(state, width / inner, camera))
+    image = _render(state, colouring, (width, inner), camera_of(state, width / inner, camera))
     figure = _frame(image, (width, height), foot, title, f"{colour} energy density", colouring)
     with replacing(target) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
@@ -86,7 +97,16 @@ def picture(
 def moving_pictures(
     states: Sequence[State], colour: str | None, size: tuple[int, int]
 ) -> list[NDArray[np.uint8]]:
-    """Pictures (height, width, 3) of states as `animation` shows them: one camera, one scale of colours."""
+    """Pictures (height, width, 3) of states as `animation` shows them: one camera, one scale of colours.
+
+    Args:
+        states: of one path.
+        colour: as for `picture`.
+        size: width and height, pixels.
+
+    Raises:
+        PlotError: an unknown colour, a size that cannot be, or no library to draw with.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     width, height = _possible(size)
@@ -95,24 +115,28 @@ def moving_pictures(
     unit = _unit(width, height)
     head, foot = int(64 * unit), int(118 * unit) if top else 0
     inner = height - head - foot
-    camera = _camera(states[-1], width / inner, None, np.concatenate([state.points for state in states]))
+    camera = camera_of(states[-1], width / inner, None, np.concatenate([state.points for state in states]))
     found = []
     for state in states:
         colouring = _colouring(state, colour, top or None)
         image = _render(state, colouring, (width, inner), camera)
         figure = _frame(image, (width, height), foot, _energies(state), f"{colour} energy density", colouring)
         canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        found.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+        canvas.draw()  # type: ignore[no-untyped-call]
+        found.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())  # type: ignore[no-untyped-call]
     return found
 
 
-def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
+def show(state: State, colour: str | None = "bending", **options: object) -> object:
     """Show the folded sheet in a window that turns with the mouse; returns when it is closed.
 
     Args:
+        state: of a path.
         colour: as for `picture`.
-        options: of `pyvista.Plotter.show`.
+        **options: of `pyvista.Plotter.show`.
+
+    Returns:
+        What `pyvista.Plotter.show` returns.
 
     Raises:
         PlotError: not a state, an unknown colour, or there is no display.
@@ -124,7 +148,7 @@ def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
 
     colouring = _colouring(state, colour, None)
     plotter = pv.Plotter(window_size=[1200, 900], title="bh")
-    near = _camera(state, 4 / 3, None)
+    near = camera_of(state, 4 / 3, None)
     # room for the texts
     camera = near._replace(
         half_height=1.22 * near.half_height, centre=near.centre - 0.08 * near.half_height * near.up
@@ -132,9 +156,18 @@ def show(state: State, colour: str | None = "bending", **options: Any) -> Any:
     sheet = _draw(plotter, state, colouring, 2.0 * camera.half_height / 900)
     if colouring is not None:
         plotter.add_scalar_bar(
-            f"{colour} energy density, N mm / mm^2\n", mapper=sheet.mapper, color=INK, n_labels=3, fmt="%.2g",
-            position_x=0.03, position_y=0.03, width=0.34, height=0.08, title_font_size=18, label_font_size=16,
-        )  # fmt: skip
+            f"{colour} energy density, N mm / mm^2\n",
+            mapper=sheet.mapper,
+            color=INK,
+            n_labels=3,
+            fmt="%.2g",
+            position_x=0.03,
+            position_y=0.03,
+            width=0.34,
+            height=0.08,
+            title_font_size=18,
+            label_font_size=16,
+        )
     # VTK's own fonts have neither Greek letters nor raised digits
     plotter.add_text(_energies(state), font_size=9, color=INK, font_file=findfont("DejaVu Sans"))
     camera.aim(plotter)
@@ -148,8 +181,13 @@ def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path"
     energy densities of the triangles (N mm / mm^2). The states lie in the folder `name` beside the collection;
     both appear when all is written and replace what was there.
 
+    Args:
+        path: solved, as far as it goes.
+        folder: where the collection is written.
+        name: of the collection and of its folder.
+
     Returns:
-        the absolute path of the collection.
+        The absolute path of the collection.
 
     Raises:
         PlotError: a path without states, or a folder that cannot be written to.
@@ -171,10 +209,7 @@ def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path"
             write_mesh(new / file, state.mesh, state.points, at_nodes, at_cells)
             entries.append(f'    <DataSet timestep="{time:.17g}" part="0" file="{name}/{file}"/>')
         _swap(new, home / name)
-        text = "\n".join(
-            ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
-             "  <Collection>", *entries, "  </Collection>", "</VTKFile>", ""]
-        )  # fmt: skip
+        text = "\n".join((*HEAD, *entries, *FOOT))
         with replacing(home / f"{name}.pvd") as temporary:
             temporary.write_text(text, encoding="utf-8")
     except OSError as error:
@@ -235,7 +270,7 @@ def _superscript(exponent: int) -> str:
     return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def _panels(state: State) -> Any:
+def _panels(state: State) -> PolyData:
     """The sheet as a pyvista surface cut open along its creases, so that shading is smooth up to them."""
     import pyvista as pv
 
@@ -245,14 +280,14 @@ def _panels(state: State) -> Any:
     return surface
 
 
-def _draw(plotter: Any, state: State, colouring: Colouring | None, pixel: float) -> Any:
+def _draw(plotter: Plotter, state: State, colouring: Colouring | None, pixel: float) -> Actor:
     """Sheet (which is returned), mesh edges, boundary and creases; `pixel` is how many mm one is wide."""
     surface = _panels(state).compute_normals(
         cell_normals=False, split_vertices=False, consistent_normals=False, auto_orient_normals=False
     )
-    look: dict[str, Any] = {"ambient": 0.57, "diffuse": 0.47, "specular": 0.0}
+    look: dict[str, object] = {"ambient": 0.57, "diffuse": 0.47, "specular": 0.0}
     edges = _lines(state, state.mesh.topology.edges)
-    faint: dict[str, Any] = {"line_width": 1.0, "lighting": False, "show_scalar_bar": False}
+    faint: dict[str, object] = {"line_width": 1.0, "lighting": False, "show_scalar_bar": False}
     if colouring is None:
         look["color"] = BLANK_SHEET
         faint |= {"color": INK, "opacity": 0.25}
@@ -273,7 +308,7 @@ def _draw(plotter: Any, state: State, colouring: Colouring | None, pixel: float)
     return drawn
 
 
-def _shades_of_edges() -> Any:
+def _shades_of_edges() -> ListedColormap:
     """The colour map, a shade lighter where it is dark and a shade darker where it is light."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
@@ -283,84 +318,16 @@ def _shades_of_edges() -> Any:
     return ListedColormap(np.where(dark[:, None], 0.72 * colours + 0.28, 0.78 * colours))
 
 
-def _lines(state: State, pairs: NDArray[np.int64]) -> Any:
+def _lines(state: State, pairs: NDArray[np.int64]) -> PolyData:
     import pyvista as pv
 
     cells = np.column_stack((np.full(len(pairs), 2), pairs))
     return pv.PolyData(state.points, lines=cells.ravel())
 
 
-def _tubes(plotter: Any, lines: Any, radius: float) -> None:
+def _tubes(plotter: Plotter, lines: PolyData, radius: float) -> None:
     joined = lines.strip(join=True, max_length=100_000)
     plotter.add_mesh(joined.tube(radius=radius, n_sides=12, capping=True), color=INK, lighting=False)
-
-
-# --- where it is seen from ---------------------------------------------------------------------------------
-
-
-class Camera(NamedTuple):
-    """Parallel projection with z up: the picture's unit vectors in space, its centre and half its height, mm."""
-
-    across: Array
-    up: Array
-    back: Array
-    centre: Array
-    half_height: float
-    depth: float
-
-    def aim(self, plotter: Any) -> None:
-        plotter.enable_parallel_projection()
-        plotter.camera.focal_point = self.centre
-        plotter.camera.position = self.centre + 2.0 * self.depth * self.back
-        plotter.camera.up = self.up
-        plotter.camera.parallel_scale = self.half_height
-        plotter.camera.clipping_range = (0.5 * self.depth, 3.5 * self.depth)
-
-
-def _camera(
-    state: State, aspect: float, view: tuple[float, float] | None, points: Array | None = None
-) -> Camera:
-    """The sheet fills the picture (`aspect` wide a height) but for a margin, or all of `points` (n, 3) do."""
-    across, up, back = _axes(*(view or _view(state, aspect)))
-    to_picture = np.column_stack((across, up, back))
-    seen = (state.points if points is None else points) @ to_picture
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    width, height, _ = (high - low).tolist()
-    centre, depth = to_picture @ (0.5 * (low + high)), float(np.linalg.norm(high - low))
-    return Camera(across, up, back, centre, 0.54 * max(width / aspect, height), depth)
-
-
-def _view(state: State, aspect: float) -> tuple[float, float]:
-    """Azimuth and elevation, rad, from where most of the upper side is seen and the picture is filled."""
-    triangles = state.points[state.mesh.triangles]
-    doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    area = np.linalg.norm(doubled, axis=1)
-    normal, weight = doubled / area[:, None], area / area.sum()
-    if weight @ normal[:, 2] < 0.0:
-        normal = -normal
-    plan = state.points[:, :2] - state.points[:, :2].mean(axis=0)
-    long_axis = np.linalg.eigh(plan.T @ plan)[1][:, 1]
-    best, choice = -np.inf, (0.0, 0.0)
-    for elevation in np.deg2rad((30.0, 36.0, 42.0, 48.0)):
-        for azimuth in np.deg2rad(np.arange(-60.0, 300.0, 10.0)):
-            across, up, back = _axes(azimuth, elevation)
-            facing = np.log(np.maximum(normal @ back, 0.08))
-            extent = max(np.ptp(state.points @ across) / aspect, np.ptp(state.points @ up))
-            # along and across the sheet are dull; so is a view from far above
-            slanted = abs(2.0 * (long_axis @ across[:2]) * (long_axis @ back[:2]))
-            score = float(weight @ facing - 0.8 * np.log(extent) + 0.3 * slanted - 0.6 * elevation)
-            if score > best + 1e-9:
-                best, choice = score, (float(azimuth), float(elevation))
-    return choice
-
-
-def _axes(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
-    """Unit vectors of the picture in space: to its right, to its top, and towards the viewer."""
-    back = np.array(
-        (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
-    )
-    across = np.array((-np.sin(azimuth), np.cos(azimuth), 0.0))
-    return across, np.cross(back, across), back
 
 
 # --- rendering ---------------------------------------------------------------------------------------------
@@ -371,7 +338,7 @@ def _render(state: State, colouring: Colouring | None, size: tuple[int, int], ca
     _, height = size
     pixel = 2.0 * camera.half_height / height * max(height / 700.0, 0.5)
 
-    def draw(plotter: Any) -> None:
+    def draw(plotter: Plotter) -> None:
         _draw(plotter, state, colouring, pixel)
         camera.aim(plotter)
 
@@ -386,14 +353,16 @@ def _frame(
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
+    from matplotlib.font_manager import FontProperties
 
     width, height = size
     unit = _unit(width, height)
     figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor=PAPER)
     figure.figimage(image, 0, foot, origin="upper", zorder=-1)
-    text: dict[str, Any] = {"color": INK, "fontsize": 16.0 * unit, "family": "DejaVu Sans"}
+    font = FontProperties(family="DejaVu Sans", size=16.0 * unit)
     if title:
-        figure.text(0.03, 1.0 - 28 * unit / height, title.replace("$", r"\$"), ha="left", va="top", **text)
+        top = 1.0 - 28 * unit / height
+        figure.text(0.03, top, title.replace("$", r"\$"), ha="left", va="top", color=INK, fontproperties=font)
     if colouring is not None:
         power = int(np.floor(np.log10(colouring.top)))
         power = power if not -2 <= power <= 2 else 0
@@ -405,7 +374,8 @@ def _frame(
         axes.spines[:].set_visible(False)
         axes.tick_params(length=5.0 * unit, width=unit, color=INK, labelcolor=INK, labelsize=15.0 * unit)
         axes.locator_params(nbins=5)
-        axes.set_title(f"{label}, {scale}N mm / mm²", loc="left", pad=8.0 * unit, **text)
+        title = f"{label}, {scale}N mm / mm²"
+        axes.set_title(title, loc="left", pad=8.0 * unit, color=INK, fontproperties=font)
     return figure
 
 
@@ -418,5 +388,5 @@ def _swap(new: FilePath, place: FilePath) -> None:
     """Move the folder `new` to `place`, whatever was there before."""
     with tempfile.TemporaryDirectory(dir=place.parent, prefix=".old-") as old:
         if place.exists():
-            os.replace(place, FilePath(old) / place.name)
-        os.replace(new, place)
+            place.replace(FilePath(old) / place.name)
+        new.replace(place)

@@ -30,8 +30,7 @@ def ensure() -> None:
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given and writable(Path(given)):
         return
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    folder = Path(home, NAME)
+    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path("~", ".cache").expanduser(), NAME)
     if not (folder.is_absolute() and writable(folder)):
         folder = _temporary()
     os.environ["NUMBA_CACHE_DIR"] = str(folder)

@@ -5,37 +5,44 @@ from __future__ import annotations
 import sys
 import time
 from types import TracebackType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
 
 
 class ProgressMeter(Protocol):
     """Told about every accepted increment; `step` counts from 0."""
 
-    def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None: ...
+    def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
+        """Report an accepted increment; `step` of `steps` counts from 0, energy in N mm."""
 
-    def close(self, outcome: str) -> None: ...
+    def close(self, outcome: str) -> None:
+        """The trace has ended, or was stopped."""
 
 
 class Silent:
     """No report at all."""
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
-        return
+        """Report nothing."""
 
     def close(self, outcome: str) -> None:
-        return
+        """Nothing to close."""
 
 
 class Bar:
     """A bar with lambda, iterations and energy on stderr; where that is no terminal, a plain line now and then.
 
     Attributes:
-        first, every: seconds until the first plain line and between two of them.
+        first: seconds until the first plain line.
+        every: seconds between two of them.
     """
 
     first, every = 5.0, 15.0
 
     def __init__(self) -> None:
+        """Nothing is shown before the first increment."""
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -49,13 +56,14 @@ class Bar:
             transient=False,
         )
         self._enabled = self._progress.console.is_terminal
-        self._task: Any = None
+        self._task: TaskID | None = None
         self._step = -1
         self._iterations = 0
         self._began = time.monotonic()
         self._due = self._began + self.first
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
+        """Move the bar, or print a line where there is no terminal."""
         new = step != self._step
         self._step, self._iterations = step, iterations + (0 if new else self._iterations)
         if not self._enabled:
@@ -66,6 +74,7 @@ class Bar:
             self._task = self._progress.add_task(
                 "", total=1.0, step=f"{step + 1}/{steps}", iterations=0, energy=0.0
             )
+        assert self._task is not None
         self._progress.update(self._task, completed=lam, iterations=self._iterations, energy=energy)
 
     def _tell(self, step: int, steps: int, lam: float, energy: float) -> None:
@@ -81,13 +90,17 @@ class Bar:
         )
 
     def close(self, outcome: str) -> None:
+        """Leave the bar as it is."""
+        del outcome
         if self._enabled:
             self._progress.stop()
 
     def __enter__(self) -> Bar:
+        """The bar itself, to be closed at the end of the block."""
         return self
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Close the bar, also after an error."""
         self.close("")
 
 

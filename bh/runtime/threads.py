@@ -10,15 +10,18 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 _lock = threading.Lock()
 _inside = 0
-_limit: Any = None
+_limit: ThreadpoolController | None = None
 
 
 @cache
-def _blas() -> Any:
+def _blas() -> ThreadpoolController:
     """The BLAS libraries of this process. NumPy's and SciPy's are there once SciPy's linear algebra is imported."""
     import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
@@ -45,7 +48,7 @@ def one_blas_thread() -> Iterator[None]:
     finally:
         with _lock:
             _inside -= 1
-            if _inside == 0:
+            if _inside == 0 and _limit is not None:
                 # only the thread that set the number may change it again, unless it is told to give that up
                 OpenBLASController.clear_controlling_thread(force=True)
                 _limit.restore_original_limits()

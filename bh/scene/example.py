@@ -65,6 +65,10 @@ pictures = true
 def example(drawing: Path | None = None, folder: Path = Path()) -> str:
     """The text of a scene; with a drawing (looked for in `folder`) the mesh that suits what it shows.
 
+    Args:
+        drawing: file name of a drawing (.svg, .dxf) or of a .fold file; None for a scene without one.
+        folder: where the drawing is looked for.
+
     Raises:
         InputError: the drawing cannot be read, or is none.
     """

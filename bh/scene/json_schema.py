@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 from bh.scene import tables
 from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
 from bh.scene.reading import Table
+
+Schema = dict[str, object]
 
 SINGLE: dict[str, type[Table]] = {
     "sheet": tables.SheetTable,
@@ -24,19 +25,19 @@ OWN = {
 MESHES: tuple[type[Table], ...] = (tables.MeshTable, tables.GmshTable, tables.DrawnTable)
 
 
-def schema() -> dict[str, Any]:
+def schema() -> Schema:
     """The schema (draft 2020-12) of every table and key of a scene.
 
     What only fits together with other values (places, widths and radii, one of two keys) is told by `bh check`.
     """
-    found: dict[str, Any] = {}
+    found: Schema = {}
     patterns: list[type[Table]] = [*LIBRARY.values(), FilePattern, DrawingPattern]
     steps = {key: _one_or_more(_table(found, kind)) for key, kind in tables.ACTUATIONS.items()}
     steps["until"] = _table(found, tables.UntilTable)
     scene = {
-        "pattern": {"anyOf": [*_any(found, patterns)["anyOf"], OWN]},
+        "pattern": {"anyOf": [*_tables(found, patterns), OWN]},
         **{name: _table(found, kind) for name, kind in SINGLE.items()},
-        "mesh": _any(found, MESHES),
+        "mesh": {"anyOf": _tables(found, MESHES)},
         "supports": {"type": "array", "items": {"anyOf": [_table(found, tables.SupportTable), OWN]}},
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
         "symmetry": {"anyOf": [{"enum": ["x", "y"]}, VECTOR]},
@@ -64,7 +65,7 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _table(found: dict[str, Any], kind: type[Table]) -> dict[str, Any]:
+def _table(found: Schema, kind: type[Table]) -> Schema:
     """A reference to the schema of a table, which is put into `found`."""
     if kind.__name__ not in found:
         own = kind.model_json_schema(ref_template="#/$defs/{model}")
@@ -73,9 +74,9 @@ def _table(found: dict[str, Any], kind: type[Table]) -> dict[str, Any]:
     return {"$ref": f"#/$defs/{kind.__name__}"}
 
 
-def _any(found: dict[str, Any], kinds: Iterable[type[Table]]) -> dict[str, Any]:
-    return {"anyOf": [_table(found, kind) for kind in kinds]}
+def _tables(found: Schema, kinds: Iterable[type[Table]]) -> list[Schema]:
+    return [_table(found, kind) for kind in kinds]
 
 
-def _one_or_more(item: dict[str, Any]) -> dict[str, Any]:
+def _one_or_more(item: Schema) -> Schema:
     return {"anyOf": [item, {"type": "array", "items": item, "minItems": 1}]}

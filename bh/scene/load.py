@@ -9,9 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from bh.errors import InputError, SceneError
 from bh.formulations.registry import formulation, names
@@ -26,11 +23,11 @@ from bh.model.sheet import CreaseLaw, Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support, directions, select
 from bh.model.until import Until
-from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
+from bh.scene.meshing import mesh_of
 from bh.scene.reading import (
+    arguments,
     as_table,
     as_tables,
-    as_tuple,
     check_keys,
     nearest,
     one_line,
@@ -45,27 +42,40 @@ from bh.scene.tables import (
     ACTUATIONS,
     AccuracyTable,
     CreaseTable,
-    DrawnTable,
-    GmshTable,
-    MeshTable,
     ModelTable,
     OutputsTable,
     SheetTable,
     SupportTable,
     UntilTable,
 )
-from meshes import CreasePattern, SheetMesh, structured
 
-SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy",
-            "symmetry")  # fmt: skip
-LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
+SECTIONS = (
+    "pattern",
+    "sheet",
+    "mesh",
+    "model",
+    "supports",
+    "creases",
+    "steps",
+    "outputs",
+    "accuracy",
+    "symmetry",
+)
 COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """What `bh run` writes beside the result: pictures, the path (PVD, VTU), the folded sheet, the flat pattern."""
+    """What `bh run` writes beside the result.
+
+    Attributes:
+        pictures: of the folded sheet.
+        vtu: the path, a file a state and a list of them (PVD).
+        fold: the path as a FOLD file.
+        folded: formats of the folded sheet, such as "glb".
+        flat: formats of the flat pattern, such as "svg".
+    """
 
     pictures: bool = False
     vtu: bool = False
@@ -97,6 +107,9 @@ class Scene:
 
 def load_scene(path: str | Path) -> Scene:
     """Read a scene file.
+
+    Args:
+        path: of the file (TOML); patterns that it names are looked for in its folder.
 
     Raises:
         SceneError: it cannot be read, or asks for what cannot be; one line that begins with the file's name.
@@ -137,6 +150,11 @@ def load_scene(path: str | Path) -> Scene:
 def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     """A scene from its text; `folder` is where files that it names are looked for.
 
+    Args:
+        text: TOML.
+        folder: where files that it names are looked for.
+        name: of the scene, for messages and results.
+
     Raises:
         SceneError: the text is not TOML, or what it asks for cannot be; one line that begins with `name`.
     """
@@ -146,8 +164,13 @@ def parse_scene(text: str, folder: str | Path = ".", name: str = "scene") -> Sce
         raise SceneError(one_line(f"{name}: {error}")) from error
 
 
-def scene_from_tables(tables: dict[str, Any], folder: str | Path = ".", name: str = "scene") -> Scene:
+def scene_from_tables(tables: dict[str, object], folder: str | Path = ".", name: str = "scene") -> Scene:
     """A scene from its tables as `tomllib` reads them: what a sweep changes between points.
+
+    Args:
+        tables: keys and values of TOML.
+        folder: where files that they name are looked for.
+        name: of the scene, for messages and results.
 
     Raises:
         SceneError: as `parse_scene`.
@@ -162,7 +185,7 @@ def _scene(text: str, folder: Path) -> Scene:
     return _from_tables(read_toml(text), folder)
 
 
-def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
+def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     check_keys("", data, SECTIONS)
     for key in ("pattern", "sheet", "steps"):
         if key not in data:
@@ -178,7 +201,7 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
     if accuracy is not None and how_meshed is None and "file" not in as_table(data["pattern"], "pattern"):
         how_meshed = COARSEST  # only to check the scene on
     model = Model(
-        mesh=_mesh(data["pattern"], how_meshed, folder),
+        mesh=mesh_of(data["pattern"], how_meshed, folder),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
@@ -192,11 +215,15 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
             pattern_of(model)
             if accuracy.at is not None:
                 model.mesh.nodes(accuracy.at)
-    return Scene(model, Outputs(**{name: as_tuple(value) for name, value in outputs}), accuracy=accuracy,
-                 symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None)  # fmt: skip
+    return Scene(
+        model,
+        Outputs(**arguments(outputs)),
+        accuracy=accuracy,
+        symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None,
+    )
 
 
-def _symmetry(model: Model, data: Any) -> Plane:
+def _symmetry(model: Model, data: object) -> Plane:
     """A letter, or a normal."""
     if not isinstance(data, str | list):
         raise SceneError(f'symmetry = {shown(data)} cannot be; give "x", "y" or a normal [x, y, 0]')
@@ -205,11 +232,11 @@ def _symmetry(model: Model, data: Any) -> Plane:
     return data if isinstance(data, str) else tuple(data)
 
 
-def _accuracy(data: Any) -> Goal:
+def _accuracy(data: object) -> Goal:
     """A number, or a table."""
     with within("accuracy"):
         if not isinstance(data, dict):
-            return Goal(data)
+            return Goal(data)  # type: ignore[arg-type]  # it refuses what is no number
         table = read_table(AccuracyTable, data, "accuracy")
         direction = None if table.direction is None else tuple(table.direction)
         return Goal(table.within, table.of, table.at, direction)  # type: ignore[arg-type]
@@ -228,121 +255,7 @@ def _formulation(name: str) -> str:
     return name
 
 
-def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
-    table = as_table(pattern, "pattern")
-    if "file" in table:
-        return _mesh_from_file(table, mesh, folder)
-    drawn = _drawn(table)
-    if mesh is None:
-        raise SceneError(
-            "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
-        )
-    how = _mesh_table(as_table(mesh, "mesh"))
-    if isinstance(how, DrawnTable):
-        raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
-    return _meshed(drawn, how)
-
-
-def _drawn(table: dict[str, Any]) -> CreasePattern:
-    """A pattern of the library, or of the user's own: "module:function" with its arguments as keys."""
-    kind = table.get("kind")
-    listed = ", ".join(LIBRARY)
-    if kind is None:
-        raise SceneError(f"pattern.kind is missing; use one of {listed}, or give a file")
-    if isinstance(kind, str) and ":" in kind:
-        with within("pattern"):
-            own: CreasePattern = made(kind, without(table, "kind"), CreasePattern)
-            return own
-    if not isinstance(kind, str) or kind not in LIBRARY:
-        raise SceneError(
-            f"pattern.kind = {shown(kind)} is not known{nearest(kind, LIBRARY)}; use one of {listed}"
-        )
-    drawn = read_table(LIBRARY[kind], table, "pattern")
-    with within("pattern"):
-        return drawn.draw()
-
-
-def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
-    if isinstance(how, GmshTable):
-        from meshes.unstructured import sheet_area, unstructured
-
-        _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
-        with within("mesh"):
-            return unstructured(flat, size=how.size, near=how.near, growth=how.growth, seed=how.seed)
-    if not flat.rails:
-        raise SceneError(
-            f'mesh.kind = "{how.kind}" is for creases that run across the sheet side by side, or round a hole; '
-            'these do not: use kind = "gmsh" with size'
-        )
-    _check_size(flat, how)
-    with within("mesh"):
-        return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
-
-
-def _mesh_table(table: dict[str, Any]) -> MeshTable | GmshTable | DrawnTable:
-    if table.get("kind") == "gmsh":
-        return read_table(GmshTable, table, "mesh")
-    if table.get("kind") == "drawn":
-        return read_table(DrawnTable, table, "mesh")
-    if "size" in table:
-        raise SceneError(
-            f'mesh.size = {shown(table["size"])} is for kind = "gmsh"; use along or aspect_ratio, or add that kind'
-        )
-    return read_table(MeshTable, table, "mesh")
-
-
-def _mesh_from_file(table: dict[str, Any], mesh: Any, folder: Path) -> SheetMesh:
-    name = shown(table["file"])
-    suffix = Path(str(table["file"])).suffix.lower()
-    if suffix in (".svg", ".dxf"):
-        return _mesh_from_drawing(read_table(DrawingPattern, table, "pattern"), mesh, folder)
-    stored = read_table(FilePattern, table, "pattern")
-    if suffix != ".fold":
-        raise SceneError(f"pattern.file = {name} is no file of a pattern; give .svg, .dxf or .fold")
-    if mesh is not None:
-        raise SceneError(f"mesh: {name} brings its own faces, and they are the mesh; remove [mesh]")
-    from meshes.io import read_fold
-
-    with within("pattern.file"):
-        return read_fold(folder / stored.file, stored.frame)
-
-
-def _mesh_from_drawing(table: DrawingPattern, mesh: Any, folder: Path) -> SheetMesh:
-    from meshes.io import read_drawn, read_pattern
-
-    if mesh is None:
-        raise SceneError(
-            'mesh is missing; add a table [mesh] with kind = "gmsh" and size, along or aspect_ratio (creases side by '
-            'side), or kind = "drawn" (the faces of the drawing)'
-        )
-    how = _mesh_table(as_table(mesh, "mesh"))
-    options = {name: value for name, value in table if name != "file"}
-    with within("pattern.file"):
-        if isinstance(how, DrawnTable):
-            return read_drawn(folder / table.file, **options)
-        drawn = read_pattern(folder / table.file, **options)
-    return _meshed(drawn, how)
-
-
-def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
-    """Refuse what would only fill the memory; `structured` decides the exact numbers."""
-    panels = len(pattern.rails) - 1
-    along = float(how.along or 0)
-    if how.aspect_ratio is not None:
-        length = max(rail.length for rail in pattern.rails)
-        # at one end and in the middle: panels can taper
-        inner, outer = (rail.point(np.array([0.0, 0.5])) for rail in (pattern.rails[0], pattern.rails[-1]))
-        height = float(np.linalg.norm(outer - inner, axis=1).max()) / panels
-        along = how.aspect_ratio * length / height * how.rows
-    _check_triangles(2.0 * along * how.rows * panels)
-
-
-def _check_triangles(triangles: float) -> None:
-    if triangles > LARGEST_MESH:
-        raise SceneError(f"mesh: this is some {triangles:.2g} triangles; ask for fewer than {LARGEST_MESH:,}")
-
-
-def _support(item: Any, at: str) -> Constraint:
+def _support(item: object, at: str) -> Constraint:
     if isinstance(item, dict) and ":" in str(item.get("kind")):
         with within(at):
             own: Constraint = made(item["kind"], without(item, "kind"), Constraint)
@@ -353,22 +266,26 @@ def _support(item: Any, at: str) -> Constraint:
     place = table.at if isinstance(table.at, str) else tuple(table.at)
     if table.fix is None:
         return Support(place, clamp=table.clamp)
-    fix: Any = table.fix
-    if not isinstance(fix, str):
-        vectors = fix if isinstance(fix[0], list) else [fix]
-        fix = tuple(_direction(vector, f"{at}.fix") for vector in vectors)
+    fix = table.fix if isinstance(table.fix, str) else _vectors(table.fix, f"{at}.fix")
     with within(f"{at}.fix"):
         directions(fix)
     return Support(place, fix, table.clamp)
 
 
-def _crease(item: Any, at: str) -> CreaseLaw:
+def _vectors(fix: list[float] | list[list[float]], at: str) -> tuple[tuple[float, ...], ...]:
+    """A direction, or a list of directions, as a tuple of them."""
+    vectors = [each for each in fix if isinstance(each, list)]
+    numbers = [each for each in fix if not isinstance(each, list)]
+    return tuple(_direction(vector, at) for vector in vectors or [numbers])
+
+
+def _crease(item: object, at: str) -> CreaseLaw:
     table = read_table(CreaseTable, item, at)
     with within(at):
         return CreaseLaw(table.Lstar, table.stiffness, table.rest)
 
 
-def _step(item: Any, at: str) -> Step:
+def _step(item: object, at: str) -> Step:
     step = as_table(item, at)
     check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTUATIONS, "until"))
     if not set(step) - {"until"}:
@@ -384,7 +301,7 @@ def _step(item: Any, at: str) -> Step:
     return Step(tuple(found), until)
 
 
-def _until(item: Any, at: str) -> Until:
+def _until(item: object, at: str) -> Until:
     table = read_table(UntilTable, item, at)
     with within(at):
         if table.depth is not None:
@@ -394,12 +311,12 @@ def _until(item: Any, at: str) -> Until:
         return Until(table.observable, table.value, table.of, table.tolerance)
 
 
-def _actuation(key: str, item: Any, at: str) -> Actuation:
+def _actuation(key: str, item: object, at: str) -> Actuation:
     if ":" in key:
         with within(at):
             own: Actuation = made(key, as_table(item, at), Actuation)
             return own
-    given = {name: as_tuple(value) for name, value in read_table(ACTUATIONS[key], item, at)}
+    given = arguments(read_table(ACTUATIONS[key], item, at))
     if isinstance(given.get("direction"), tuple):
         given["direction"] = _direction(given["direction"], f"{at}.direction")
     with within(at):

@@ -32,6 +32,11 @@ class PatternTable(Table):
     """A pattern of the library, drawn by the function of `meshes` that has the name of its kind."""
 
     def draw(self) -> CreasePattern:
+        """Draw the pattern, mm.
+
+        Raises:
+            PatternError: values that do not go together.
+        """
         given = dict(self)
         kind, folds = given.pop("kind"), given.pop("fold")
         drawn: CreasePattern = getattr(meshes, kind.replace("-", "_"))(folds=folds, **given)
@@ -39,6 +44,8 @@ class PatternTable(Table):
 
 
 class StripPattern(PatternTable):
+    """A strip with straight creases."""
+
     kind: Literal["strip"]
     length: Length = Field(description="a positive length along x in mm")
     width: Length = Field(description="a positive width along y in mm")
@@ -47,6 +54,8 @@ class StripPattern(PatternTable):
 
 
 class AnnulusSectorPattern(PatternTable):
+    """A sector of an annulus with concentric creases."""
+
     kind: Literal["annulus_sector"]
     radius: Length | list[Length] = Field(description=RADII)
     width: Length = Field(description="a positive width each side of the creases in mm")
@@ -57,6 +66,8 @@ class AnnulusSectorPattern(PatternTable):
 
 
 class FullAnnulusPattern(PatternTable):
+    """A whole annulus with concentric creases."""
+
     kind: Literal["full_annulus"]
     radius: Length | list[Length] = Field(description=RADII)
     width: Length = Field(description="a positive width each side of the creases in mm")
@@ -64,6 +75,8 @@ class FullAnnulusPattern(PatternTable):
 
 
 class ParallelPattern(PatternTable):
+    """Parallel creases described by the first of them."""
+
     kind: Literal["parallel_creases"]
     curvature: Number | Annotated[list[Number], Field(min_length=1)] = Field(
         description="the curvature of the first crease in 1/mm, of any sign, or a list with one of them a piece"
@@ -90,11 +103,12 @@ class CorrugationPattern(PatternTable):
     fold: Folds | None = Field(None, description=FOLDS)
 
     def draw(self) -> CreasePattern:
+        """Draw the pattern, mm."""
         return meshes.corrugation(self.kind, self.width, self.height, self.panels, self.fold)
 
 
 class CurvedCorrugationPattern(PatternTable):
-    """Any corrugation of the family of `meshes.curved_corrugation`."""
+    """A corrugation of the family of `meshes.curved_corrugation`."""
 
     kind: Literal["curved-corrugation"]
     exponent: Power = Field(2.0, description="a number p from 1 to 100 (2 for parabolas and ellipses)")
@@ -109,6 +123,8 @@ class CurvedCorrugationPattern(PatternTable):
 
 
 class TwoArcsPattern(PatternTable):
+    """Two circular creases across a rectangle."""
+
     kind: Literal["two_arcs"]
     width: Length = Field(100.0, description=ALONG)
     height: Length = Field(100.0, description=ACROSS)
@@ -120,6 +136,8 @@ class TwoArcsPattern(PatternTable):
 
 
 class SineTessellationPattern(PatternTable):
+    """Sine creases across a rectangle."""
+
     kind: Literal["sine_tessellation"]
     width: Length = Field(100.0, description=ALONG)
     height: Length = Field(100.0, description=ACROSS)
@@ -130,6 +148,8 @@ class SineTessellationPattern(PatternTable):
 
 
 class ParabolicCanopyPattern(PatternTable):
+    """Equal parabolas across a rectangle."""
+
     kind: Literal["parabolic_canopy"]
     width: Length = Field(100.0, description=ALONG)
     height: Length = Field(100.0, description=ACROSS)
@@ -139,6 +159,8 @@ class ParabolicCanopyPattern(PatternTable):
 
 
 class OppositeParabolasPattern(PatternTable):
+    """Two parabolas that face each other across a square."""
+
     kind: Literal["opposite_parabolas"]
     side: Length = Field(100.0, description="the side of the square in mm")
     gap: Length = Field(30.0, description="the distance between the tops in mm")
@@ -147,6 +169,8 @@ class OppositeParabolasPattern(PatternTable):
 
 
 class FilePattern(Table):
+    """A FOLD file."""
+
     file: Annotated[str, Field(min_length=1)] = Field(
         description="the name of a .fold file, from the folder of the scene"
     )
@@ -156,6 +180,8 @@ class FilePattern(Table):
 
 
 class DrawingPattern(Table):
+    """An SVG or DXF drawing."""
+
     file: Annotated[str, Field(min_length=1)] = Field(
         description="the name of an .svg or .dxf file, from the folder of the scene"
     )

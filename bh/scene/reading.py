@@ -1,5 +1,4 @@
-"""What every table of a scene file is made of: the kinds of numbers, and reading a table with one clear line for what
-is wrong in it."""
+"""What every table of a scene file is made of: kinds of numbers, and a clear line for what is wrong in a table."""
 
 from __future__ import annotations
 
@@ -54,7 +53,12 @@ class Table(BaseModel):
 T = TypeVar("T", bound=Table)
 
 
-def read_toml(text: str) -> dict[str, Any]:
+def read_toml(text: str) -> dict[str, object]:
+    """The tables of a TOML text.
+
+    Raises:
+        SceneError: the text is empty, or no TOML.
+    """
     if not text.strip():
         raise SceneError("the file is empty; give a scene (see examples/)")
     try:
@@ -67,8 +71,13 @@ def read_toml(text: str) -> dict[str, Any]:
         raise SceneError(f"this is not TOML: {str(error).split(';')[0]}") from error
 
 
-def read_table(kind: type[T], data: Any, at: str) -> T:
+def read_table(kind: type[T], data: object, at: str) -> T:
     """The table `data` as `kind`.
+
+    Args:
+        kind: the class of the table.
+        data: what the scene has there.
+        at: dotted path of the table.
 
     Raises:
         SceneError: the first thing that is wrong with it, with its dotted path (`at` is the table's).
@@ -89,7 +98,17 @@ def read_table(kind: type[T], data: Any, at: str) -> T:
         raise SceneError(f"{at}.{key} = {shown(table[key])} cannot be; give {allowed}{hint}") from errors
 
 
-def check_keys(at: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
+def check_keys(at: str, table: Mapping[str, object], known: Iterable[str]) -> None:
+    """Refuse keys that a table does not know.
+
+    Args:
+        at: dotted path of the table, "" for the scene itself.
+        table: what the scene has there.
+        known: its keys.
+
+    Raises:
+        SceneError: the first unknown key, with the nearest known one.
+    """
     allowed = list(known)
     for key, value in table.items():
         if key not in allowed:
@@ -100,14 +119,24 @@ def check_keys(at: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
             )
 
 
-def as_table(data: Any, at: str) -> dict[str, Any]:
+def as_table(data: object, at: str) -> dict[str, object]:
+    """The value at a path, if it is a table.
+
+    Raises:
+        SceneError: it is none.
+    """
     if not isinstance(data, dict):
         example = f"[{at}]" if at.isalpha() else "{ key = value }"
         raise SceneError(f"{at} = {shown(data)} is not a table; write {example}")
     return data
 
 
-def as_tables(data: Any, at: str) -> list[Any]:
+def as_tables(data: object, at: str) -> list[object]:
+    """The value at a path, if it is a list of tables.
+
+    Raises:
+        SceneError: it is none.
+    """
     if isinstance(data, dict):
         raise SceneError(f"{at} is one table; it is a list of tables, so write [[{at}]] with double brackets")
     if not isinstance(data, list):
@@ -117,8 +146,16 @@ def as_tables(data: Any, at: str) -> list[Any]:
     return data
 
 
-def one_or_more(value: Any, at: str) -> list[tuple[str, Any]]:
-    """A table, or the tables of a list, each with its path."""
+def one_or_more(value: object, at: str) -> list[tuple[str, object]]:
+    """A table, or the tables of a list, each with its path.
+
+    Args:
+        value: what the scene has there.
+        at: its dotted path.
+
+    Raises:
+        SceneError: the list is empty.
+    """
     if not isinstance(value, list):
         return [(at, value)]
     if not value:
@@ -128,6 +165,7 @@ def one_or_more(value: Any, at: str) -> list[tuple[str, Any]]:
 
 @contextmanager
 def within(at: str) -> Iterator[None]:
+    """Errors inside get the dotted path in front, as a `SceneError`."""
     try:
         yield
     except InputError as error:
@@ -135,18 +173,19 @@ def within(at: str) -> Iterator[None]:
 
 
 def nearest(key: object, known: Iterable[str]) -> str:
+    """A known name like `key` as ` (did you mean ...?)`, or ""."""
     close = difflib.get_close_matches(str(key), list(known), n=1) or [
         name for name in known if name.lower() == str(key).lower()
     ]
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
-def _like_degrees(value: Any) -> bool:
+def _like_degrees(value: object) -> bool:
     numbers = [v for v in (value if isinstance(value, list) else [value]) if isinstance(v, int | float)]
     return any(7.0 < abs(v) <= 360.0 for v in numbers)
 
 
-def shown(value: Any) -> str:
+def shown(value: object) -> str:
     """A value as TOML writes it, in a few characters."""
     if isinstance(value, dict):
         return "{...}" if value else "{}"
@@ -168,11 +207,11 @@ def one_line(text: str) -> str:
     return clean if len(clean) <= 600 else clean[:596] + " ..."
 
 
-def without(table: dict[str, Any], key: str) -> dict[str, Any]:
+def without(table: dict[str, object], key: str) -> dict[str, object]:
     """The table without one of its keys."""
     return {name: value for name, value in table.items() if name != key}
 
 
-def as_tuple(value: Any) -> Any:
-    """Lists of a scene as the tuples of frozen data."""
-    return tuple(value) if isinstance(value, list) else value
+def arguments(table: Table) -> dict[str, Any]:
+    """The keys of a table as keyword arguments; lists become the tuples of frozen data."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in table}

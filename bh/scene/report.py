@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from math import degrees
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,10 +14,14 @@ from bh.formulations.registry import remarks
 from bh.model.supports import Support, select
 from bh.scene.load import Scene
 from meshes import SheetMesh
-from meshes.curves import sample
+from meshes.curves import Array, sample
 from meshes.io.draw import LOOKS, flat_lines
 from meshes.io.export import replacing
 from meshes.mesh import count
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SHOWN = 12  # creases or places in a list
 
@@ -59,7 +63,8 @@ def report(scene: Scene) -> list[str]:
     return lines + [f"remark ({remark.code}): {remark}" for remark in remarks(model)]
 
 
-def _words(item: Any) -> str:
+def _words(item: object) -> str:
+    """An actuation with what it was given."""
     given = {key: value for key, value in vars(item).items() if value is not None}
     place = given.pop("crease", None) or given.pop("at", "")
     rest = ", ".join(f"{key} = {value}" for key, value in given.items())
@@ -71,8 +76,12 @@ def draw(scene: Scene, file: str | os.PathLike[str]) -> Path:
 
     A sheet that is not flat is drawn as seen from +z.
 
+    Args:
+        scene: with its pattern.
+        file: of the picture.
+
     Returns:
-        the absolute path of the file.
+        The absolute path of the file.
 
     Raises:
         InputError: another suffix, or a place that cannot be written to.
@@ -87,7 +96,7 @@ def draw(scene: Scene, file: str | os.PathLike[str]) -> Path:
     return target.resolve()
 
 
-def _figure(scene: Scene) -> Any:
+def _figure(scene: Scene) -> Figure:
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
@@ -103,7 +112,9 @@ def _figure(scene: Scene) -> Any:
     names = set()
     for layer, points in _outlines(mesh):
         colour, dashes, _ = LOOKS[layer]
-        style: Any = (0, tuple(1.2 * x for x in dashes)) if dashes else "-"
+        style: str | tuple[float, tuple[float, ...]] = (
+            (0.0, tuple(1.2 * x for x in dashes)) if dashes else "-"
+        )
         label = layer if layer not in names else None
         names.add(layer)
         axes.plot(*points.T, color=colour, linestyle=style, linewidth=1.6, label=label, zorder=3)
@@ -119,7 +130,7 @@ def _figure(scene: Scene) -> Any:
     return figure
 
 
-def _outlines(mesh: SheetMesh) -> list[tuple[str, Any]]:
+def _outlines(mesh: SheetMesh) -> list[tuple[str, Array]]:
     """Layers and points (k, 2) of boundary and creases, seen from +z."""
     if mesh.flat:
         return [(line.layer, sample(line.curve)) for line in flat_lines(mesh) if line.layer != "facet"]
@@ -131,7 +142,7 @@ def _outlines(mesh: SheetMesh) -> list[tuple[str, Any]]:
     return found
 
 
-def _mark_supports(axes: Any, scene: Scene) -> None:
+def _mark_supports(axes: Axes, scene: Scene) -> None:
     mesh = scene.model.mesh
     for support, mark in zip(scene.model.supports, "^so*DvP" * len(scene.model.supports), strict=False):
         if isinstance(support, Support):

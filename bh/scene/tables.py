@@ -35,6 +35,8 @@ from meshes.structured import Kind
 
 
 class SheetTable(Table):
+    """Material and thickness of the sheet."""
+
     E: Positive = Field(
         description="Young's modulus in MPa, a positive number up to 1e9 MPa (1 GPa is 1000 MPa)"
     )
@@ -64,6 +66,8 @@ class DrawnTable(Table):
 
 
 class MeshTable(Table):
+    """A mesh along rulings."""
+
     kind: Kind = Field("staggered", description='"staggered", "alternating", "one-way" or "mirrored"')
     along: Count | None = Field(None, description="a whole number of cells along the crease, from 1")
     aspect_ratio: Annotated[float, Field(gt=0.0, le=1e4)] | None = Field(None, description=DENSITY)
@@ -73,6 +77,7 @@ class MeshTable(Table):
 
     @model_validator(mode="after")
     def one_density(self) -> MeshTable:
+        """Check that the density is given in one of the two ways."""
         if (self.along is None) == (self.aspect_ratio is None):
             given = "both" if self.along is not None else "neither"
             raise ValueError(f"needs either along (cells along the crease) or aspect_ratio, but has {given}")
@@ -80,11 +85,15 @@ class MeshTable(Table):
 
 
 class ModelTable(Table):
+    """How the sheet is modelled."""
+
     formulation: str = Field("bars-and-hinges", description="a name that `bh formulations` lists")
     hinge_lock: bool = Field(True, description="true or false")
 
 
 class OutputsTable(Table):
+    """What a run writes beside the result."""
+
     pictures: bool = Field(False, description="true or false")
     vtu: bool = Field(False, description="true or false")
     fold: bool = Field(False, description="true or false")
@@ -109,6 +118,8 @@ class AccuracyTable(Table):
 
 
 class SupportTable(Table):
+    """Nodes that are held."""
+
     at: Place = Field(description=PLACE + ', or "rigid-body"')
     fix: str | Vector | Annotated[list[Vector], Field(min_length=1)] | None = Field(
         None, description='letters out of "xyz", a direction [x, y, z], or a list of directions'
@@ -117,6 +128,7 @@ class SupportTable(Table):
 
     @model_validator(mode="after")
     def rigid_body_fixes_nothing(self) -> SupportTable:
+        """Check that "rigid-body" stands alone."""
         if self.at == "rigid-body" and (self.fix is not None or self.clamp):
             raise ValueError(
                 'at = "rigid-body" takes out the motions that are left and needs neither; remove fix and clamp'
@@ -125,12 +137,15 @@ class SupportTable(Table):
 
 
 class CreaseTable(Table):
+    """The law of a crease: its stiffness, and the angle where it is at rest."""
+
     Lstar: Positive | None = Field(None, description=LSTAR)
     stiffness: Stiffness | None = Field(None, description="a stiffness a length, N mm / (mm rad), 0 or more")
     rest: Rest = Field(math.pi, description="a rest dihedral angle in rad from 0 to 2 pi (flat is pi)")
 
     @model_validator(mode="after")
     def one_stiffness(self) -> CreaseTable:
+        """Check that the stiffness is given in one of the two ways."""
         if (self.Lstar is None) == (self.stiffness is None):
             raise ValueError("needs either Lstar (mm) or stiffness (N mm / (mm rad)), one of them")
         return self
@@ -182,17 +197,23 @@ class PinchTable(Table):
 
 
 class MomentTable(Table):
+    """Keys of `bh.Moment`."""
+
     crease: str = Field(description='the name of a crease, or "all"')
     to: Number = Field(description="a couple a length in N mm / mm")
 
 
 class ForceTable(Table):
+    """Keys of `bh.Force`."""
+
     at: Place = Field(description=PLACE)
     each: Vector | None = Field(None, description=VECTOR + " in N, on every node of the place")
     total: Vector | None = Field(None, description=VECTOR + " in N, shared by the nodes of the place")
 
 
 class DisplaceTable(Table):
+    """Keys of `bh.Displace`."""
+
     at: Place = Field(description=PLACE)
     direction: Literal["x", "y", "z"] | Vector = Field(description='"x", "y", "z" or a direction [x, y, z]')
     by: Number = Field(description="a displacement in mm")
@@ -213,6 +234,7 @@ class UntilTable(Table):
 
     @model_validator(mode="after")
     def one_target(self) -> UntilTable:
+        """Check that the target is given in one of the two ways."""
         if (self.depth is None) == (self.observable is None) or (self.observable is None) != (
             self.value is None
         ):

@@ -16,15 +16,15 @@ import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 from bh.paths.provenance import versions
 from bh.sweep import runner
 from bh.sweep.dataset import ABOUT_RUN, Label, dataset, load, save
-from bh.sweep.journal import Journal
+from bh.sweep.journal import Journal, Meta
 from bh.sweep.points import Points, SweepError, grid, read_csv, table
 from bh.sweep.pools import Dask, Given, Here, Local, Pool
 from bh.sweep.progress import Bar, Silent
@@ -35,9 +35,48 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 __all__ = [
-    "ABOUT_RUN", "Dask", "Finished", "Given", "Here", "Label", "Local", "Measured", "Points", "SceneTask", "SweepError",
-    "grid", "load", "partial", "read_csv", "run", "scene", "table",
-]  # fmt: skip
+    "ABOUT_RUN",
+    "Batches",
+    "Dask",
+    "Finished",
+    "Given",
+    "Here",
+    "Label",
+    "Local",
+    "Measured",
+    "Points",
+    "SceneTask",
+    "SweepError",
+    "grid",
+    "load",
+    "partial",
+    "read_csv",
+    "run",
+    "scene",
+    "table",
+]
+
+
+class Batches(TypedDict, total=False):
+    """How points are handed to workers.
+
+    Attributes:
+        chunk: points a worker does in one go, 1 by default; more where points take milliseconds on far machines.
+        retries: how often a point in flight when workers died is tried again, 2 by default.
+        warm: of a scene on a grid: each line along the last axis is one task, whose points begin at their neighbours'
+            states where that is checked to give the same (`bh.sweep.warm`); bits are equal among warm runs only.
+    """
+
+    chunk: int
+    retries: int
+    warm: bool
+
+
+@dataclass(frozen=True)
+class _Batches:
+    chunk: int = 1
+    retries: int = 2
+    warm: bool = False
 
 
 def scene(
@@ -47,6 +86,13 @@ def scene(
     shape: bool = False,
 ) -> SceneTask:
     """The task of solving a scene file with some of its keys set; see `SceneTask`.
+
+    Args:
+        file: of the scene (TOML).
+        keys: for every parameter the key or keys of the scene that take its value, such as
+            "steps[0].fold.to".
+        places: whose node positions are measured, such as "corner:inner-end".
+        shape: also measure the positions of all nodes.
 
     Raises:
         SweepError: the file cannot be read, or the scene has no such key.
@@ -69,10 +115,8 @@ def run(
     resume: bool = False,
     progress: bool | runner.Meter = False,
     labels: Mapping[str, Label] | None = None,
-    attributes: Mapping[str, Any] | None = None,
-    chunk: int = 1,
-    retries: int = 2,
-    warm: bool = False,
+    attributes: Mapping[str, object] | None = None,
+    **batches: Unpack[Batches],
 ) -> Dataset:
     """Run a task at every point and write the data set `file` (netCDF-4).
 
@@ -80,23 +124,28 @@ def run(
     variables but those of `ABOUT_RUN` are equal to the last bit.
 
     Args:
-        task: called with the parameters of a point by name; must be picklable. Returns values by name, or a `Measured`.
-        pool: a number of local processes (0: this process; None: one a core), any `concurrent.futures` executor, or a
-            `bh.sweep.Dask`. Given executors and pools stay open.
+        task: called with the parameters of a point by name; must be picklable. Returns values by name, or a
+            `Measured`.
+        points: of `grid`, `table` or `read_csv`.
+        file: of the data set; its journal is beside it.
+        pool: a number of local processes (0: this process; None: one a core), any `concurrent.futures`
+            executor, or a `bh.sweep.Dask`. Given executors and pools stay open.
         resume: go on from the journal `file`.points of a run that was interrupted or killed.
         progress: True for a bar with rate and time left, or an object that is told.
         labels: units and texts of parameters and values, beside those that the task knows.
         attributes: to be written to the data set beside its provenance.
-        chunk: points a worker does in one go; more than one where points take milliseconds on far machines.
-        retries: see `bh.sweep.runner.run`.
-        warm: of a scene on a grid: each line along the last axis is one task, whose points begin at their neighbours'
-            states where that is checked to give the same (`bh.sweep.warm`); bits are equal among warm runs only.
+        **batches: chunk, retries and warm, see `Batches`.
+
+    Returns:
+        The data set as it was written, see `bh.sweep.dataset.dataset`.
 
     Raises:
-        SweepError: bad input, a place that cannot be written, workers that are gone; what is finished is kept.
+        SweepError: bad input, a place that cannot be written, workers that are gone; what is finished is
+            kept.
     """
-    file = Path(file)
-    if warm:
+    file, batch = Path(file), _Batches(**batches)
+    chunk = batch.chunk
+    if batch.warm:
         if not isinstance(task, SceneTask) or not points.grid:
             raise SweepError("warm starts need a scene and a grid; leave warm out")
         task, chunk = replace(task, warm=True), len(points.values[-1])
@@ -113,14 +162,21 @@ def run(
     journal = _open(file, meta, resume)
     meter = (Bar() if progress else Silent()) if isinstance(progress, bool) else progress
     with closing(journal):
-        todo = _todo(len(points), journal.done(), chunk, warm)
+        todo = _todo(len(points), journal.done(), chunk, batch.warm)
         if todo:
             workers, ours = _pool(pool)
             try:
+                count = runner.Count(len(points), journal.failed())
                 runner.run(
-                    task, points.__getitem__, todo, journal, workers, meter,
-                    total=len(points), failed=journal.failed(), retries=retries,
-                )  # fmt: skip
+                    task,
+                    points.__getitem__,
+                    todo,
+                    journal,
+                    workers,
+                    meter,
+                    count=count,
+                    retries=batch.retries,
+                )
             finally:
                 meter.close()
                 if ours:
@@ -159,9 +215,9 @@ def _meta(
     task: Task,
     points: Points,
     labels: Mapping[str, Label] | None,
-    attributes: Mapping[str, Any] | None,
+    attributes: Mapping[str, object] | None,
     began: float,
-) -> dict[str, Any]:
+) -> Meta:
     from hashlib import sha256
 
     own: dict[str, Label] = getattr(task, "labelled", dict)()
@@ -183,7 +239,7 @@ def _meta(
     }
 
 
-def _open(file: Path, meta: dict[str, Any], resume: bool) -> Journal:
+def _open(file: Path, meta: Meta, resume: bool) -> Journal:
     """The journal to write to: a new one, or that of a run which goes on."""
     place = _journal(file)
     if not (resume and place.is_file()):
@@ -201,7 +257,7 @@ def _dataset(journal: Journal) -> Dataset:
     meta = journal.meta
     points = Points(tuple(meta["names"]), tuple(tuple(v) for v in meta["values"]), meta["grid"])
     labels = {name: Label(unit, about, tuple(dims)) for name, (unit, about, dims) in meta["labels"].items()}
-    attributes = {"identity": meta["identity"], **meta["attributes"]}
+    attributes: dict[str, object] = {"identity": meta["identity"], **meta["attributes"]}
     return dataset(points, journal, labels, attributes)
 
 

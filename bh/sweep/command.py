@@ -13,6 +13,7 @@ import typer
 import bh.sweep
 from bh.errors import InputError
 from bh.solvers.outcome import Outcome
+from bh.sweep.pools import Pool
 
 
 def sweep(
@@ -49,15 +50,22 @@ def sweep(
     place = Path(f"{asked.name}.nc") if output is None else output
     if sum(choice is not None for choice in (workers, dask, dask_workers)) > 1:
         raise InputError("--workers, --dask and --dask-workers exclude each other; give one of them")
-    pool: bh.sweep.Pool | int = os.cpu_count() or 1 if workers is None else workers
+    pool: Pool | int = os.cpu_count() or 1 if workers is None else workers
     if dask is not None or dask_workers is not None:
         pool = bh.sweep.Dask(dask, dask_workers or 0)
     try:
         with closing(pool) if isinstance(pool, bh.sweep.Dask) else _nothing():
             data = bh.sweep.run(
-                asked.task, asked.points, place, pool=pool, resume=resume, progress=not quiet,
-                labels=asked.labels, chunk=chunk, warm=warm,
-            )  # fmt: skip
+                asked.task,
+                asked.points,
+                place,
+                pool=pool,
+                resume=resume,
+                progress=not quiet,
+                labels=asked.labels,
+                chunk=chunk,
+                warm=warm,
+            )
     except KeyboardInterrupt:
         again = shlex.join(["bh", "sweep", str(file), "-o", str(place), "--resume"])
         typer.echo(f"bh: interrupted; what is finished is kept, go on with: {again}", err=True)

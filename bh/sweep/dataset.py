@@ -6,7 +6,8 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,13 +33,22 @@ class Label:
 
 
 def dataset(
-    points: Points, found: Iterable[Finished], labels: Mapping[str, Label], attributes: Mapping[str, Any]
+    points: Points, found: Iterable[Finished], labels: Mapping[str, Label], attributes: Mapping[str, object]
 ) -> Dataset:
     """The labelled data set of a sweep.
 
     A grid has its axes as dimensions, a table the dimension "point" with the parameters as coordinates. Numbers of
     points that were not reached are nan, words are empty; `outcome` and `reason` tell why. Arrays of different
     lengths are filled up with nan.
+
+    Args:
+        points: of the sweep.
+        found: finished points, in any order.
+        labels: of parameters and values, by name.
+        attributes: of the data set; what is no number or word is written as JSON.
+
+    Raises:
+        SweepError: xarray is not installed, or a value has arrays of different ranks at different points.
     """
     xr = _xarray()
     rows = list(found)
@@ -47,7 +57,7 @@ def dataset(
         name: (name if points.grid else "point", np.asarray(values), _attributes(labels.get(name)))
         for name, values in zip(points.names, points.values, strict=True)
     }
-    variables: dict[str, Any] = {}
+    variables: dict[str, tuple[object, ...]] = {}
     names = dict.fromkeys(
         name for row in rows for name in row.values
     )  # in the order in which they were measured
@@ -70,7 +80,8 @@ def dataset(
             column[row.number] = getattr(row, name)
         variables[name] = (dims, (column.astype(str) if kind is object else column).reshape(points.shape))
     text = {k: v if isinstance(v, str | int | float) else json.dumps(v) for k, v in attributes.items()}
-    return xr.Dataset(variables, coords, text)
+    made: Dataset = xr.Dataset(variables, coords, text)
+    return made
 
 
 def save(data: Dataset, file: Path) -> None:
@@ -110,7 +121,7 @@ def load(file: str | Path) -> Dataset:
     return loaded
 
 
-def _stack(name: str, rows: list[Finished], count: int) -> NDArray[Any]:
+def _stack(name: str, rows: list[Finished], count: int) -> NDArray[np.float64] | NDArray[np.str_]:
     """(count, ...) values of all points."""
     given = {row.number: row.values[name] for row in rows if name in row.values}
     first = next(iter(given.values()))
@@ -128,7 +139,7 @@ def _stack(name: str, rows: list[Finished], count: int) -> NDArray[Any]:
     shapes = np.array([array.shape for array in arrays.values()], dtype=int)
     data: NDArray[np.float64] = np.full((count, *shapes.max(axis=0).tolist()), np.nan)
     for index, array in arrays.items():
-        inside: Any = (index, *(slice(n) for n in array.shape))
+        inside: tuple[int | slice, ...] = (index, *(slice(n) for n in array.shape))
         data[inside] = array
     return data
 
@@ -139,7 +150,7 @@ def _attributes(label: Label | None) -> dict[str, str]:
     return {k: v for k, v in (("units", label.unit), ("long_name", label.about)) if v}
 
 
-def _xarray() -> Any:
+def _xarray() -> ModuleType:
     try:
         import h5netcdf  # noqa: F401
         import xarray

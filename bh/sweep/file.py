@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -13,7 +13,7 @@ from bh.errors import InputError
 from bh.scene.reading import Table, as_table, check_keys, one_line, read_table, read_toml
 from bh.sweep import SceneTask, scene
 from bh.sweep.dataset import Label
-from bh.sweep.points import Points, SweepError, grid, read_csv
+from bh.sweep.points import Points, SweepError, Value, grid, read_csv
 
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 SECTIONS = ("scene", "axes", "table", "measure")
@@ -35,6 +35,7 @@ class AxisTable(Table):
 
     @model_validator(mode="after")
     def one_way(self) -> AxisTable:
+        """Check that the values are given in one of the two ways."""
         ends = [v is not None for v in (self.start, self.stop, self.count)]
         if (self.values is not None) == any(ends) or (any(ends) and not all(ends)):
             raise ValueError("needs either values, or start, stop and count")
@@ -42,7 +43,7 @@ class AxisTable(Table):
             raise ValueError('needs positive start and stop for spacing = "log"')
         return self
 
-    def expanded(self) -> list[Any]:
+    def expanded(self) -> list[Value]:
         """The values."""
         if self.values is not None:
             return list(self.values)
@@ -54,18 +55,29 @@ class AxisTable(Table):
 
 
 class SampleTable(Table):
+    """Sampled points: a CSV file, and the keys of the scene that its columns stand for."""
+
     file: str = Field(description="the name of a CSV file, from the folder of the sweep file")
     keys: dict[str, str | list[str]] = Field(description="for every column " + KEY)
 
 
 class MeasureTable(Table):
+    """What is measured beside energies and angles."""
+
     places: list[str] = Field([], description="a list of places whose node positions are measured")
     shape: bool = Field(False, description="true or false: positions of all nodes")
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """What a sweep file asks for: `bh.sweep.run(sweep.task, sweep.points, "out.nc", labels=sweep.labels)`."""
+    """What a sweep file asks for: `bh.sweep.run(sweep.task, sweep.points, "out.nc", labels=sweep.labels)`.
+
+    Attributes:
+        task: of a point.
+        points: of the sweep.
+        labels: of its parameters.
+        name: of the file, without its suffix.
+    """
 
     task: SceneTask
     points: Points
@@ -91,9 +103,10 @@ def load_sweep(file: str | Path) -> Sweep:
         ) from error
 
 
-def _sweep(data: dict[str, Any], file: Path) -> Sweep:
+def _sweep(data: dict[str, object], file: Path) -> Sweep:
     check_keys("", data, SECTIONS)
-    if not isinstance(data.get("scene"), str):
+    file_of_scene = data.get("scene")
+    if not isinstance(file_of_scene, str):
         raise SweepError('scene is missing; add scene = "NAME.toml", from the folder of this file')
     if ("axes" in data) == ("table" in data):
         raise SweepError("give either [axes.NAME] tables (every combination) or a [table] (sampled points)")
@@ -117,7 +130,7 @@ def _sweep(data: dict[str, Any], file: Path) -> Sweep:
             raise SweepError(
                 f"table.keys and the columns of '{sample.file}' do not fit: look at {', '.join(wrong)}"
             )
-    task = scene(file.parent / data["scene"], keys, measure.places, measure.shape)
+    task = scene(file.parent / file_of_scene, keys, measure.places, measure.shape)
     return Sweep(task, points, labels, file.stem)
 
 

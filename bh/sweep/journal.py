@@ -11,9 +11,9 @@ import json
 import sqlite3
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TypedDict, cast
 
-from bh.sweep.points import SweepError
+from bh.sweep.points import SweepError, Value
 from bh.sweep.task import Finished
 
 FORMAT = 1
@@ -25,14 +25,35 @@ CREATE TABLE points (
 """
 
 
+class Meta(TypedDict):
+    """What a journal knows of its sweep.
+
+    Attributes:
+        identity: of task and points; SHA-256.
+        names: of the parameters.
+        values: of each parameter, see `Points`.
+        grid: every combination of the values, or row by row.
+        labels: unit, text and dimensions of parameters and values, by name.
+        attributes: of the data set.
+    """
+
+    identity: str
+    names: Sequence[str]
+    values: Sequence[Sequence[Value]]
+    grid: bool
+    labels: dict[str, tuple[str, str, Sequence[str]]]
+    attributes: dict[str, object]
+
+
 class Journal:
     """An open journal; every `add` is one transaction."""
 
     def __init__(self, file: Path, connection: sqlite3.Connection) -> None:
+        """Take over an open connection to a file."""
         self.file, self._db = file, connection
 
     @classmethod
-    def create(cls, file: Path, meta: dict[str, Any]) -> Journal:
+    def create(cls, file: Path, meta: Meta) -> Journal:
         """Begin a new journal; an old one of that name is replaced.
 
         Raises:
@@ -73,8 +94,10 @@ class Journal:
         return cls(file, db)
 
     @property
-    def meta(self) -> dict[str, Any]:
-        return {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
+    def meta(self) -> Meta:
+        """What was written when the sweep began."""
+        found = {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
+        return cast(Meta, found)
 
     def done(self) -> set[int]:
         """Indices of the finished points."""
@@ -109,6 +132,7 @@ class Journal:
             yield Finished(i, outcome, reason, json.loads(values), wall_time, attempts, worker)
 
     def close(self) -> None:
+        """Close the file."""
         self._db.close()
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import SupportsIndex
 
 import numpy as np
 
@@ -30,6 +30,9 @@ class Points:
         names: of the parameters.
         values: of each parameter; of a grid the values of its axis, of a table one value a point.
         grid: every combination (the last axis runs fastest), or row by row.
+
+    Raises:
+        SweepError: no parameters, names used twice, values that cannot be, or too many points.
     """
 
     names: tuple[str, ...]
@@ -37,6 +40,7 @@ class Points:
     grid: bool
 
     def __post_init__(self) -> None:
+        """Check names and values."""
         if not self.names or not all(self.values):
             raise SweepError("a sweep needs at least one parameter with at least one value")
         if len(set(self.names)) != len(self.names):
@@ -52,23 +56,38 @@ class Points:
         return tuple(len(v) for v in self.values) if self.grid else (len(self.values[0]),)
 
     def __len__(self) -> int:
+        """Number of points."""
         return math.prod(self.shape)
 
     def __getitem__(self, index: int) -> dict[str, Value]:
         """The parameters of a point, from 0 in the order of the data set."""
-        where: tuple[Any, ...] = (
-            np.unravel_index(index, self.shape) if self.grid else (index,) * len(self.names)
-        )
-        return {n: v[int(i)] for n, v, i in zip(self.names, self.values, where, strict=True)}
+        where: Iterable[SupportsIndex] = (index,) * len(self.names)
+        if self.grid:
+            where = np.unravel_index(index, self.shape)
+        return {n: v[i] for n, v, i in zip(self.names, self.values, where, strict=True)}
 
 
-def grid(axes: Mapping[str, Sequence[Any]]) -> Points:
-    """Every combination of the values of some axes; the last axis runs fastest."""
+def grid(axes: Mapping[str, Sequence[Value | np.generic]]) -> Points:
+    """Every combination of the values of some axes; the last axis runs fastest.
+
+    Args:
+        axes: values by the name of the parameter; none twice on an axis.
+
+    Raises:
+        SweepError: values that cannot be, see `Points`.
+    """
     return Points(tuple(axes), tuple(_plain(values) for values in axes.values()), grid=True)
 
 
-def table(columns: Mapping[str, Sequence[Any]]) -> Points:
-    """Sampled points: one column a parameter, all of one length."""
+def table(columns: Mapping[str, Sequence[Value | np.generic]]) -> Points:
+    """Sampled points: one column a parameter, all of one length.
+
+    Args:
+        columns: values by the name of the parameter.
+
+    Raises:
+        SweepError: columns of different length, or values that cannot be.
+    """
     values = tuple(_plain(column) for column in columns.values())
     lengths = {name: len(column) for name, column in zip(columns, values, strict=True)}
     if len(set(lengths.values())) > 1:
@@ -109,7 +128,7 @@ def _number(cell: str) -> Value:
     return cell.strip()
 
 
-def _plain(values: Sequence[Any]) -> tuple[Value, ...]:
+def _plain(values: Sequence[Value | np.generic]) -> tuple[Value, ...]:
     return tuple(value.item() if isinstance(value, np.generic) else value for value in values)
 
 

@@ -10,10 +10,14 @@ import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from multiprocessing import get_context, parent_process
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from bh.sweep.points import SweepError
 
+if TYPE_CHECKING:
+    from distributed import Client, LocalCluster
+
+Result = TypeVar("Result")
 ANSWER_S = 15.0  # until a scheduler counts as silent
 ASK_AGAIN_S = 5.0  # between two looks at how many workers a cluster has
 
@@ -22,9 +26,11 @@ class Pool(Protocol):
     """Workers. `slots` is how many tasks run at the same time."""
 
     @property
-    def slots(self) -> int: ...
+    def slots(self) -> int:
+        """How many tasks run at the same time."""
 
-    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]: ...
+    def submit(self, function: Callable[..., Result], *args: object) -> Future[Result]:
+        """Have a worker call `function(*args)`."""
 
     def lost(self, error: BaseException) -> str:
         """Why a task came to nothing by no fault of its own: "worker" (it died), "pool" (all are gone), or ""."""
@@ -42,7 +48,8 @@ class Pool(Protocol):
         """Why nothing will ever be finished again, or an empty string."""
         ...
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """Let the workers go."""
 
 
 class Here:
@@ -50,8 +57,9 @@ class Here:
 
     slots = 1
 
-    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
-        future: Future[Any] = Future()
+    def submit(self, function: Callable[..., Result], *args: object) -> Future[Result]:
+        """Call it now; an exception is kept in the future."""
+        future: Future[Result] = Future()
         try:
             future.set_result(function(*args))
         except Exception as error:
@@ -59,47 +67,74 @@ class Here:
         return future
 
     def lost(self, error: BaseException) -> str:
+        """Why a task came to nothing: never by a worker, there is none but this process."""
+        del error
         return ""
 
     def renew(self) -> None:
+        """Refuse: there are no workers.
+
+        Raises:
+            SweepError: always.
+        """
         raise SweepError("the sweep runs in this process and has no workers to renew")
 
     def trouble(self) -> str:
+        """Nothing can be wrong."""
         return ""
 
     def close(self) -> None:
+        """Nothing to close."""
         return
 
 
 class Given:
-    """Any `concurrent.futures` executor; it is not shut down, and broken it cannot be made anew."""
+    """A `concurrent.futures` executor; it is not shut down, and broken it cannot be made anew."""
 
     def __init__(self, executor: Executor) -> None:
+        """Take an executor; where it does not say how many workers it has, one a core."""
         self.executor = executor
         self.slots = int(getattr(executor, "_max_workers", 0) or os.cpu_count() or 1)
 
-    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
+    def submit(self, function: Callable[..., Result], *args: object) -> Future[Result]:
+        """Have the executor call `function(*args)`."""
         return self.executor.submit(function, *args)
 
     def lost(self, error: BaseException) -> str:
+        """See `Pool.lost`."""
         return "pool" if isinstance(error, BrokenExecutor | CancelledError) else ""
 
     def renew(self) -> None:
+        """Refuse: the executor is another's.
+
+        Raises:
+            SweepError: always.
+        """
         raise SweepError(
             "the given executor is broken; what is finished is kept: go on with a new one and resume"
         )
 
     def trouble(self) -> str:
+        """Nothing is known of it."""
         return ""
 
     def close(self) -> None:
+        """Nothing: the executor is another's."""
         return
 
 
 class Local:
-    """Processes on this machine, one solver thread each, started anew where one dies."""
+    """Processes on this machine, one solver thread each, started anew where one dies.
+
+    Args:
+        workers: how many.
+
+    Raises:
+        SweepError: none, or they cannot start.
+    """
 
     def __init__(self, workers: int) -> None:
+        """Start the processes."""
         if workers < 1:
             raise SweepError(f"workers = {workers} cannot be; give 1 or more, or 0 for this process")
         self.slots = workers
@@ -116,25 +151,30 @@ class Local:
                 "`if __name__ == '__main__':`, because they import it"
             ) from error
 
-    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
+    def submit(self, function: Callable[..., Result], *args: object) -> Future[Result]:
+        """Have a process call `function(*args)`."""
         try:
             return self._executor.submit(function, *args)
         except BrokenExecutor as error:  # found out between two tasks
-            future: Future[Any] = Future()
+            future: Future[Result] = Future()
             future.set_exception(error)
             return future
 
     def lost(self, error: BaseException) -> str:
+        """See `Pool.lost`."""
         return "pool" if isinstance(error, BrokenExecutor) else ""
 
     def renew(self) -> None:
+        """Start all processes anew."""
         self._executor.shutdown(wait=True, cancel_futures=True)
         self._start()
 
     def trouble(self) -> str:
+        """Processes of this machine are always in reach."""
         return ""
 
     def close(self) -> None:
+        """End the processes, also in the middle of a point."""
         # an interrupted sweep does not wait for points of minutes: nothing of them would be kept
         for process in list((getattr(self._executor, "_processes", None) or {}).values()):
             process.terminate()
@@ -142,22 +182,31 @@ class Local:
 
 
 class Dask:
-    """A Dask distributed cluster: by the address of its scheduler, or a local one of so many processes."""
+    """A Dask distributed cluster.
+
+    Args:
+        address: of a scheduler; None for a local cluster.
+        workers: processes of a local cluster.
+
+    Raises:
+        SweepError: Dask is not installed, the scheduler does not answer, or it has no workers.
+    """
 
     def __init__(self, address: str | None = None, workers: int = 0) -> None:
+        """Connect to the scheduler."""
         try:
             from distributed import Client, LocalCluster
         except ImportError as error:
             raise SweepError(
                 "Dask is not installed; add the extra: pip install 'curved-crease-workbench[cluster]'"
             ) from error
-        self._cluster: Any = None
+        self._cluster: LocalCluster | None = None
         if address is None:
             self._cluster = LocalCluster(
                 n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
             )
         try:
-            self._client: Any = Client(self._cluster or address, timeout=ANSWER_S, set_as_default=False)
+            self._client: Client = Client(self._cluster or address, timeout=ANSWER_S, set_as_default=False)
         except (OSError, ValueError) as error:  # a time-out is an OSError
             raise SweepError(
                 f"the scheduler '{address}' does not answer ({' '.join(str(error).split())}); start it with "
@@ -183,8 +232,9 @@ class Dask:
                 self._slots = max(1, sum(self._client.nthreads().values()))
         return self._slots
 
-    def submit(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
-        future: Future[Any]
+    def submit(self, function: Callable[..., Result], *args: object) -> Future[Result]:
+        """Have a worker call `function(*args)`."""
+        future: Future[Result]
         try:
             future = self._executor.submit(function, *args)
         except (OSError, RuntimeError) as error:
@@ -193,17 +243,24 @@ class Dask:
         return future
 
     def lost(self, error: BaseException) -> str:
+        """See `Pool.lost`."""
         if isinstance(error, CancelledError):  # the scheduler forgot it
             return "pool"
         # the scheduler itself has tried it on several workers
         return "worker" if type(error).__name__ == "KilledWorker" else ""
 
     def renew(self) -> None:
+        """Refuse: the scheduler is gone.
+
+        Raises:
+            SweepError: always.
+        """
         raise SweepError(
             f"the scheduler '{self.address}' is gone; what is finished is kept: resume when it is back"
         )
 
     def trouble(self) -> str:
+        """What the connection to the scheduler says."""
         if self._client.status in ("closed", "closing"):
             return "gone"
         if self._client.status == "connecting":
@@ -211,6 +268,7 @@ class Dask:
         return ""
 
     def close(self) -> None:
+        """Close the connection, and a local cluster with it."""
         with contextlib.suppress(Exception):  # it may be gone already
             self._client.close(timeout=2)
         if self._cluster is not None:

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 from bh.solvers.outcome import Outcome
 from bh.sweep.points import SweepError, Value
@@ -21,15 +21,18 @@ AHEAD = 2  # tasks handed out for each that can run, so that no worker waits for
 class Meter(Protocol):
     """Told about every finished task: points done of all, how many of them failed, done in this run, its seconds."""
 
-    def update(self, done: int, total: int, failed: int, now: int, seconds: float) -> None: ...
+    def update(self, done: int, total: int, failed: int, now: int, seconds: float) -> None:
+        """Report points done of all, how many of them failed, how many were done in this run, and its seconds."""
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """The sweep has ended, or was stopped."""
 
 
 class Store(Protocol):
     """Where finished points go; `Journal` is one."""
 
-    def add(self, found: Sequence[Finished]) -> None: ...
+    def add(self, found: Sequence[Finished]) -> None:
+        """Keep some points, all of them or none."""
 
 
 @dataclass(frozen=True)
@@ -46,15 +49,31 @@ class Job:
     deaths: int | None = None
 
 
+@dataclass(frozen=True)
+class Count:
+    """Points of the whole sweep, and how many of those that were stored before failed."""
+
+    total: int
+    failed: int = 0
+
+
 @dataclass
 class _State:
     waiting: deque[Job]
     suspects: deque[Job] = field(default_factory=deque)  # in flight when workers died: each is run alone
-    running: dict[Future[Any], Job] = field(default_factory=dict)
+    running: dict[Future[list[Finished]], Job] = field(default_factory=dict)
 
 
 def jobs(indices: Sequence[int], chunk: int) -> list[Job]:
-    """Jobs of `chunk` points each."""
+    """Jobs of `chunk` points each.
+
+    Args:
+        indices: of the points to do.
+        chunk: points a job.
+
+    Raises:
+        SweepError: a chunk of less than one point.
+    """
     if chunk < 1:
         raise SweepError(f"chunk = {chunk} cannot be; give a whole number of points a task, from 1")
     return [Job(tuple(indices[i : i + chunk])) for i in range(0, len(indices), chunk)]
@@ -68,21 +87,31 @@ def run(
     pool: Pool,
     meter: Meter,
     *,
-    total: int,
-    failed: int = 0,
+    count: Count,
     retries: int = 2,
 ) -> int:
-    """Run jobs until all of them are stored; returns how many points have another outcome than "reached".
+    """Run jobs until all of them are stored.
 
     Args:
+        task: called in a worker with the parameters of a point.
         parameters: of a point by its index.
+        todo: what is to be done.
+        store: where finished points go at once.
+        pool: the workers.
+        meter: told about every finished task.
+        count: points of the whole sweep, and how many of those stored before failed.
+        retries: how often a point in flight when workers died is tried again, alone, after the first such
+            try.
         total, failed: points of the whole sweep, and how many of those stored before failed.
-        retries: how often a point in flight when workers died is tried again, alone, after the first such try.
+
+    Returns:
+        How many points of the whole sweep have another outcome than "reached".
 
     Raises:
         SweepError: the pool is gone for good; what was finished is in the store.
     """
     began = time.monotonic()
+    total, failed = count.total, count.failed
     left = sum(len(job.indices) for job in todo)
     done, now = total - left, 0
     state = _State(deque(todo))
@@ -98,7 +127,8 @@ def run(
             )
         found, broken = _collect(state, ready, pool, retries)
         if broken:  # everything in flight is lost with the pool, or was finished just before
-            more, _ = _collect(state, wait(state.running).done, pool, retries)
+            # a scheduler that is gone may leave futures that never come back
+            more, _ = _collect(state, wait(state.running, timeout=QUIET_S).done, pool, retries)
             found += more
         if found:
             store.add(found)
@@ -123,7 +153,9 @@ def _hand_out(
         state.running[pool.submit(work, task, points)] = job
 
 
-def _collect(state: _State, ready: set[Future[Any]], pool: Pool, retries: int) -> tuple[list[Finished], bool]:
+def _collect(
+    state: _State, ready: set[Future[list[Finished]]], pool: Pool, retries: int
+) -> tuple[list[Finished], bool]:
     """Results of finished futures, and whether the pool broke."""
     found: list[Finished] = []
     broken = False

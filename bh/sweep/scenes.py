@@ -6,10 +6,10 @@ import copy
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from bh.errors import InputError
 from bh.model.supports import select
@@ -30,11 +30,17 @@ class SceneTask:
     """Solve a scene with some of its keys set, and measure its last state.
 
     Attributes:
-        text: of the scene file; `folder` is where files that it names are looked for.
+        text: of the scene file.
         keys: for every parameter the keys of the scene that take its value, such as "steps[0].fold.to".
+        folder: where files that it names are looked for.
         places: whose node positions are measured, such as "corner:inner-end".
         shape: also measure the positions of all nodes.
-        warm: points that come together are a line along one axis and may begin at each other's states: `bh.sweep.warm`.
+        warm: points that come together are a line along one axis and may begin at each other's states:
+            `bh.sweep.warm`.
+        labels: of the parameters, in front of those that the task knows.
+
+    Raises:
+        SweepError: the scene has no such key.
     """
 
     text: str
@@ -46,10 +52,11 @@ class SceneTask:
     labels: Mapping[str, Label] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """See that the scene has the keys."""
         tables = read_toml(self.text)
         for name, keys in self.keys.items():
             for key in keys:
-                _parent(tables, key, name)
+                _setter(tables, key, name)
 
     @property
     def identity(self) -> str:
@@ -72,11 +79,11 @@ class SceneTask:
         tables = copy.deepcopy(read_toml(self.text))
         for name, value in parameters.items():
             for key in self.keys[name]:
-                table, last = _parent(tables, key, name)
-                table[last] = value
+                _setter(tables, key, name)(value)
         return scene_from_tables(tables, self.folder)
 
     def __call__(self, parameters: Mapping[str, Value]) -> Measured:
+        """Solve the scene of a point and measure its last state."""
         scene = self.scene(parameters)
         path = trace(scene.model, accuracy=scene.accuracy)
         if not path.reached:
@@ -100,11 +107,11 @@ class SceneTask:
         reached = all(path.reached for path in paths)
         return [Measured(self.measure(path)) for path in paths] if reached else None
 
-    def measure(self, path: Trace) -> dict[str, Any]:
+    def measure(self, path: Trace) -> dict[str, object]:
         """Energies in N mm, dihedral angles of the creases in rad, positions in mm, and what it took."""
         state, mesh = path[-1], path.model.mesh
         energy = state.energy.as_dict()
-        found: dict[str, Any] = {f"energy_{kind}": energy[kind] for kind in ENERGIES}
+        found: dict[str, object] = {f"energy_{kind}": energy[kind] for kind in ENERGIES}
         for crease in mesh.creases:
             angles = state.dihedral(crease)
             if len(angles):
@@ -157,32 +164,39 @@ class SceneTask:
         raise errors[0]
 
 
-def _parent(tables: dict[str, Any], key: str, name: str) -> tuple[Any, Any]:
-    """The table or list that holds a key, and its last part; tables that are not there yet are made."""
+def _setter(tables: dict[str, object], key: str, name: str) -> Callable[[Value], None]:
+    """What sets a key of some tables; tables that are not there yet are made."""
     words = TOKEN.findall(key)
     if not words or "".join(f"[{i}]" if i else f".{w}" for w, i in words).lstrip(".") != key:
         raise SweepError(
             f"parameter '{name}': the key '{key}' is not understood; write it as steps[0].fold.to"
         )
     parts: list[str | int] = [int(i) if i else w for w, i in words]
-    here: Any = tables
+    here: dict[str, object] | list[object] = tables
     for part, after in zip(parts, [*parts[1:], None], strict=True):
         wrong = SweepError(
             f"parameter '{name}': the scene has no '{key}'; it must name a key of one of its tables"
         )
-        if isinstance(part, int) != isinstance(here, list):
+        inner: object
+        if isinstance(here, list):
+            if not isinstance(part, int) or part >= len(here):
+                raise wrong
+            if after is None:
+                return partial(here.__setitem__, part)
+            inner = here[part]
+        else:
+            if not isinstance(part, str):
+                raise wrong
+            if after is None:
+                return partial(here.__setitem__, part)
+            if part not in here and not isinstance(after, int):
+                here[part] = {}
+            if part not in here:
+                raise wrong
+            inner = here[part]
+        if not isinstance(inner, dict | list):
             raise wrong
-        if isinstance(part, int) and part >= len(here):
-            raise wrong
-        if after is None:
-            return here, part
-        if isinstance(part, str) and part not in here and not isinstance(after, int):
-            here[part] = {}
-        if isinstance(part, str) and part not in here:
-            raise wrong
-        here = here[part]
-        if not isinstance(here, dict | list):
-            raise wrong
+        here = inner
     raise wrong
 
 

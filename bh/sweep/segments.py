@@ -9,7 +9,7 @@ import json
 from concurrent.futures import Executor
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -18,7 +18,8 @@ from bh.applications.inverse.segments import Domain, beyond, grid
 from bh.applications.inverse.simulate import SETTING, SegmentTask, Setting
 from bh.applications.inverse.surrogate import FORMAT, Surrogate
 from bh.solvers.outcome import Outcome
-from bh.sweep import Label, Points, Pool, run, table
+from bh.sweep import Label, Points, run, table
+from bh.sweep.pools import Pool
 from bh.sweep.runner import Meter
 
 if TYPE_CHECKING:
@@ -39,7 +40,13 @@ LABELS = {
 
 
 def points(domain: Domain | None = None, step_k0: float = 5e-4, step_length: float = 4.0) -> Points:
-    """The source's grid (2,487 segments), and behind it those just beyond the domain that splines need at its edge."""
+    """The source's grid (2,487 segments), and behind it those just beyond the domain that splines need at its edge.
+
+    Args:
+        domain: of curvatures and lengths; None for the source's.
+        step_k0: between curvatures, 1/mm.
+        step_length: between lengths, mm.
+    """
     inside = grid(domain, step_k0, step_length)
     outside = beyond(domain, step_k0, step_length)
     k0, length = (np.concatenate(pair) for pair in zip(inside, outside, strict=True))
@@ -55,20 +62,45 @@ def build(
     resume: bool = False,
     progress: bool | Meter = False,
 ) -> Dataset:
-    """Simulate all segments of `points` and write the data set; arguments as for `bh.sweep.run`."""
-    about: dict[str, Any] = {
-        "title": "Pinched segments of a folded crease", "format": FORMAT, "setting": json.dumps(asdict(setting))
-    }  # fmt: skip
+    """Simulate all segments of `points` and write the data set.
+
+    Args:
+        file: of the data set (netCDF-4).
+        setting: sheet, fold and pinch of every segment.
+        pool: see `bh.sweep.run`.
+        resume: see `bh.sweep.run`.
+        progress: see `bh.sweep.run`.
+
+    Raises:
+        SweepError: see `bh.sweep.run`.
+    """
+    about = {
+        "title": "Pinched segments of a folded crease",
+        "format": FORMAT,
+        "setting": json.dumps(asdict(setting)),
+    }
     return run(
-        SegmentTask(setting), points(), file, pool=pool, resume=resume, progress=progress, labels=LABELS,
+        SegmentTask(setting),
+        points(),
+        file,
+        pool=pool,
+        resume=resume,
+        progress=progress,
+        labels=LABELS,
         attributes=about,
-    )  # fmt: skip
+    )
 
 
 def intensity_points(
     surrogate: Surrogate, steps: int = 9, parts: tuple[float, ...] = (0.25, 0.5, 0.75)
 ) -> Points:
-    """Segments pinched by parts of the way: a grid of curvatures (k0 >= 0: mirror images are known), lengths, parts."""
+    """Segments pinched by parts of the way: a grid of curvatures (k0 >= 0: mirror images are known), lengths and parts.
+
+    Args:
+        surrogate: of fully pinched segments, whose domain is taken.
+        steps: curvatures a length, and lengths.
+        parts: of the way from the fold to the full pinch.
+    """
     lengths = np.linspace(*surrogate.domain.length, steps)
     setting = surrogate.setting
     rows = [
@@ -89,7 +121,17 @@ def intensity_points(
 def build_intensities(
     file: str | Path, surrogate: Surrogate, *, pool: Pool | Executor | int | None = None, resume: bool = False
 ) -> Dataset:
-    """Simulate `intensity_points` for a data set, as `bh.applications.inverse.graded` needs them."""
+    """Simulate `intensity_points` for a data set, as `bh.applications.inverse.graded` needs them.
+
+    Args:
+        file: of the data set (netCDF-4).
+        surrogate: of fully pinched segments, see `intensity_points`.
+        pool: see `bh.sweep.run`.
+        resume: see `bh.sweep.run`.
+
+    Raises:
+        SweepError: see `bh.sweep.run`.
+    """
     setting = surrogate.setting
     about = {
         "title": "Pinched segments of some intensities",

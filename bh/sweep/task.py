@@ -7,7 +7,7 @@ import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from bh.errors import InputError
 from bh.solvers.outcome import Outcome
 from bh.sweep.points import SweepError, Value
 
-Task = Callable[[Mapping[str, Value]], "Measured | Mapping[str, Any]"]
+Task = Callable[[Mapping[str, Value]], "Measured | Mapping[str, object]"]
 
 
 @dataclass(frozen=True)
@@ -28,18 +28,27 @@ class Measured:
         reason: one line, where the outcome is another.
     """
 
-    values: Mapping[str, Any] = field(default_factory=dict)
+    values: Mapping[str, object] = field(default_factory=dict)
     outcome: str = Outcome.REACHED
     reason: str = ""
 
 
 class Finished(NamedTuple):
-    """A point as it is stored; `values` hold plain numbers, words and lists of numbers."""
+    """A point as it is stored; `values` hold plain numbers, words and lists of numbers.
 
-    number: int  # in the order of the data set, from 0
+    Attributes:
+        number: in the order of the data set, from 0.
+        outcome: "reached", or why there are no values.
+        reason: one line, where the outcome is another.
+        wall_time_s: that the point took, s.
+        attempts: how often it was begun.
+        worker: host and process.
+    """
+
+    number: int
     outcome: str
     reason: str
-    values: dict[str, Any]
+    values: dict[str, object]
     wall_time_s: float
     attempts: int = 1
     worker: str = ""
@@ -49,6 +58,13 @@ def work(task: Task, points: Sequence[tuple[int, Mapping[str, Value]]]) -> list[
     """Run a task at some points, one after another; an exception is an outcome of its point.
 
     A task that has `line` is first asked for all of them at once; it returns None where they have to be done alone.
+
+    Args:
+        task: called with the parameters of a point.
+        points: index and parameters of each.
+
+    Returns:
+        The points in the same order.
     """
     worker = f"{platform.node()}:{os.getpid()}"
     line = getattr(task, "line", None)
@@ -95,7 +111,7 @@ def identity(task: Task) -> str:
     return f"{getattr(task, '__module__', type(task).__module__)}.{name}"
 
 
-def _plain(name: str, value: Any) -> Any:
+def _plain(name: str, value: object) -> object:
     """The value as JSON can hold it; Python writes floats so that they are read back to the last bit."""
     if isinstance(value, str | bool | int | float):
         return value
@@ -105,4 +121,5 @@ def _plain(name: str, value: Any) -> Any:
             raise TypeError
     except (TypeError, ValueError) as error:
         raise SweepError(f"measured '{name}' is a {type(value).__name__}; give numbers or words") from error
-    return array.tolist()
+    plain: object = array.tolist()
+    return plain

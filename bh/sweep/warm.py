@@ -26,7 +26,14 @@ SAME = 1e-6  # of the sheet's size: states this near each other are one
 
 
 def line(models: Sequence[Model]) -> list[Path]:
-    """Paths of models in order, each begun at the one before where that is worth it and gives the same states."""
+    """Paths of models in order, each begun at the one before where that is worth it and gives the same states.
+
+    Args:
+        models: along one axis of a grid.
+
+    Returns:
+        The solved paths, in order.
+    """
     cold = {0: trace(models[0])}
     paths = list(_warm(models, cold[0]))
     checked = [i for i in (1, len(models) - 1) if i < len(paths) and len(paths) == len(models)]
@@ -41,7 +48,7 @@ def line(models: Sequence[Model]) -> list[Path]:
 
 
 def same(one: Path, other: Path) -> bool:
-    """Do two paths end in one state?"""
+    """Whether two paths end in one state: all nodes within `SAME` of the sheet's size."""
     if not one.reached or not other.reached:
         return False
     apart = np.abs(one[-1].points - other[-1].points).max()
@@ -64,6 +71,10 @@ def step_over(before: Path, model: Model) -> Path | None:
     """The path of a model from the last state of a neighbour's, or None where that cannot be or does not converge.
 
     The earlier steps are the neighbour's own; of the last step there is its end alone.
+
+    Args:
+        before: the neighbour's solved path.
+        model: that differs from the neighbour's in its last step alone.
     """
     last = len(model.steps) - 1
     if not before.reached or not _alike(before.model, model):
@@ -82,9 +93,16 @@ def step_over(before: Path, model: Model) -> Path | None:
     if not found.converged or not found.stable or system.objection(record.q, 1.0, found.q, 1.0):
         return None
     record = Record(
-        last, 1.0, found.q, found.iterations, found.evaluation.imbalance, 0.0, record.next_increment,
-        negative=found.negative, note="from a neighbouring point",
-    )  # fmt: skip
+        last,
+        1.0,
+        found.q,
+        found.iterations,
+        found.evaluation.imbalance,
+        0.0,
+        record.next_increment,
+        negative=found.negative,
+        note="from a neighbouring point",
+    )
     path.records.append(record)
     path.steps.append(StepOutcome(Outcome.REACHED))
     return path

@@ -71,4 +71,5 @@ def _draw(front: Front, known: dict[str, Candidate], folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:3]))
+    population, generations = (*map(int, sys.argv[1:3]), *(24, 5)[len(sys.argv[1:3]) :])
+    main(population, generations)

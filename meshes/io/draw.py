@@ -58,13 +58,15 @@ def write_pattern(
     not at all.
 
     Args:
+        path: of the file; its suffix decides the format.
+        sheet: a pattern, or a flat mesh.
         facets: also the lines along which the sheet does not fold (drawn rulings; the inner edges of a mesh).
-        perforate: lengths (cut, left) in mm: creases are cut up into dashes of that length, as many machines ignore the
-            style of a line. Such a file cannot be read back as a pattern.
+        perforate: lengths (cut, left) in mm: creases are cut up into dashes of that length, as many machines
+            ignore the style of a line. Such a file cannot be read back as a pattern.
 
     Raises:
-        FileFormatError: another suffix, a mesh that is not flat, lengths that cannot be, a place that cannot be
-            written to.
+        FileFormatError: another suffix, a mesh that is not flat, lengths that cannot be, a place that cannot
+            be written to.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".svg", ".dxf"):
@@ -86,6 +88,12 @@ def write_pattern(
 
 def flat_lines(sheet: CreasePattern | SheetMesh) -> list[FlatLine]:
     """All lines of a flat pattern, the outline first; of a mesh the edges between its nodes.
+
+    Args:
+        sheet: a pattern, or a flat mesh of which creases and boundary are drawn along the edges.
+
+    Returns:
+        The lines, mm, with drawn fold angles in rad where they are known.
 
     Raises:
         FileFormatError: the mesh is not flat.
@@ -227,9 +235,9 @@ def _mm(value: float) -> str:
 
 
 def _write_dxf(path: str | os.PathLike[str], lines: list[FlatLine]) -> None:
-    import ezdxf
+    from ezdxf.filemanagement import new
 
-    drawing = ezdxf.new("R2010", units=4)  # mm
+    drawing = new("R2010", units=4)  # mm
     drawing.header["$MEASUREMENT"] = 1
     for layer in {line.layer: None for line in lines}:
         _, dashes, number = LOOKS[layer]

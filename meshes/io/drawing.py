@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TypedDict, TypeVar, Unpack
 
 import numpy as np
 
@@ -26,14 +26,13 @@ SHORT = 0.4  # of its shortest line: a larger gap by default would swallow it
 LONGEST = 1e6  # mm
 LETTERS = {"mountain": "M", "valley": "V", "boundary": "B", "cut": "B", "facet": "F", "flat": "U"}
 
+Read = TypeVar("Read")
 
-def read_pattern(path: str | os.PathLike[str], **options: Any) -> CreasePattern:
-    """The crease pattern of an SVG or DXF drawing, lengths in mm.
 
-    Mountain and valley are as seen on the drawing, that is from +z. The sheet of an SVG file has the lower left corner
-    of its bounding box at the origin; that of a DXF file keeps its coordinates (unless `fit` scales it).
+class DrawingOptions(TypedDict, total=False):
+    """How the lines of a drawing are taken.
 
-    Args:
+    Attributes:
         scale: mm a unit of the drawing; None for the unit that the file states (SVG: CSS lengths, 96 px an inch;
             DXF: $INSUNITS, mm where it is unset).
         fit: length of the longer side of the sheet's bounding box, mm, in place of a scale.
@@ -41,25 +40,48 @@ def read_pattern(path: str | os.PathLike[str], **options: Any) -> CreasePattern:
         gap: lines that miss each other by up to so much are joined, mm; None for 1 / 2,000 of the diagonal, but no
             more than 0.4 of the shortest line.
         lines: what colours, layers and dashes stand for, in front of the defaults (see `meshes.io.strokes`).
+    """
+
+    scale: float | None
+    fit: float | None
+    tolerance: float | None
+    gap: float | None
+    lines: Mapping[str, str] | None
+
+
+def read_pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> CreasePattern:
+    """The crease pattern of an SVG or DXF drawing, lengths in mm.
+
+    Mountain and valley are as seen on the drawing, that is from +z. The sheet of an SVG file has the lower left corner
+    of its bounding box at the origin; that of a DXF file keeps its coordinates (unless `fit` scales it).
+
+    Args:
+        path: of an .svg or .dxf file.
+        **options: see `DrawingOptions`.
 
     Raises:
         FileFormatError: one line that names the file, the line or place, and the mend.
     """
-    return _told(path, lambda: _pattern(path, **options))
+    return _naming_the_file(path, lambda: _pattern(path, **options))
 
 
-def read_drawn(path: str | os.PathLike[str], **options: Any) -> SheetMesh:
-    """The drawing as a mesh of its own faces, cut into triangles; no node is added. Arguments as `read_pattern`.
+def read_drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> SheetMesh:
+    """The drawing as a mesh of its own faces, cut into triangles; no node is added.
 
     For drawings whose facet lines are to be the mesh. The names are those of `meshes.io.read_fold`.
+
+    Args:
+        path: of an .svg or .dxf file.
+        **options: as for `read_pattern`.
 
     Raises:
         FileFormatError: as for `read_pattern`; also lines that end inside the sheet.
     """
-    return _told(path, lambda: _drawn(path, **options))
+    return _naming_the_file(path, lambda: _drawn(path, **options))
 
 
-def _told(path: str | os.PathLike[str], read: Any) -> Any:
+def _naming_the_file(path: str | os.PathLike[str], read: Callable[[], Read]) -> Read:
+    """What `read` returns; its errors get the name of the file in front."""
     import shapely
 
     try:
@@ -68,13 +90,13 @@ def _told(path: str | os.PathLike[str], read: Any) -> Any:
         raise FileFormatError(f"{shown(path)}: {' '.join(str(error).split())}") from error
 
 
-def _pattern(path: str | os.PathLike[str], **options: Any) -> CreasePattern:
+def _pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> CreasePattern:
     graph, lines, remarks = read_graph(path, **options)
     pattern = pattern_of(graph, lines)
     return replace(pattern, remarks=(*remarks, *pattern.remarks))
 
 
-def _drawn(path: str | os.PathLike[str], **options: Any) -> SheetMesh:
+def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> SheetMesh:
     from meshes.io.fold import sheet_of_frame
     from meshes.io.fold_frame import Frame
 
@@ -85,8 +107,10 @@ def _drawn(path: str | os.PathLike[str], **options: Any) -> SheetMesh:
     for e in rim.tolist():
         letters[e] = "B"
     sign = {"M": -1.0, "V": 1.0}
-    angles = [sign[letter] * math.degrees(lines[line].angle) if letter in sign else 0.0
-              for letter, line in zip(letters, graph.lines, strict=True)]  # fmt: skip
+    angles = [
+        sign[letter] * math.degrees(lines[line].angle) if letter in sign else 0.0
+        for letter, line in zip(letters, graph.lines, strict=True)
+    ]
     known = any(not math.isnan(line.angle) for line in lines)
     points = np.column_stack((graph.points, np.zeros(len(graph.points))))
     edges = [(int(a), int(b)) for a, b in graph.edges.tolist()]
@@ -103,7 +127,25 @@ def read_graph(
     gap: float | None = None,
     lines: Mapping[str, str] | None = None,
 ) -> tuple[Graph, list[DrawnLine], list[str]]:
-    """The healed plane graph of a drawing, its lines, and remarks; arguments as `read_pattern`."""
+    """The healed plane graph of a drawing.
+
+    Args:
+        path: of an .svg or .dxf file.
+        scale: mm a unit of the drawing; None for the unit that the file states.
+        fit: length of the longer side of the sheet's bounding box, mm, in place of a scale.
+        tolerance: how far chords may stay off curves, mm; None for a part of the diagonal.
+        gap: lines that miss each other by up to so much are joined, mm; None for a part of the diagonal.
+        lines: what colours, layers and dashes stand for, in front of the defaults.
+
+    Returns:
+        The graph, the lines that its edges belong to, and one remark for each thing that was taken for
+        granted.
+
+    Raises:
+        FileFormatError: the file cannot be read, or its lines cannot be understood; the message does not name
+            the file.
+        PatternError: lines that cannot be healed, see `meshes.planar.heal`.
+    """
     for name, value in (("scale", scale), ("fit", fit), ("tolerance", tolerance), ("gap", gap)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise FileFormatError(f"{name} = {value} cannot be; give a positive number")
@@ -131,11 +173,10 @@ def read_graph(
         sampled = [_finite(stroke, stroke.sample(tolerance / unit)) for stroke, _ in kept]
     moved = low if Path(path).suffix.lower() == ".svg" or fit is not None else np.zeros(2)
     partly = any(stroke.opacity < 1.0 for stroke, kind in kept if kind in ("mountain", "valley"))
-    drawn = [
-        DrawnLine(_clean((points - moved) * unit, 1e-9 * diagonal), kind, stroke.name,
-                  math.pi * stroke.opacity if partly and kind in ("mountain", "valley") else math.nan)
-        for (stroke, kind), points in zip(kept, sampled, strict=True)
-    ]  # fmt: skip
+    drawn = []
+    for (stroke, kind), points in zip(kept, sampled, strict=True):
+        angle = math.pi * stroke.opacity if partly and kind in ("mountain", "valley") else math.nan
+        drawn.append(DrawnLine(_clean((points - moved) * unit, 1e-9 * diagonal), kind, stroke.name, angle))
     drawn = [line for line in drawn if len(line.points) > 1]
     lengths = np.array([_length(line.points) for line in drawn])
     remarks = []
@@ -176,7 +217,7 @@ def _box(lines: list[Array]) -> tuple[Array, Array]:
 def _clean(points: Array, near: float) -> Array:
     """The points without repetitions."""
     keep = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > near)
-    return points[keep]
+    return np.asarray(points[keep])
 
 
 def _length(points: Array) -> float:

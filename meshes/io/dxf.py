@@ -24,8 +24,8 @@ UNITS = {
     13: 1e-3,
     14: 100.0,
 }
-SILENT = ("TEXT", "MTEXT", "DIMENSION", "POINT", "HATCH", "ATTDEF", "ATTRIB", "LEADER", "MULTILEADER", "IMAGE",
-          "VIEWPORT", "SOLID", "WIPEOUT")  # fmt: skip
+TEXTS = ("TEXT", "MTEXT", "DIMENSION", "ATTDEF", "ATTRIB", "LEADER", "MULTILEADER")
+SILENT = (*TEXTS, "POINT", "HATCH", "IMAGE", "VIEWPORT", "SOLID", "WIPEOUT")
 LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX", "3DFACE", "TRACE")
 
 
@@ -34,16 +34,20 @@ def read_dxf(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
 
     Layers that are off or frozen are left out, and so are texts, dimensions and hatches.
 
+    Args:
+        path: of the file.
+
     Raises:
-        FileFormatError: the file cannot be read or is not DXF, has units that are no lengths, lines that are not in
-            the xy plane, or entities that are no lines.
+        FileFormatError: the file cannot be read or is not DXF, has units that are no lengths, lines that are
+            not in the xy plane, or entities that are no lines.
     """
-    import ezdxf
     from ezdxf.disassemble import recursive_decompose
+    from ezdxf.filemanagement import readfile
+    from ezdxf.lldxf.const import DXFError
 
     try:
-        drawing = ezdxf.readfile(os.fspath(path))
-    except ezdxf.DXFError as error:
+        drawing = readfile(os.fspath(path))
+    except DXFError as error:
         raise FileFormatError(
             f"this is not a DXF file that can be read ({error}); save it as DXF again"
         ) from error
@@ -82,8 +86,14 @@ def _stroke(drawing: Any, entity: Any, number: int) -> Stroke:
             raise FileFormatError(f"{name} is not in the xy plane; flatten the drawing")
         return np.asarray(points[:, :2], dtype=float)
 
-    return Stroke(sample, name, _colour(drawing, entity), str(entity.dxf.layer), _dash(drawing, entity),
-                  1.0 - entity.transparency)  # fmt: skip
+    return Stroke(
+        sample=sample,
+        name=name,
+        colour=_colour(drawing, entity),
+        layer=str(entity.dxf.layer),
+        dash=_dash(drawing, entity),
+        opacity=1.0 - entity.transparency,
+    )
 
 
 def _layer(drawing: Any, entity: Any) -> Any:

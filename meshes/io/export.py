@@ -40,6 +40,8 @@ def write_mesh(
     The file appears whole or not at all: it is written beside its place and then moved there.
 
     Args:
+        path: of the file; its suffix decides the format.
+        mesh: the triangles, and the positions where `points` is None.
         points: (n, 3) positions, mm, of a folded state; the mesh's own where None.
         node_fields: by name, (n,) or (n, k) values of the nodes; only .vtu, .vtk and .msh hold fields.
         cell_fields: by name, (t,) or (t, k) values of the triangles.
@@ -90,7 +92,7 @@ def _field(name: str, what: str, values: ArrayLike, count: int) -> Array:
 
 
 def shown(path: str | os.PathLike[str]) -> str:
-    """The path for a message of one line."""
+    """The path for a message of one line; anything that cannot be printed is escaped."""
     text = os.fspath(path)
     return text if text.isprintable() else ascii(text)
 
@@ -113,7 +115,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = target.parent / f".{uuid.uuid4().hex}.tmp"
     try:
         yield temporary
-        os.replace(temporary, target)
+        temporary.replace(target)
     except OSError as error:
         raise FileFormatError(
             f"{name} cannot be written ({error.strerror}); choose an existing folder that you may write to"

@@ -43,7 +43,11 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
     triangles). `fold_angles` are there if the file has edges_foldAngle (nan for a null).
 
     Args:
+        path: of the file.
         frame: 0 for the key frame, i + 1 for file_frames[i]; None for the first frame that has vertices.
+
+    Returns:
+        The mesh, mm, of kind "imported".
 
     Raises:
         FileFormatError: the file cannot be read, is not FOLD, or its frame is not one manifold sheet.
@@ -61,7 +65,11 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
 
 
 def sheet_of_frame(frame: Frame) -> SheetMesh:
-    """The mesh of one checked frame; names and errors as `read_fold`."""
+    """The mesh of one checked frame, mm; the names are those of `read_fold`.
+
+    Raises:
+        FileFormatError: the frame is not one manifold sheet, or lies over itself.
+    """
     faces = frame.faces or faces_of_graph(frame)
     sides = sides_of(faces)
     _check_edges(frame, sides)
@@ -239,8 +247,11 @@ def write_fold(
     crease without. The file appears whole or not at all.
 
     Args:
+        path: of the file.
+        mesh: the key frame.
         frames: (title, points (n, 3) in mm, fold angles (e,) in rad, mountain positive, one for each of
             `mesh.topology.edges`, or None) of each state.
+        title: of the file.
 
     Raises:
         FileFormatError: arrays that do not fit the mesh, or the file cannot be written.

@@ -19,7 +19,17 @@ def _directed(face: Face) -> list[tuple[int, int]]:
 
 
 def sides_of(faces: Sequence[Face]) -> dict[Side, list[int]]:
-    """The one or two faces at every side."""
+    """The one or two faces at every side.
+
+    Args:
+        faces: rings of vertex numbers each.
+
+    Returns:
+        The numbers of the one or two faces at every side.
+
+    Raises:
+        FileFormatError: an edge has more than two faces.
+    """
     sides: dict[Side, list[int]] = {}
     for number, face in enumerate(faces):
         for a, b in _directed(face):
@@ -34,7 +44,11 @@ def sides_of(faces: Sequence[Face]) -> dict[Side, list[int]]:
 
 
 def faces_of_graph(frame: Frame) -> list[Face]:
-    """The bounded faces of a plane graph, without the holes that B edges outline."""
+    """The bounded faces of a plane graph, without the holes that B edges outline.
+
+    Raises:
+        FileFormatError: the frame lies in space, its edges cross or hang loose, or B edges enclose nothing.
+    """
     import shapely
 
     if not frame.flat:
@@ -118,7 +132,19 @@ def _inside(frame: Frame, sides: dict[Side, list[int]], count: int) -> list[bool
 
 
 def orient(frame: Frame, faces: list[Face], sides: dict[Side, list[int]]) -> list[Face]:
-    """The faces of one sheet, turned to agree: with +z where it is flat, else with most of the faces."""
+    """The faces of one sheet, turned to agree: with +z where it is flat, else with most of the faces.
+
+    Args:
+        frame: the frame that the faces belong to.
+        faces: rings of vertex numbers each.
+        sides: the faces at every side, see `sides_of`.
+
+    Returns:
+        The same faces in the same order; those that were against the others run the other way.
+
+    Raises:
+        FileFormatError: the sheet is one-sided, or in pieces.
+    """
     ahead = [set(_directed(face)) for face in faces]
     turned: list[bool | None] = [None] * len(faces)
     turned[0] = False
@@ -152,7 +178,10 @@ def orient(frame: Frame, faces: list[Face], sides: dict[Side, list[int]]) -> lis
 
 
 def area(xy: Array, face: Face) -> float:
-    """Signed area, counter-clockwise positive; from the first vertex, lest far-off sheets lose digits."""
+    """Signed area of a face, counter-clockwise positive, in the square of the unit of `xy` (n, 2).
+
+    It is taken from the first vertex, lest far-off sheets lose digits.
+    """
     total = 0.0
     for ring in face:
         x, y = (xy[ring] - xy[face[0][0]]).T
@@ -164,7 +193,15 @@ def area(xy: Array, face: Face) -> float:
 
 
 def triangulate(points: Array, face: Face, flat: bool) -> list[list[int]]:
-    """Triangles (vertex numbers) of one face, turned as the face is; `points` (n, 3).
+    """Triangles of one face, turned as the face is.
+
+    Args:
+        points: (n, 3) positions of all vertices, mm.
+        face: rings of vertex numbers, the outside first.
+        flat: True if the frame lies in a plane z = constant.
+
+    Returns:
+        Three vertex numbers a triangle.
 
     Raises:
         FileFormatError: the face has no area or is no simple polygon (in space: seen along its mean normal).
@@ -200,7 +237,7 @@ def _projected(xyz: Array) -> Array:
     normal /= np.linalg.norm(normal)
     first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     first /= np.linalg.norm(first)
-    return xyz @ np.column_stack((first, np.cross(normal, first)))
+    return np.asarray(xyz @ np.column_stack((first, np.cross(normal, first))))
 
 
 def _fullness(xy: Array, triangle: Sequence[int]) -> float:

@@ -16,8 +16,15 @@ from meshes.curves import Array
 from meshes.errors import FileFormatError
 
 UNITS = {
-    "unit": 1.0, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "pt": 25.4 / 72.0, "um": 1e-3, "nm": 1e-6,
-}  # fmt: skip
+    "unit": 1.0,
+    "mm": 1.0,
+    "cm": 10.0,
+    "m": 1e3,
+    "in": 25.4,
+    "pt": 25.4 / 72.0,
+    "um": 1e-3,
+    "nm": 1e-6,
+}  # mm a unit
 LETTERS = "MVFBUCJ"
 LIMIT = 1e12  # mm; beyond it products of coordinates lose all meaning
 
@@ -27,20 +34,36 @@ Side = tuple[int, int]  # two vertices, the smaller one first
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame, checked: what the file says about points (n, 3) in mm, edges and faces."""
+    """One frame, checked: what the file says about points, edges and faces.
+
+    Attributes:
+        points: (n, 3), mm.
+        edges: two vertex numbers each.
+        letters: assignment of every edge, one of M, V, F, B, U, C and J.
+        angles: fold angles of the edges, degrees, valley positive, nan where the file has null; None without
+            any.
+        faces: rings of vertex numbers each; may be empty.
+    """
 
     points: Array
     edges: list[Side]
     letters: list[str]
-    angles: list[float] | None  # degrees, valley positive; nan where the file has null
+    angles: list[float] | None
     faces: list[Face]
 
     @cached_property
     def flat(self) -> bool:
+        """True if all vertices have one z (to 1e-9 of the size)."""
         return bool(np.ptp(self.points[:, 2]) <= 1e-9 * np.linalg.norm(np.ptp(self.points, axis=0)))
 
 
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The JSON object at the top of a FOLD file.
+
+    Raises:
+        FileFormatError: the file cannot be read, or is not a JSON object.
+    """
+
     def refuse(constant: str) -> None:
         raise FileFormatError(f"{constant} is not JSON; write a number")
 
@@ -67,7 +90,15 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def select(data: dict[str, Any], frame: int | None) -> dict[str, Any]:
-    """The frame asked for, with all it inherits."""
+    """The frame asked for, with all it inherits.
+
+    Args:
+        data: the top of the file.
+        frame: 0 for the key frame, i + 1 for file_frames[i]; None for the first frame that has vertices.
+
+    Raises:
+        FileFormatError: there is no such frame, or frames inherit in a circle.
+    """
     frames = [data, *_list(data, "file_frames")]
     for number, each in enumerate(frames):
         if not isinstance(each, dict):
@@ -103,6 +134,14 @@ def _inherited(frames: list[dict[str, Any]], number: int) -> dict[str, Any]:
 
 
 def check(frame: dict[str, Any]) -> Frame:
+    """A frame in mm, every number of which is known to fit the others.
+
+    Args:
+        frame: a JSON object with all it inherits, see `select`.
+
+    Raises:
+        FileFormatError: one line that names the key, the place in it and the mend.
+    """
     points = _points(frame)
     count = len(points)
     edges: list[Side] = []
@@ -209,4 +248,5 @@ def show(value: object) -> str:
 
 
 def side(a: int, b: int) -> Side:
+    """The pair of two vertices, the smaller one first."""
     return (a, b) if a < b else (b, a)

@@ -25,6 +25,8 @@ def write_gltf(
     """Write the triangles, seen from both sides, with creases and boundary as dark lines.
 
     Args:
+        path: of the .glb file.
+        mesh: the triangles, and the positions where `points` is None.
         points: (n, 3) positions of a folded state, mm; the mesh's own where None.
         colours: (n, 3) or (n, 4) of the nodes as a screen shows them (sRGB), 0 to 255.
 

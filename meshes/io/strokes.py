@@ -70,11 +70,15 @@ class Stroke:
 class Rules:
     """The defaults with a user's own mapping in front of them.
 
+    Args:
+        lines: what "#rrggbb", "layer:NAME" and "dash:WORD" stand for; None for the defaults alone.
+
     Raises:
         FileFormatError: a key or a meaning that is not known.
     """
 
     def __init__(self, lines: Mapping[str, str] | None = None) -> None:
+        """Sort the mapping by what its keys name."""
         self.layers: dict[str, LineKind] = {}
         self.colours: dict[Colour, LineKind] = {}
         self.dashes: dict[str, LineKind] = {}
@@ -161,7 +165,7 @@ def parse_colour(text: str) -> Colour | None:
 
 
 def dash_kind(pattern: list[float]) -> Dash:
-    """Name of a pattern of dash and gap lengths (none, or all zero, is solid)."""
+    """Name of a pattern of dash and gap lengths, in any one unit (none, or all zero, is solid)."""
     marks = [abs(value) for value in pattern]
     if not marks or max(marks) == 0.0:
         return "solid"

@@ -26,6 +26,9 @@ def read_svg(path: str | os.PathLike[str]) -> tuple[list[Stroke], float]:
 
     Filled areas without a stroke and texts are no lines. Elements that are not displayed are left out.
 
+    Args:
+        path: of the file.
+
     Raises:
         FileFormatError: the file cannot be read, or is not SVG.
     """

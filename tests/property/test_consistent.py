@@ -77,22 +77,28 @@ def kinds() -> dict[str, Model]:
         "oblique, spring crease": oblique.fold("crease", rest=2.3, Lstar=8.0),
         "oblique, prescribed crease": oblique.fold("crease", to=2.3),
         "displaced": clamped(mesh).displace("corner:outer-end", "z", 0.4),
-        "displaced obliquely, prescribed crease": clamped(mesh)
-        .step(Fold("crease", to=2.8), Displace("corner:outer-end", DIAGONAL, 0.3)),
+        "displaced obliquely, prescribed crease": clamped(mesh).step(
+            Fold("crease", to=2.8), Displace("corner:outer-end", DIAGONAL, 0.3)
+        ),
         "everything": held_at_corners(pair).step(
-            Fold("crease-1", rest=2.5, Lstar=5.0), Fold("crease-2", to=3.6), Force("edge:end", each=(0.0, 0.001, 0.002))
+            Fold("crease-1", rest=2.5, Lstar=5.0),
+            Fold("crease-2", to=3.6),
+            Force("edge:end", each=(0.0, 0.001, 0.002)),
         ),
         "several steps": held_at_corners(pair)
         .step(Fold("crease-1", rest=2.6, Lstar=5.0), Moment("crease-1", 0.05))
         .step(Fold("crease-2", to=3.5), Moment("crease-1", -0.05), Force("edge:end", each=(0.0, 0.0, 0.002)))
-        .fold("crease-1", to=2.9).fold("crease-1", rest=2.7, Lstar=5.0),
+        .fold("crease-1", to=2.9)
+        .fold("crease-1", rest=2.7, Lstar=5.0),
         "clamped edge, prescribed crease": slope.fold("crease", to=2.6),
         "clamped edge, force": slope.force("edge:end", total=(0.0, 0.02, 0.05)),
-        "symmetry, spring crease": symmetric.support("corner:inner-end", "z").fold("crease", rest=2.3, Lstar=8.0),
+        "symmetry, spring crease": symmetric.support("corner:inner-end", "z").fold(
+            "crease", rest=2.3, Lstar=8.0
+        ),
         "2 rows, alternating": sheet(sector(4, rows=2, kind="alternating")).fold("crease", to=2.5),
         "curved, prescribed crease": sheet(curved(mesh)).fold("crease", to=2.9),
         "curved, spring crease": clamped(curved(mesh)).fold("crease", rest=2.3, Lstar=8.0),
-    }  # fmt: skip
+    }
 
 
 KINDS = kinds()
@@ -300,9 +306,10 @@ def test_mirrored_fold() -> None:
     )
     assert up.energy.total == pytest.approx(down.energy.total, rel=1e-8)
     assert up.energy.stretching == pytest.approx(down.energy.stretching, rel=1e-6)
-    assert np.abs(up.crease_moment("crease") + down.crease_moment("crease")).max() < 1e-6 * np.abs(
-        down.crease_moment("crease")
-    ).max()  # fmt: skip
+    assert (
+        np.abs(up.crease_moment("crease") + down.crease_moment("crease")).max()
+        < 1e-6 * np.abs(down.crease_moment("crease")).max()
+    )
 
 
 def test_renumbering_does_not_matter() -> None:

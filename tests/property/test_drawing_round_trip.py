@@ -94,14 +94,20 @@ def test_gaps_below_the_tolerance_heal(seed: int, count: int, gap: float) -> Non
     triangles = Delaunay(points).simplices
     pairs = {tuple(sorted((int(t[i]), int(t[i - 1])))) for t in triangles for i in range(3)}
     heights = [
-        2.0 * abs(np.linalg.det(np.column_stack((points[t], np.ones(3))))) / 2.0
+        2.0
+        * abs(np.linalg.det(np.column_stack((points[t], np.ones(3)))))
+        / 2.0
         / max(np.linalg.norm(points[t[i]] - points[t[i - 1]]) for i in range(3))
         for t in triangles
-    ]  # fmt: skip
+    ]
     if min(heights) < 3.0 * gap:  # a sliver is a line drawn twice
         return
-    kinds = {pair: "boundary" if max(pair) < 4 and abs(pair[0] - pair[1]) != 2 else
-             str(random.choice(["mountain", "valley", "facet"])) for pair in pairs}  # fmt: skip
+    kinds = {
+        pair: "boundary"
+        if max(pair) < 4 and abs(pair[0] - pair[1]) != 2
+        else str(random.choice(["mountain", "valley", "facet"]))
+        for pair in pairs
+    }
 
     def jitter() -> np.ndarray:
         angle = random.uniform(0.0, 2.0 * np.pi)

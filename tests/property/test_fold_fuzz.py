@@ -7,6 +7,7 @@ import json
 import math
 import pathlib
 import tempfile
+from typing import Any
 
 import numpy as np
 from hypothesis import HealthCheck, example, given, settings
@@ -152,7 +153,7 @@ def _is_sheet(mesh: SheetMesh) -> None:
         assert ((b - a)[:, 0] * (c - a)[:, 1] > (b - a)[:, 1] * (c - a)[:, 0]).all()
 
 
-def test_seeds_are_valid():
+def test_seeds_are_valid() -> None:
     for seed in SEEDS:
         mesh = _survives(json.dumps(seed).encode())
         assert mesh is not None
@@ -166,13 +167,13 @@ def test_seeds_are_valid():
 @example({**SEEDS[0], "faces_vertices": [[0, 1, 4]] * 3}, None)
 @example({**SEEDS[0], "edges_assignment": ["\ud800"] * 8}, None)
 @example({**SEEDS[0], "file_frames": [{"frame_inherit": True, "frame_parent": 1}]}, 1)
-def test_damaged_values(data, frame):
+def test_damaged_values(data: Any, frame: Any) -> None:
     _survives(json.dumps(data).encode(), frame)
 
 
 @FUZZ
 @given(st.sampled_from(SEEDS), st.data())
-def test_damaged_bytes(seed, data):
+def test_damaged_bytes(seed: Any, data: Any) -> None:
     text = bytearray(json.dumps(seed).encode())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, max(len(text) - 1, 0)))
@@ -196,7 +197,7 @@ def test_damaged_bytes(seed, data):
 @example(b'{"vertices_coords": [[NaN, 0]]}')
 @example(b'{"vertices_coords": [[1e999, 0]], "edges_vertices": [[0, 0]]}')
 @example(b'{"vertices_coords": [[' + b"9" * 5000 + b", 0]]}")
-def test_random_bytes(data):
+def test_random_bytes(data: Any) -> None:
     assert _survives(data) is None
 
 
@@ -205,7 +206,7 @@ def test_random_bytes(data):
     st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=3, max_size=12),
     st.lists(st.tuples(st.integers(0, 11), st.integers(0, 11), st.sampled_from("BMVFUCJ")), max_size=25),
 )
-def test_random_graphs(points, edges):
+def test_random_graphs(points: Any, edges: Any) -> None:
     edges = [(a % len(points), b % len(points), letter) for a, b, letter in edges]
     data = {
         "vertices_coords": points,
@@ -220,6 +221,6 @@ def test_random_graphs(points, edges):
     st.lists(st.tuples(*[st.integers(0, 3)] * 3), min_size=3, max_size=8),
     st.lists(st.lists(st.integers(0, 7), min_size=3, max_size=5), min_size=1, max_size=5),
 )
-def test_random_faces(points, faces):
+def test_random_faces(points: Any, faces: Any) -> None:
     faces = [[v % len(points) for v in face] for face in faces]
     _survives(json.dumps({"vertices_coords": points, "faces_vertices": faces}).encode())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -344,7 +345,7 @@ def test_released_in_the_zone() -> None:
 # --------------------------------------------------------------------------------------- descriptions
 
 
-def test_option_is_kept_and_checked(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_option_is_kept_and_checked(tmp_path: Path) -> None:
     model = replace(flap(), hinge_lock=False).fold("crease", rest=2.9)
     path = trace(model, file=tmp_path / "path.bh")
     assert bh.Path.load(tmp_path / "path.bh").model.hinge_lock is False

@@ -258,7 +258,7 @@ def test_turned_over() -> None:
 
 
 def test_same_input_same_numbers() -> None:
-    """Bit for bit (DESIGN.md, section 3)."""
+    """Bit for bit."""
     again = solve(free(sector()).fold("crease", to=2.0))
     assert np.array_equal(again.points, base_state("staggered", "held").points)
     assert again.energy == base_state("staggered", "held").energy

@@ -195,8 +195,10 @@ def test_angle_is_continuous_through_flat() -> None:
     for shift in shifts:
         x = hinge(math.pi + shift, 1.3, (1.0, 0.4), (0.3, 0.8))
         assert angle(x) - math.pi == pytest.approx(shift, abs=1e-15)
-    below, above = (kinematics.dihedral_hessians(hinge(math.pi + d, 1.3, (1.0, 0.4), (0.3, 0.8)), HINGE)[0]
-                    for d in (-1e-7, 1e-7))  # fmt: skip
+    below, above = (
+        kinematics.dihedral_hessians(hinge(math.pi + d, 1.3, (1.0, 0.4), (0.3, 0.8)), HINGE)[0]
+        for d in (-1e-7, 1e-7)
+    )
     assert np.abs(above - below).max() < 1e-5
     flat = hinge(math.pi, 1.3, (1.0, 0.4), (0.3, 0.8))
     flat[:, 2] = 0.0
@@ -205,7 +207,7 @@ def test_angle_is_continuous_through_flat() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_closed_hinge_is_inside_the_turn(seed: int) -> None:
-    """Wings on top of each other: 0 or 2 pi by rounding, never outside of [0, 2 pi] (DESIGN.md, section 3)."""
+    """Wings on top of each other: 0 or 2 pi by rounding, never outside of [0, 2 pi]."""
     closed = hinge(0.0, 1.0, (0.7, 0.7), (0.2, 0.2)) @ rotation(seed).T
     phi = angle(closed)
     assert 0.0 <= phi <= 2.0 * math.pi

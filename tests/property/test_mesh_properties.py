@@ -6,7 +6,7 @@ import json
 import math
 import pathlib
 import tempfile
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from hypothesis import HealthCheck, assume, given, settings
@@ -64,7 +64,7 @@ def least_cells(pattern: CreasePattern, rows: int) -> int:
 
 @PROPERTY
 @given(patterns(), KINDS, st.integers(1, 4), st.integers(0, 20))
-def test_meshes_are_valid_sheets(pattern, kind, rows, more):
+def test_meshes_are_valid_sheets(pattern: Any, kind: Any, rows: Any, more: Any) -> None:
     along = least_cells(pattern, rows) + more
     mesh = structured(pattern, along=along, rows=rows, kind=kind)
     topology = mesh.topology
@@ -95,7 +95,7 @@ def test_meshes_are_valid_sheets(pattern, kind, rows, more):
 
 @PROPERTY
 @given(patterns(), KINDS, st.integers(1, 3), st.integers(0, 6))
-def test_area_converges(pattern, kind, rows, more):
+def test_area_converges(pattern: Any, kind: Any, rows: Any, more: Any) -> None:
     along = 2 * least_cells(pattern, rows) + more
     exact = exact_area(pattern)
     errors = [
@@ -117,7 +117,7 @@ def test_area_converges(pattern, kind, rows, more):
 
 @PROPERTY
 @given(patterns(), KINDS, st.floats(0.2, 20.0), st.integers(1, 3))
-def test_aspect_ratio_comes_out(pattern, kind, alpha, rows):
+def test_aspect_ratio_comes_out(pattern: Any, kind: Any, alpha: Any, rows: Any) -> None:
     """The count of cells is the nearest whole number, and alpha lies between those of the panels."""
     lengths = np.array([rail.length for rail in pattern.rails])
     starts = np.vstack([rail.point(np.zeros(1)) for rail in pattern.rails])
@@ -136,7 +136,7 @@ def test_aspect_ratio_comes_out(pattern, kind, alpha, rows):
 
 @PROPERTY
 @given(patterns(), KINDS, st.integers(1, 3), st.integers(0, 8))
-def test_the_same_input_gives_the_same_mesh(pattern, kind, rows, more):
+def test_the_same_input_gives_the_same_mesh(pattern: Any, kind: Any, rows: Any, more: Any) -> None:
     along = least_cells(pattern, rows) + more
     one, two = (structured(pattern, along=along, rows=rows, kind=kind) for _ in range(2))
     assert one.points.tobytes() == two.points.tobytes()
@@ -157,7 +157,7 @@ def edges_of(mesh: SheetMesh, *names: str) -> set[int]:
 
 @PROPERTY
 @given(patterns(), KINDS, st.integers(1, 3), st.integers(0, 8), st.booleans())
-def test_fold_round_trip(pattern, kind, rows, more, angles):
+def test_fold_round_trip(pattern: Any, kind: Any, rows: Any, more: Any, angles: Any) -> None:
     mesh = structured(pattern, along=least_cells(pattern, rows) + more, rows=rows, kind=kind)
     if angles:
         drawn = {name: np.linspace(-3.0, 3.0, len(mesh.crease_edges(name))) for name in mesh.creases}
@@ -196,7 +196,7 @@ def test_fold_round_trip(pattern, kind, rows, more, angles):
 
 @PROPERTY
 @given(patterns(), st.integers(0, 6), st.randoms(use_true_random=False))
-def test_edges_alone_bring_back_the_sheet(pattern, more, random):
+def test_edges_alone_bring_back_the_sheet(pattern: Any, more: Any, random: Any) -> None:
     """Panels as polygons: only rim and creases are given, the importer finds faces, holes and triangles."""
     mesh = structured(pattern, along=least_cells(pattern, 1) + 4 + more, kind="one-way")
     names = list(mesh.edge_sets)

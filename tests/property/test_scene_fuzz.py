@@ -2,7 +2,9 @@
 
 import datetime
 import json
+from collections.abc import Iterator
 from copy import deepcopy
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -107,7 +109,7 @@ KEYS = [
 ]
 
 
-def written(value):
+def written(value: Any) -> Any:
     """TOML, all on one line below the top level."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{json.dumps(key)} = {written(each)}" for key, each in value.items()) + "}"
@@ -122,11 +124,11 @@ def written(value):
     return value.isoformat() if isinstance(value, datetime.date) else repr(value)
 
 
-def text_of(scene):
+def text_of(scene: Any) -> Any:
     return "".join(f"{json.dumps(key)} = {written(value)}\n" for key, value in scene.items())
 
 
-def places(value, above=()):
+def places(value: Any, above: Any = ()) -> Iterator[Any]:
     """Paths to everything in nested tables and lists."""
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, each in items:
@@ -135,7 +137,7 @@ def places(value, above=()):
 
 
 @st.composite
-def changed_scenes(draw):
+def changed_scenes(draw: Any) -> Any:
     scene = deepcopy(draw(st.sampled_from(SCENES)))
     for _ in range(draw(st.integers(1, 3))):
         found = list(places(scene))
@@ -160,13 +162,13 @@ def changed_scenes(draw):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Any:
     place = tmp_path_factory.mktemp("scenes")
     (place / "sheet.fold").write_text(json.dumps(SQUARE))
     return place
 
 
-def scene_or_one_line(text, folder):
+def scene_or_one_line(text: Any, folder: Any) -> None:
     try:
         assert isinstance(parse_scene(text, folder), Scene)
     except InputError as error:
@@ -178,7 +180,7 @@ def scene_or_one_line(text, folder):
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene["pattern"].get("kind", "file"))
-def test_the_scenes_are_right(scene, folder):
+def test_the_scenes_are_right(scene: Any, folder: Any) -> None:
     assert isinstance(parse_scene(text_of(scene), folder), Scene)
 
 
@@ -190,13 +192,13 @@ COMMON = {
 
 @given(changed_scenes())
 @settings(max_examples=300, **COMMON)
-def test_changed_values(folder, scene):
+def test_changed_values(folder: Any, scene: Any) -> None:
     scene_or_one_line(text_of(scene), folder)
 
 
 @given(st.sampled_from(SCENES), st.data())
 @settings(max_examples=150, **COMMON)
-def test_changed_characters(folder, scene, data):
+def test_changed_characters(folder: Any, scene: Any, data: Any) -> None:
     text = text_of(scene)
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(text)))
@@ -211,5 +213,5 @@ def test_changed_characters(folder, scene, data):
 
 @given(st.text(max_size=60))
 @settings(max_examples=50, **COMMON)
-def test_any_text(folder, text):
+def test_any_text(folder: Any, text: Any) -> None:
     scene_or_one_line(text, folder)

@@ -75,9 +75,13 @@ def kinds() -> dict[str, Model]:
         "free, prescribed crease": Model(mesh, SHEET).fold("crease", to=2.3),
         "free, moment": Model(mesh, SHEET).crease("crease", stiffness=0.4).moment("crease", 0.2),
         "free, forces": Model(mesh, SHEET).step(Fold("crease", to=2.6), *balanced(mesh, 0.01)),
-        "free, all z held": Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
+        "free, all z held": Model(mesh, SHEET)
+        .support("crease:crease", "z")
+        .support("rigid-body")
         .fold("crease", rest=2.0, Lstar=20.0),
-        "point and rigid body": Model(mesh, SHEET).support("corner:outer-end", "xyz").support("rigid-body")
+        "point and rigid body": Model(mesh, SHEET)
+        .support("corner:outer-end", "xyz")
+        .support("rigid-body")
         .fold("crease", to=2.5),
         "supported, spring crease": clamped(mesh).fold("crease", rest=2.3, Lstar=8.0),
         "supported, prescribed crease": clamped(mesh).fold("crease", to=3.9),
@@ -85,14 +89,18 @@ def kinds() -> dict[str, Model]:
         "oblique, spring crease": oblique.fold("crease", rest=2.3, Lstar=8.0),
         "oblique, prescribed crease": oblique.fold("crease", to=2.3),
         "displaced": clamped(mesh).displace("corner:outer-end", "z", 0.4),
-        "displaced obliquely, prescribed crease": clamped(mesh)
-        .step(Fold("crease", to=2.8), Displace("corner:outer-end", DIAGONAL, 0.3)),
+        "displaced obliquely, prescribed crease": clamped(mesh).step(
+            Fold("crease", to=2.8), Displace("corner:outer-end", DIAGONAL, 0.3)
+        ),
         "everything": held_at_corners(pair).step(
-            Fold("crease-1", rest=2.5, Lstar=5.0), Fold("crease-2", to=3.6), Force("edge:end", each=(0.0, 0.001, 0.002))
+            Fold("crease-1", rest=2.5, Lstar=5.0),
+            Fold("crease-2", to=3.6),
+            Force("edge:end", each=(0.0, 0.001, 0.002)),
         ),
         "several steps": held_at_corners(pair)
         .step(
-            Fold("crease-1", rest=2.6, Lstar=5.0), Moment("crease-1", 0.05),
+            Fold("crease-1", rest=2.6, Lstar=5.0),
+            Moment("crease-1", 0.05),
             Displace("corner:outer-end", DIAGONAL, 0.1),
         )
         .step(Fold("crease-2", to=3.5), Moment("crease-1", -0.05), Force("edge:end", each=(0.0, 0.0, 0.002)))
@@ -100,7 +108,7 @@ def kinds() -> dict[str, Model]:
         "green, free": given_stiffness(Model(mesh, SHEET)).fold("crease", rest=2.5, stiffness=1.0),
         "green, oblique, displaced": given_stiffness(oblique).displace("corner:inner-end", DIAGONAL, 0.4),
         "2 rows, alternating": Model(sector(4, rows=2, kind="alternating"), SHEET).fold("crease", to=2.5),
-    }  # fmt: skip
+    }
 
 
 KINDS = kinds()

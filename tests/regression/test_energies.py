@@ -49,7 +49,7 @@ def full_annulus() -> Model:
 def test_appendix_b_a() -> None:
     path = solve(appendix_b.model("a"))
     assert_energy(path[-1], 6.015832507460427e-05, 0.05333601579552741, 0.0)
-    assert path.iterations <= 35  # the bound of issue 2; 16 now
+    assert path.iterations <= 35  # 16 when this was written
     assert path.unknowns == 520
 
 

@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -199,7 +200,7 @@ def test_scene_of_the_training_seed_is_honest() -> None:
         (lambda m: m.fold("crease", to=[2.0, 2.0, 2.1, 2.0]), "give one angle"),
     ],
 )
-def test_what_belongs_to_one_mesh_is_named(changed, words: str) -> None:  # type: ignore[no-untyped-def]
+def test_what_belongs_to_one_mesh_is_named(changed: Any, words: str) -> None:
     with pytest.raises(ModelError, match=words):
         pattern_of(changed(model()))
 

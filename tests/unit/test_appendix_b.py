@@ -116,7 +116,7 @@ def test_every_cell_has_its_place() -> None:
 
 def test_what_was_not_reached_is_no_value() -> None:
     """The record of a failed path has its outcome, and neither a value nor an error."""
-    right = Check("c", "q", {}, 1.0, "mm", 1.0, "s", 0.1)
+    right = Check(case="c", quantity="q", value=1.0, unit="mm", reference=1.0, source="s", tolerance=0.1)
     assert (right.record()["value"], right.record()["error"], right.record()["passed"]) == (1.0, 0.0, True)
     record = replace(right, outcome="stalled").record()
     assert (record["value"], record["error"], record["passed"]) == (None, None, False)

@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,15 +26,15 @@ FREE = '[[supports]]\nat = "corner:inner-start"\n'
 HELD = '[[supports]]\nat = "edge:inner"\n'
 
 
-def text_of(**sections):
+def text_of(**sections: Any) -> Any:
     return "\n".join({**BASE, **sections}.values())
 
 
-def step(how):
+def step(how: Any) -> Any:
     return f"[[steps]]\n{how}\n"
 
 
-def refused(text, folder="."):
+def refused(text: Any, folder: Any = ".") -> Any:
     with pytest.raises(InputError) as caught:
         parse_scene(text, folder)
     message = str(caught.value)
@@ -183,13 +185,13 @@ CASES = [
 
 
 @pytest.mark.parametrize(("sections", "words"), [case[1:] for case in CASES], ids=[case[0] for case in CASES])
-def test_scene_is_refused(sections, words):
+def test_scene_is_refused(sections: Any, words: Any) -> None:
     message = refused(text_of(**sections))
     for word in words:
         assert word in message
 
 
-def test_the_base_scene_is_right():
+def test_the_base_scene_is_right() -> None:
     assert parse_scene(text_of()).model.steps
 
 
@@ -226,7 +228,7 @@ FOLD_CASES = [
 @pytest.mark.parametrize(
     ("content", "words"), [case[1:] for case in FOLD_CASES], ids=[case[0] for case in FOLD_CASES]
 )
-def test_fold_file_is_refused(tmp_path, content, words):
+def test_fold_file_is_refused(tmp_path: Path, content: Any, words: Any) -> None:
     text = content if isinstance(content, str) else json.dumps(content)
     (tmp_path / "sheet.fold").write_text(text)
     message = refused(text_of(pattern='[pattern]\nfile = "sheet.fold"\n', mesh=""), tmp_path)
@@ -250,7 +252,7 @@ FILE_CASES = [
 @pytest.mark.parametrize(
     ("pattern", "mesh", "words"), [c[1:] for c in FILE_CASES], ids=[c[0] for c in FILE_CASES]
 )
-def test_pattern_file_is_refused(tmp_path, pattern, mesh, words):
+def test_pattern_file_is_refused(tmp_path: Path, pattern: Any, mesh: Any, words: Any) -> None:
     (tmp_path / "sheet.fold").write_text(json.dumps(SQUARE))
     (tmp_path / "sub.fold").mkdir()
     message = refused(text_of(pattern=f"[pattern]\n{pattern}\n", mesh=mesh), tmp_path)
@@ -263,7 +265,7 @@ def test_pattern_file_is_refused(tmp_path, pattern, mesh, words):
     [(b"", "is empty"), (b"a = '\xff'", "UTF-8"), (b"x" * 20_000_001, "longer than"), (None, "is a folder")],
     ids=["empty", "latin", "endless", "folder"],
 )
-def test_scene_file_is_refused(tmp_path, content, words):
+def test_scene_file_is_refused(tmp_path: Path, content: Any, words: str) -> None:
     file = tmp_path / "odd.toml"
     file.mkdir() if content is None else file.write_bytes(content)
     with pytest.raises(InputError, match=words) as caught:
@@ -271,7 +273,7 @@ def test_scene_file_is_refused(tmp_path, content, words):
     assert "odd.toml" in str(caught.value)
 
 
-def test_missing_scene_file():
+def test_missing_scene_file() -> None:
     with pytest.raises(InputError, match=r"no scene file 'nowhere\.toml'"):
         load_scene("nowhere.toml")
     with pytest.raises(InputError, match="cannot be read"):
@@ -281,7 +283,7 @@ def test_missing_scene_file():
 # --- the command line -------------------------------------------------------------------------------------------
 
 
-def command(capsys, *words):
+def command(capsys: pytest.CaptureFixture[str], *words: Any) -> Any:
     """Exit code, and the one line on stderr."""
     code = main([str(word) for word in words])
     out, err = capsys.readouterr()
@@ -292,7 +294,9 @@ def command(capsys, *words):
 
 
 @pytest.mark.parametrize("case", [0, 44, 58, 75], ids=lambda number: CASES[number][0])
-def test_bad_scene_exits_with_2_and_leaves_nothing(tmp_path, capsys, case):
+def test_bad_scene_exits_with_2_and_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], case: int
+) -> None:
     (tmp_path / "bad.toml").write_text(text_of(**CASES[case][1]))
     code, err, out = command(capsys, "run", tmp_path / "bad.toml", "-o", tmp_path / "out")
     assert (code, out) == (2, "")
@@ -304,7 +308,7 @@ def test_bad_scene_exits_with_2_and_leaves_nothing(tmp_path, capsys, case):
 @pytest.mark.parametrize(
     "place", ["taken", "taken/below", "linked"], ids=["file", "below a file", "dead link"]
 )
-def test_output_folder_that_cannot_be(tmp_path, capsys, place):
+def test_output_folder_that_cannot_be(tmp_path: Path, capsys: pytest.CaptureFixture[str], place: str) -> None:
     (tmp_path / "scene.toml").write_text(text_of())
     (tmp_path / "taken").write_text("mine")
     (tmp_path / "linked").symlink_to(tmp_path / "nowhere" / "at" / "all")
@@ -316,7 +320,7 @@ def test_output_folder_that_cannot_be(tmp_path, capsys, place):
     assert (tmp_path / "taken").read_text() == "mine"
 
 
-def test_path_file_that_cannot_be_written(tmp_path, capsys):
+def test_path_file_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "scene.toml").write_text(text_of())
     (tmp_path / "out" / "path.bh").mkdir(parents=True)
     code, err, _ = command(capsys, "run", tmp_path / "scene.toml", "-o", tmp_path / "out")
@@ -341,13 +345,13 @@ def test_path_file_that_cannot_be_written(tmp_path, capsys):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_wrong_command_lines(capsys, words, told):
+def test_wrong_command_lines(capsys: pytest.CaptureFixture[str], words: Any, told: str) -> None:
     code, err, _ = command(capsys, *words)
     assert code == 2
     assert told in err
 
 
-def test_traceback_only_with_debug(tmp_path, capsys):
+def test_traceback_only_with_debug(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "bad.toml").write_text("[sheet")
     assert main(["run", str(tmp_path / "bad.toml"), "--debug"]) == 2
     err = capsys.readouterr().err
@@ -355,7 +359,7 @@ def test_traceback_only_with_debug(tmp_path, capsys):
     assert err.splitlines()[-1].startswith("bh: ")
 
 
-def test_whole_program(tmp_path):
+def test_whole_program(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text(text_of(sheet="[sheet]\nE = 1\nt = -1\n"))
     program = [sys.executable, "-m", "bh.commands.cli", "run", "bad.toml"]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=60)

@@ -14,8 +14,11 @@ def test_one_case() -> None:
     """A case in a process of its own gives every phase a time, and the memory that grows from phase to phase."""
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.table", "wide", "2", "chosen"],
-        capture_output=True, text=True, check=True, cwd=ROOT,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+    )
     found = json.loads(done.stdout)
     phases = ("evaluate", "assemble", "factorise", "solve")
     assert all(found[phase] > 0.0 for phase in phases)

@@ -9,6 +9,7 @@ import sys
 import time
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,7 +52,7 @@ moment = { crease = "crease", to = 0.0 }
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "good.toml").write_text(GOOD)
     (tmp_path / "two.toml").write_text(TWO_STEPS)
@@ -59,11 +60,11 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def result(file):
+def result(file: Any) -> Any:
     return json.loads(Path(file).read_text(encoding="utf-8"))
 
 
-def test_run_writes_path_and_result(here, capsys):
+def test_run_writes_path_and_result(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "good.toml", "-o", "deep/out"]) == 0
     assert sorted(os.listdir("deep/out")) == ["path.bh", "result.json"]
     data = result("deep/out/result.json")
@@ -84,8 +85,10 @@ def test_run_writes_path_and_result(here, capsys):
     assert data["unknowns"] == path.unknowns > 0
     mesh = path.model.mesh
     assert data["mesh"] == {
-        "nodes": len(mesh.points), "triangles": len(mesh.triangles), "aspect_ratio": mesh.aspect_ratio,
-    }  # fmt: skip
+        "nodes": len(mesh.points),
+        "triangles": len(mesh.triangles),
+        "aspect_ratio": mesh.aspect_ratio,
+    }
     assert {"python", "numpy", "scipy", "curved-crease-workbench"} <= set(data["versions"])
     assert data["input"] == path.provenance["input"]
     assert data["scene"] == "good.toml"
@@ -102,13 +105,13 @@ def test_run_writes_path_and_result(here, capsys):
         assert word in out
 
 
-def test_default_folder_and_quiet(here, capsys):
+def test_default_folder_and_quiet(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "good.toml", "--quiet"]) == 0
     assert (here / "good-out" / "result.json").is_file()
     assert capsys.readouterr() == ("", "")
 
 
-def test_no_aspect_ratio_is_null(here):
+def test_no_aspect_ratio_is_null(here: Any) -> None:
     text = Path(__file__).parents[2].joinpath("examples", "miura.toml").read_text()
     (here / "miura.toml").write_text(text)
     (here / "miura.fold").write_bytes(
@@ -120,7 +123,7 @@ def test_no_aspect_ratio_is_null(here):
     assert {"mountain", "valley"} <= set(data["fold_angle"])
 
 
-def test_path_that_ends_early(here, capsys):
+def test_path_that_ends_early(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "early.toml", "-o", "out", "--quiet"]) == 1
     data = result("out/result.json")
     assert data["outcome"] == data["steps"][1]["outcome"] != "reached"
@@ -134,7 +137,7 @@ def test_path_that_ends_early(here, capsys):
     assert "out/result.json" in err
 
 
-def test_locked_hinges_let_it_reach_its_end(here, capsys):
+def test_locked_hinges_let_it_reach_its_end(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     """The same couple with the default: the panels are pressed against each other."""
     (here / "locked.toml").write_text(EARLY.replace("hinge_lock = false", "hinge_lock = true"))
     assert main(["run", "locked.toml", "-o", "out", "--quiet"]) == 0
@@ -142,11 +145,11 @@ def test_locked_hinges_let_it_reach_its_end(here, capsys):
     assert max(state.energy.lock for state in path) > 0.0
 
 
-def test_a_finished_result_is_never_lost(here, capsys):
+def test_a_finished_result_is_never_lost(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
     kept = {name: (here / "out" / name).read_bytes() for name in ("path.bh", "result.json")}
 
-    def still_kept():
+    def still_kept() -> Any:
         return all((here / "out" / name).read_bytes() == content for name, content in kept.items())
 
     assert main(["run", "early.toml", "-o", "out", "-q"]) == 1
@@ -163,7 +166,7 @@ def test_a_finished_result_is_never_lost(here, capsys):
     assert len(Trace.load("out/path.bh").steps) == 2
 
 
-def test_an_early_end_is_replaced(here):
+def test_an_early_end_is_replaced(here: Any) -> None:
     assert main(["run", "early.toml", "-o", "out", "-q"]) == 1
     assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
     assert result("out/result.json")["outcome"] == "reached"
@@ -191,13 +194,13 @@ solve(bh.load_scene("two.toml"), Path("out"), resume=sys.argv[1] == "resume", pr
 """
 
 
-def killed(how, states):
+def killed(how: Any, states: Any) -> Any:
     done = subprocess.run([sys.executable, "-c", KILLED, how, str(states)], capture_output=True, timeout=120)
     assert done.returncode == -signal.SIGKILL, done.stderr
     return len(Trace.load("out/path.bh"))
 
 
-def test_killed_run_resumes_with_nothing_lost(here):
+def test_killed_run_resumes_with_nothing_lost(here: Any) -> None:
     assert main(["run", "two.toml", "-o", "whole", "-q"]) == 0
     assert killed("new", 2) == 3  # the start, and two increments
     assert not (here / "out" / "result.json").exists()
@@ -212,7 +215,7 @@ def test_killed_run_resumes_with_nothing_lost(here):
     assert sorted(os.listdir("out")) == ["path.bh", "result.json"]
 
 
-def test_resume_of_a_complete_run_rewrites_its_result(here):
+def test_resume_of_a_complete_run_rewrites_its_result(here: Any) -> None:
     assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
     first = result("out/result.json")
     (here / "out" / "result.json").unlink()
@@ -220,7 +223,9 @@ def test_resume_of_a_complete_run_rewrites_its_result(here):
     assert result("out/result.json") == first
 
 
-def test_resume_finds_the_run_that_was_begun_beside_a_finished_one(here, monkeypatch, capsys):
+def test_resume_finds_the_run_that_was_begun_beside_a_finished_one(
+    here: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
     interrupt_after(2, monkeypatch)
     assert main(["run", "two.toml", "-o", "out"]) == 130
@@ -244,7 +249,9 @@ def test_resume_finds_the_run_that_was_begun_beside_a_finished_one(here, monkeyp
     ],
     ids=["no folder", "no path", "garbage", "another scene"],
 )
-def test_resume_of_what_cannot_be_resumed(here, capsys, prepare, told):
+def test_resume_of_what_cannot_be_resumed(
+    here: Any, capsys: pytest.CaptureFixture[str], prepare: Any, told: str
+) -> None:
     prepare(here / "out")
     before = sorted(here.rglob("*"))
     assert main(["run", "good.toml", "-o", "out", "--resume"]) == 2
@@ -254,22 +261,24 @@ def test_resume_of_what_cannot_be_resumed(here, capsys, prepare, told):
     assert sorted(here.rglob("*")) == before
 
 
-def interrupt_after(states, monkeypatch):
+def interrupt_after(states: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     class Interrupting:
         seen = 0
 
-        def update(self, *_):
+        def update(self, *_: Any) -> None:
             self.seen += 1
             if self.seen == states:
                 raise KeyboardInterrupt
 
-        def close(self, outcome):
+        def close(self, outcome: Any) -> None:
             pass
 
     monkeypatch.setattr(bh.runtime.progress, "Bar", Interrupting)
 
 
-def test_interrupt_says_how_to_go_on(here, monkeypatch, capsys):
+def test_interrupt_says_how_to_go_on(
+    here: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     interrupt_after(1, monkeypatch)
     assert main(["run", "good.toml", "-o", "out"]) == 130
     err = capsys.readouterr().err
@@ -282,8 +291,10 @@ def test_interrupt_says_how_to_go_on(here, monkeypatch, capsys):
     ("module", "name"),
     [("bh.scene.load", "load_scene"), ("bh.commands.run", "extras"), ("bh.commands.run", "result")],
 )
-def test_interrupt_anywhere_is_one_line(here, monkeypatch, capsys, module, name):
-    def stop(*_, **__):
+def test_interrupt_anywhere_is_one_line(
+    here: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], module: str, name: str
+) -> None:
+    def stop(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(f"{module}.{name}", stop)
@@ -294,8 +305,10 @@ def test_interrupt_anywhere_is_one_line(here, monkeypatch, capsys, module, name)
     assert err.count("\n") == 1
 
 
-def test_interrupt_of_another_packages_command(here, monkeypatch, capsys):
-    def stop(*_, **__):
+def test_interrupt_of_another_packages_command(
+    here: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("verification.framework.run.run", stop)
@@ -303,7 +316,9 @@ def test_interrupt_of_another_packages_command(here, monkeypatch, capsys):
     assert capsys.readouterr() == ("", "bh: interrupted\n")
 
 
-def test_hints_can_be_pasted(here, monkeypatch, capsys):
+def test_hints_can_be_pasted(
+    here: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     (here / "my scene.toml").write_text(GOOD)
     interrupt_after(1, monkeypatch)
     assert main(["run", "my scene.toml", "-o", "it's out"]) == 130
@@ -315,21 +330,21 @@ def test_hints_can_be_pasted(here, monkeypatch, capsys):
     assert main([*words[1:], "-q"]) == 0
 
 
-def test_resume_of_a_finished_run_says_so(here, capsys):
+def test_resume_of_a_finished_run_says_so(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "good.toml", "-o", "out"]) == 0
     assert "nothing was left to solve" not in capsys.readouterr().out
     assert main(["run", "good.toml", "-o", "out", "--resume"]) == 0
     assert "this run had reached its end before; nothing was left to solve" in capsys.readouterr().out
 
 
-def test_extras_of_an_older_run_do_not_stay(here):
+def test_extras_of_an_older_run_do_not_stay(here: Any) -> None:
     """A picture beside a result is of that result; what others have put there stays."""
     asked = "[outputs]\nfold = true\n"
     (here / "asks.toml").write_text(GOOD + asked)
     old = ("folded.png", "path.pvd", "path/0000.vtu", "path/notes.txt")
     ours = ["folded.fold", "path.bh", "result.json"]
 
-    def litter():
+    def litter() -> None:
         (here / "out" / "path").mkdir(exist_ok=True)
         for name in old:
             (here / "out" / name).touch()
@@ -350,7 +365,9 @@ def test_extras_of_an_older_run_do_not_stay(here):
     assert sorted(os.listdir("out")) == [ours[0], "path", *ours[1:]]
 
 
-def test_plain_progress_where_there_is_no_terminal(here, monkeypatch, capsys):
+def test_plain_progress_where_there_is_no_terminal(
+    here: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(bh.runtime.progress.Bar, "first", 0.0)
     monkeypatch.setattr(bh.runtime.progress.Bar, "every", 0.0)
     assert main(["run", "two.toml", "-o", "out"]) == 0
@@ -363,7 +380,7 @@ def test_plain_progress_where_there_is_no_terminal(here, monkeypatch, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_poissons_ratio_that_is_not_used_is_told(here, capsys):
+def test_poissons_ratio_that_is_not_used_is_told(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "nu.toml").write_text(GOOD.replace("t = 0.1", "t = 0.1\nnu = 0.3"))
     assert main(["run", "nu.toml"]) == 0
     assert "bars-and-hinges take Poisson's ratio as 0, not as nu = 0.3" in capsys.readouterr().out
@@ -382,7 +399,9 @@ def test_poissons_ratio_that_is_not_used_is_told(here, capsys):
         (["run", "out/path.bh"], "`bh view`"),
     ],
 )
-def test_where_a_wrong_command_line_is_sent(here, capsys, words, told):
+def test_where_a_wrong_command_line_is_sent(
+    here: Any, capsys: pytest.CaptureFixture[str], words: Any, told: str
+) -> None:
     assert main(words) == 2
     err = capsys.readouterr().err
     assert told in err
@@ -393,7 +412,7 @@ def test_where_a_wrong_command_line_is_sent(here, capsys, words, told):
 
 
 @pytest.fixture
-def drawn(monkeypatch):
+def drawn(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Pictures and series are told of, not made; `tests` of plotting make them."""
     import bh.plotting
 
@@ -410,7 +429,7 @@ def drawn(monkeypatch):
     return calls
 
 
-def test_pictures_and_series_on_request(here, drawn, capsys):
+def test_pictures_and_series_on_request(here: Any, drawn: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "good.toml", "-o", "out"]) == 0
     assert drawn == []
     assert main(["run", "good.toml", "-o", "out", "--pictures", "--vtu"]) == 0
@@ -425,10 +444,12 @@ def test_pictures_and_series_on_request(here, drawn, capsys):
     assert np.degrees(2.0 - np.pi) == pytest.approx(np.array(angles))  # mountain folds are negative in FOLD
 
 
-def test_picture_that_fails_leaves_the_result(here, monkeypatch, capsys):
+def test_picture_that_fails_leaves_the_result(
+    here: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     import bh.plotting
 
-    def fail(*_, **__):
+    def fail(*_: Any, **__: Any) -> None:
         raise ImportError("libGL is missing")
 
     monkeypatch.setattr(bh.plotting, "picture", fail)
@@ -437,7 +458,7 @@ def test_picture_that_fails_leaves_the_result(here, monkeypatch, capsys):
     assert result("out/result.json")["outcome"] == "reached"
 
 
-def test_view(here, drawn, capsys):
+def test_view(here: Any, drawn: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
     assert main(["view", "out"]) == 0
     assert main(["view", "out/path.bh", "--state", "0", "--picture", "flat.png"]) == 0
@@ -456,7 +477,7 @@ def test_view(here, drawn, capsys):
 # --- the command itself ------------------------------------------------------------------------------------------
 
 
-def test_version_formulations_and_help(capsys):
+def test_version_formulations_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("bh 0.")
     assert main(["formulations"]) == 0
@@ -469,12 +490,12 @@ def test_version_formulations_and_help(capsys):
         assert all(about in out for about in ABOUT.values())
 
 
-def test_short_help_is_that_of_the_commands():
+def test_short_help_is_that_of_the_commands() -> None:
     for entry in entry_points(group="bh.commands"):
         assert entry.load().__doc__.splitlines()[0] == ABOUT[entry.name]
 
 
-def test_starts_fast_and_light():
+def test_starts_fast_and_light() -> None:
     heavy = "numpy", "numba", "pydantic", "pyvista", "scipy", "matplotlib", "shapely"
     check = f"import sys, bh.commands.cli; sys.exit(' '.join(m for m in {heavy} if m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", check], capture_output=True, text=True).stderr.strip() == ""
@@ -487,7 +508,9 @@ def test_starts_fast_and_light():
     assert min(times) < 1.0  # 0.15 s on an idle machine
 
 
-def test_commands_of_other_packages(monkeypatch, capsys):
+def test_commands_of_other_packages(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     from bh.commands.cli import _proxy
 
     def check(cases: list[str], fast: bool = False, level: int = 3) -> None:
@@ -511,7 +534,7 @@ def test_commands_of_other_packages(monkeypatch, capsys):
         assert main(["check", "one", "--slow"]) == 2
         assert "--slow" in capsys.readouterr().err
 
-        def broken(self):
+        def broken(self: Any) -> None:
             raise ImportError("no module of that name")
 
         monkeypatch.setattr(EntryPoint, "load", broken)
@@ -523,10 +546,12 @@ def test_commands_of_other_packages(monkeypatch, capsys):
         app.registered_commands[:] = commands
 
 
-def test_a_fault_of_the_program_is_told_as_such(here, monkeypatch, capsys):
+def test_a_fault_of_the_program_is_told_as_such(
+    here: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     import bh.commands.run
 
-    def fail(*_, **__):
+    def fail(*_: Any, **__: Any) -> None:
         raise RuntimeError("a\nfault")
 
     monkeypatch.setattr(bh.commands.run, "solve", fail)

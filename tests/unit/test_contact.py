@@ -270,8 +270,15 @@ def test_two_discs_joined_crosswise() -> None:
     loops = [np.array([4, 5, 6, 7]), np.array([8, 9, 10, 11])]
     edges = [tuple(sorted((t[k], t[k - 1]))) for t in triangles for k in range(3)]
     assert sorted({e for e in edges if edges.count(e) == 1}) == [  # a manifold with these two boundaries
-        (4, 5), (4, 7), (5, 6), (6, 7), (8, 9), (8, 11), (9, 10), (10, 11),
-    ]  # fmt: skip
+        (4, 5),
+        (4, 7),
+        (5, 6),
+        (6, 7),
+        (8, 9),
+        (8, 11),
+        (9, 10),
+        (10, 11),
+    ]
     assert max(edges.count(e) for e in edges) == 2
     assert not seen_once(x, np.array(triangles), loops)
     large = np.array(triangles[:8])
@@ -450,8 +457,11 @@ def test_panels() -> None:
     assert len(panels.of_triangle) == len(mesh.triangles)
     assert panels.of_triangle[0] == 0
     assert sorted(panels.creases) == [
-        ("crease-1",), ("crease-1", "crease-2"), ("crease-2", "crease-3"), ("crease-3",),
-    ]  # fmt: skip
+        ("crease-1",),
+        ("crease-1", "crease-2"),
+        ("crease-2", "crease-3"),
+        ("crease-3",),
+    ]
     middle = panels.creases.index(("crease-2", "crease-3"))
     assert panels.name(middle) == f"panel {middle} (between crease-2 and crease-3)"
     radius = np.hypot(*mesh.points[mesh.triangles].mean(axis=1)[:, :2].T)

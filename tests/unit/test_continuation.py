@@ -19,7 +19,7 @@ from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
 from bh.solvers.trace import Strategy, Walk, walk
-from tests.unit.test_newton import Arch, Column, Stiffening, Toy
+from tests.unit.test_newton import Arch, Column, Small, Stiffening
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 
 Array = NDArray[np.float64]
@@ -30,8 +30,8 @@ def follow(system: Any, strategy: Strategy, q: Array) -> list[Increment]:
     return list(walk(Walk(system, strategy, (point(system, q, 0.0),))))
 
 
-class Absolute(Toy):
-    """A toy without load: its residual is measured as it is."""
+class Absolute(Small):
+    """A system without load: its residual is measured as it is."""
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         now = super().evaluate(q, lam)

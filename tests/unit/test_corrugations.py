@@ -84,8 +84,12 @@ def test_creases_that_touch_join() -> None:
 
 
 def test_family_holds_the_four_curved_ones() -> None:
-    for p, q, s, kind in ((2, 1, 1, "parabolic-point"), (2, 1, 0, "parabolic-edge"),
-                          (2, 2, 1, "elliptical-point"), (2, 2, 0, "elliptical-edge")):  # fmt: skip
+    for p, q, s, kind in (
+        (2, 1, 1, "parabolic-point"),
+        (2, 1, 0, "parabolic-edge"),
+        (2, 2, 1, "elliptical-point"),
+        (2, 2, 0, "elliptical-edge"),
+    ):
         x = np.linspace(-49.0, 49.0, 99)
         for i, rail in enumerate(meshes.curved_corrugation(p, q, s).rails[1:]):
             y = np.interp(x, *sample(rail).T, left=0.0, right=0.0)

@@ -144,8 +144,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("docs")
     done = subprocess.run(
         [sys.executable, str(ROOT / "docs" / "build_site.py"), str(folder)],
-        capture_output=True, text=True, check=False, timeout=SECONDS,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=SECONDS,
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     return folder / "html"
 

@@ -8,6 +8,7 @@ import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -29,13 +30,13 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     shutil.copy(ROOT / "examples" / "wave.svg", tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def test_the_tutorial_runs(here, capsys):
+def test_the_tutorial_runs(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     commands = [line[3:] for line in PAGE.splitlines() if line.startswith("bh ")]
     assert len(commands) == 7
     for command in commands:
@@ -49,7 +50,7 @@ def test_the_tutorial_runs(here, capsys):
     assert len(json.loads((here / "folded.fold").read_text())["file_frames"]) >= 2
 
 
-def test_the_python_runs(here, capsys):
+def test_the_python_runs(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, object] = {}
     for code in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
         exec(compile(code, "docs/drawing.md", "exec"), names)
@@ -59,7 +60,7 @@ def test_the_python_runs(here, capsys):
     assert 0.5 < float(angle) < 0.8
 
 
-def test_the_scene_of_the_page_is_read(here):
+def test_the_scene_of_the_page_is_read(here: Any) -> None:
     (text,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
     rest = (
         "[sheet]\nE = 4000.0\nt = 0.2\n[mesh]\nalong = 20\n[[steps]]\nfold = { crease = 'all', by = 0.1 }\n"
@@ -68,12 +69,12 @@ def test_the_scene_of_the_page_is_read(here):
     assert mesh.points.max(axis=0)[:2] == pytest.approx([240.0, 160.0])
 
 
-def test_the_table_is_what_the_importer_does():
+def test_the_table_is_what_the_importer_does() -> None:
     rows = re.findall(r"^\| (\w+) \| ([\w, ]+) \| \w+ `(#\w+)` \| ([\w-]*) *\|$", PAGE, re.MULTILINE)
     assert len(rows) == 7
     rules = Rules()
 
-    def kind(**look):
+    def kind(**look: Any) -> Any:
         return rules.kind(Stroke(lambda tolerance: None, "a line", **look))  # type: ignore[arg-type]
 
     for word, layers, colour, dash in rows:
@@ -86,14 +87,14 @@ def test_the_table_is_what_the_importer_does():
 
 
 class TestInit:
-    def test_the_library(self, here, capsys):
+    def test_the_library(self, here: Any, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["init"]) == 0
         assert main(["check", "scene.toml", "--no-picture"]) == 0
         assert main(["init"]) == 2
         assert "--force" in capsys.readouterr().err
         assert main(["init", "--force"]) == 0
 
-    def test_drawings_get_the_mesh_that_suits_them(self, here):
+    def test_drawings_get_the_mesh_that_suits_them(self, here: Any) -> None:
         (here / "cross.svg").write_text(
             '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="60mm" viewBox="0 0 60 60">'
             '<rect width="60" height="60" stroke="black" fill="none"/>'
@@ -107,17 +108,17 @@ class TestInit:
         with pytest.raises(InputError, match="no drawing"):
             example(Path("scene.toml"), here)
 
-    def test_from_another_folder(self, here):
+    def test_from_another_folder(self, here: Any) -> None:
         (here / "scenes").mkdir()
         assert main(["init", "scenes/wave.toml", "--drawing", "wave.svg"]) == 0
         assert load_scene(here / "scenes" / "wave.toml").model.mesh.kind == "staggered"
 
-    def test_the_example_is_what_is_written(self):
+    def test_the_example_is_what_is_written(self) -> None:
         assert (ROOT / "examples" / "wave.toml").read_text() == example(Path("wave.svg"), ROOT / "examples")
 
 
 class TestCheck:
-    def test_pictures(self, here):
+    def test_pictures(self, here: Any) -> None:
         for scene in ("appendix_b_a", "miura"):
             for suffix in ("png", "svg", "pdf"):
                 assert (
@@ -126,13 +127,13 @@ class TestCheck:
                 assert (here / f"a.{suffix}").stat().st_size > 1000
         assert main(["check", str(ROOT / "examples" / "miura.toml"), "--picture", "a.gif"]) == 2
 
-    def test_words(self):
+    def test_words(self) -> None:
         lines = report(load_scene(ROOT / "examples" / "appendix_b_a.toml"))
         assert "support at corner:inner-start: fix xyz, 1 node" in lines
         assert any(line.startswith("crease crease: mountain, 78.5") for line in lines)
         assert any(line.startswith("places: corner:inner-start") for line in lines)
 
-    def test_errors_are_one_line(self, here, capsys):
+    def test_errors_are_one_line(self, here: Any, capsys: pytest.CaptureFixture[str]) -> None:
         (here / "bad.toml").write_text("[pattern]\nfile = 'wave.svg'\n[sheet]\nE = 1.0\nt = 0.1\n[[steps]]\n")
         assert main(["check", "bad.toml"]) == 2
         assert capsys.readouterr().err.count("\n") == 1
@@ -140,14 +141,14 @@ class TestCheck:
 
 class TestSchema:
     @pytest.mark.parametrize("file", EXAMPLES, ids=lambda f: f.stem)
-    def test_examples_fit(self, file):
+    def test_examples_fit(self, file: Any) -> None:
         jsonschema.Draft202012Validator(schema()).validate(read_toml(file.read_text(encoding="utf-8")))
 
-    def test_it_is_a_schema_of_every_section(self):
+    def test_it_is_a_schema_of_every_section(self) -> None:
         jsonschema.Draft202012Validator.check_schema(schema())
         assert set(schema()["properties"]) == set(SECTIONS)
 
-    def test_things_of_ones_own_are_allowed(self):
+    def test_things_of_ones_own_are_allowed(self) -> None:
         scene = read_toml((ROOT / "examples" / "wave.toml").read_text())
         own = {"pattern": {"kind": "mine:fan", "blades": 5}, "steps": [{"mine:twist": {"by": 1.0}}]}
         jsonschema.validate(scene | own | {"supports": [{"kind": "mine:grip", "at": "all"}]}, schema())
@@ -163,12 +164,12 @@ class TestSchema:
             ("colour", {}),
         ],
     )
-    def test_what_cannot_be_is_refused(self, section, value):
+    def test_what_cannot_be_is_refused(self, section: str, value: Any) -> None:
         scene = read_toml((ROOT / "examples" / "wave.toml").read_text())
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(scene | {section: value}, schema())
 
-    def test_the_command(self, here, capsys):
+    def test_the_command(self, here: Any, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["schema"]) == 0
         assert json.loads(capsys.readouterr().out) == schema()
         assert main(["schema", "-o", "s.json"]) == 0
@@ -180,7 +181,7 @@ class TestRemarks:
 
     def codes(
         self, mesh: str, steps: str = "fold = { crease = 'crease', to = 2.0 }", how: str = "bars-and-hinges"
-    ):
+    ) -> Any:
         text = (
             "[pattern]\nkind = 'annulus_sector'\nradius = 60.0\nwidth = 10.0\nangle = 1.0\n"
             "[sheet]\nE = 4000.0\nt = 0.1\n"
@@ -203,18 +204,18 @@ class TestRemarks:
             ("size = 3.0\nkind = 'gmsh'", ["rulings"]),
         ],
     )
-    def test_bars_and_hinges(self, mesh, codes):
+    def test_bars_and_hinges(self, mesh: str, codes: Any) -> None:
         assert self.codes(mesh) == codes
         assert self.codes(mesh, how="consistent") == []
 
-    def test_loads(self):
+    def test_loads(self) -> None:
         pull = "force = { at = 'edge:end', total = [0.0, 0.0, 0.001] }"
         assert self.codes("aspect_ratio = 8.0", pull) == ["loads"]
         assert self.codes("aspect_ratio = 8.0", pull, "consistent") == ["loads"]
         assert self.codes("aspect_ratio = 8.0\nrows = 2", pull, "consistent") == []
         assert self.codes("aspect_ratio = 8.0", pull, "shell") == []
 
-    def test_the_command_prints_them(self, here, capsys):
+    def test_the_command_prints_them(self, here: Any, capsys: pytest.CaptureFixture[str]) -> None:
         text = (
             (ROOT / "examples" / "wave.toml").read_text().replace("aspect_ratio = 8.0", "aspect_ratio = 1.0")
         )
@@ -227,7 +228,7 @@ class TestRemarks:
             for line in json.loads((here / "coarse-out/result.json").read_text())["remarks"]
         )
 
-    def test_remarks_of_a_drawing_stay_with_the_path(self, here):
+    def test_remarks_of_a_drawing_stay_with_the_path(self, here: Any) -> None:
         import bh
 
         text = (here / "wave.svg").read_text().replace("</svg>", '<path d="M40,0 V80" stroke="black"/></svg>')

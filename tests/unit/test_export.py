@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -38,7 +40,7 @@ flat = ["dxf", "svg"]
 
 
 @pytest.fixture(scope="module")
-def path():
+def path() -> Any:
     pattern = meshes.annulus_sector(100.0, 10.0, 0.8)
     return bh.trace(
         bh.Model(meshes.structured(pattern, along=16), bh.Sheet(E=4000, t=0.127)).fold("crease", to=2.0)
@@ -46,7 +48,7 @@ def path():
 
 
 @pytest.mark.parametrize("suffix", [s for s in FOLDED if s not in (".fold", ".glb", ".inp")])
-def test_triangles(path, tmp_path, suffix):
+def test_triangles(path: Any, tmp_path: Path, suffix: Any) -> None:
     read = meshio.read(write_state(tmp_path / f"sheet{suffix}", list(path)))
     corners = np.sort(np.round(read.points[read.cells_dict["triangle"]].reshape(-1, 9), 4), axis=0)
     ours = np.sort(np.round(path[-1].points[path[-1].mesh.triangles].reshape(-1, 9), 4), axis=0)
@@ -56,7 +58,7 @@ def test_triangles(path, tmp_path, suffix):
         assert bending @ path[-1].mesh.areas == pytest.approx(path[-1].energy.bending)
 
 
-def test_gltf_is_in_metres_with_y_up(path, tmp_path):
+def test_gltf_is_in_metres_with_y_up(path: Any, tmp_path: Path) -> None:
     scene = trimesh.load(write_state(tmp_path / "sheet.glb", list(path)), process=False)
     sheet = scene.geometry["sheet"]
     x, y, z = 1e3 * np.asarray(sheet.vertices).T
@@ -72,7 +74,7 @@ def test_gltf_is_in_metres_with_y_up(path, tmp_path):
     assert tree["materials"][triangles["material"]]["doubleSided"]
 
 
-def test_fold_has_every_state_as_a_frame(path, tmp_path):
+def test_fold_has_every_state_as_a_frame(path: Any, tmp_path: Path) -> None:
     file = write_state(tmp_path / "sheet.fold", list(path))
     frames = json.loads(file.read_text())["file_frames"]
     assert len(frames) == len(path)
@@ -82,7 +84,7 @@ def test_fold_has_every_state_as_a_frame(path, tmp_path):
         assert mesh.fold_angles["mountain"] == pytest.approx(state.fold_angle("crease"), abs=1e-9)
 
 
-def test_flat_pattern(path, tmp_path):
+def test_flat_pattern(path: Any, tmp_path: Path) -> None:
     for suffix in (".svg", ".dxf"):
         back = read_pattern(write_flat(tmp_path / f"flat{suffix}", path.model.mesh))
         assert back.creases[0].curve.length == pytest.approx(80.0, rel=1e-3)
@@ -90,7 +92,7 @@ def test_flat_pattern(path, tmp_path):
     assert read_fold(write_flat(tmp_path / "flat.fold", path.model.mesh)).flat
 
 
-def test_what_cannot_be(path, tmp_path):
+def test_what_cannot_be(path: Any, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="suffix"):
         write_state(tmp_path / "a.xyz", list(path))
     with pytest.raises(InputError, match="no state"):
@@ -105,7 +107,9 @@ def test_what_cannot_be(path, tmp_path):
         write_gltf(tmp_path / "a.glb", path.model.mesh, colours=[1, 2])
 
 
-def test_the_command(tmp_path, monkeypatch, capsys):
+def test_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SCENE)
     assert main(["run", "scene.toml", "-o", "out", "-q"]) == 0

@@ -120,9 +120,14 @@ def test_referee_follows_the_truss() -> None:
     load[2, 2] = -truss.force
     length = math.hypot(truss.span, truss.rise)
     referee = DenseOrigami(
-        points, np.array([[0, 2], [1, 2]]), truss.stiffness * length, np.zeros((0, 4), dtype=np.int64), np.zeros(0),
-        held, load,
-    )  # fmt: skip
+        points,
+        np.array([[0, 2], [1, 2]]),
+        truss.stiffness * length,
+        np.zeros((0, 4), dtype=np.int64),
+        np.zeros(0),
+        held,
+        load,
+    )
     states = [(lam, -float(u[2, 2])) for lam, u in referee.follow(0.05, 60)]
     lam, w = np.array(states).T
     assert w[-1] > 2.0 * truss.rise

@@ -10,11 +10,11 @@ import pytest
 
 pytest.importorskip("xarray")
 from bh.applications.inverse import surrogate as stored
-from bh.applications.inverse.crossing import Projected, Swept, planar
 from bh.applications.inverse.optimisers import Evolution, Genetic, Optimiser, Polished, best, polish
 from bh.applications.inverse.problems import CURVES, FitCurve, MoveTip, ReachPoint, resample
 from bh.applications.inverse.reach import Reach
 from bh.applications.inverse.segments import DesignError
+from bh.applications.inverse.self_intersection import Projected, Swept, planar
 from bh.applications.inverse.simulate import SegmentTask, simulate
 from bh.applications.inverse.surrogate import Surrogate, shipped
 from bh.applications.inverse.transforms import angles, matrix

@@ -112,7 +112,7 @@ def test_a_spring_of_a_later_step_is_there_from_the_start() -> None:
 
 
 def test_fold_by_follows_the_drawing() -> None:
-    """Mountain below pi, valley above (DESIGN.md, section 3)."""
+    """Mountain below pi, valley above."""
     mountain, valley = crease_hinges(TWO, "crease-1"), crease_hinges(TWO, "crease-2")
     (step,) = steps(Model(TWO, STEEL).fold("all", by=0.7))
     assert step.prescribed.end[mountain] == pytest.approx(np.full(4, math.pi - 0.7))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -57,19 +57,19 @@ class TestCurves:
     )
 
     @pytest.mark.parametrize(("curve", "length", "closed"), CURVES)
-    def test_length_and_closing(self, curve, length, closed):
+    def test_length_and_closing(self, curve: Any, length: Any, closed: Any) -> None:
         assert curve.length == pytest.approx(length, rel=1e-14)
         assert curve.closed is closed
         first, last = curve.point(np.array([0.0, 1.0]))
         assert np.allclose(first, last) is closed
 
     @pytest.mark.parametrize("curve", [curve for curve, *_ in CURVES])
-    def test_constant_speed(self, curve):
+    def test_constant_speed(self, curve: Any) -> None:
         """60000 steps are 1 / 60000 of the length each (chords shorter by less than 1e-9 of it, save at corners)."""
         steps = np.linalg.norm(np.diff(curve.point(np.linspace(0, 1, 60001)), axis=0), axis=1) * 60000
         assert np.quantile(np.abs(steps / curve.length - 1), 0.99) < 1e-8
 
-    def test_points(self):
+    def test_points(self) -> None:
         np.testing.assert_allclose(
             Line((1, 2), (4, 6)).point(np.array([0, 0.5, 1])), [[1, 2], [2.5, 4], [4, 6]]
         )
@@ -80,7 +80,7 @@ class TestCurves:
 
     @pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
     @pytest.mark.parametrize("radius", [0.05, 5.0, 5000.0])
-    def test_samples_keep_the_tolerance(self, radius, tolerance):
+    def test_samples_keep_the_tolerance(self, radius: float, tolerance: float) -> None:
         arc = Arc((3, 4), radius, 0.3, 5.0)
         points = sample(arc, tolerance)
         middles = 0.5 * (points[1:] + points[:-1]) - [3, 4]
@@ -90,13 +90,13 @@ class TestCurves:
             assert sagitta.max() > 0.5 * tolerance
         np.testing.assert_allclose(points[[0, -1]], arc.point(np.array([0.0, 1.0])))
 
-    def test_samples_of_straight_curves(self):
+    def test_samples_of_straight_curves(self) -> None:
         assert sample(Line((0, 0), (1, 1))).tolist() == [[0, 0], [1, 1]]
         assert len(sample(Arc((0, 0), 1e-4, 0.0, 2 * math.pi))) >= 9
 
 
 class TestLibrary:
-    def test_strip(self):
+    def test_strip(self) -> None:
         pattern = strip(30, 10, [2, 5], ["mountain", "valley"])
         assert [rail.point(np.zeros(1))[0].tolist() for rail in pattern.rails] == [
             [0, 0],
@@ -110,7 +110,7 @@ class TestLibrary:
         assert strip(30, 10, [2]).folds == {"crease": "mountain"}
         assert strip(30, 10).creases == ()
 
-    def test_annulus_sector(self):
+    def test_annulus_sector(self) -> None:
         pattern = annulus_sector([80, 90, 110], 5, 1.0, "valley")
         assert [rail.radius for rail in pattern.rails] == [75, 80, 90, 110, 115]
         assert set(pattern.folds.values()) == {"valley"}
@@ -120,7 +120,7 @@ class TestLibrary:
         end = [math.cos(1), math.sin(1)] * np.array([[75], [115]])
         np.testing.assert_allclose(edges["end"].point(np.array([0.0, 1.0])), end)
 
-    def test_full_annulus(self):
+    def test_full_annulus(self) -> None:
         pattern = full_annulus(100, 10)
         assert pattern.closed
         assert len(pattern.rings) == 2
@@ -147,7 +147,7 @@ class TestLibrary:
             (lambda: full_annulus(math.inf, 1), "radius = inf"),
         ],
     )
-    def test_errors(self, make, words):
+    def test_errors(self, make: Any, words: str) -> None:
         with pytest.raises(PatternError) as caught:
             make()
         assert words in one_line(caught.value)
@@ -180,7 +180,7 @@ class TestPattern:
             ([Crease("null", Arc((5, 5), 0.0, 0.0, 1.0))], "crease 'null' has no length"),
         ],
     )
-    def test_creases(self, creases, words):
+    def test_creases(self, creases: Any, words: str) -> None:
         with pytest.raises(PatternError) as caught:
             CreasePattern(rings=(SQUARE,), creases=tuple(creases))
         assert words in one_line(caught.value)
@@ -196,25 +196,25 @@ class TestPattern:
             ((SQUARE, SQUARE + 20.0), "not a simple polygon"),  # a hole outside
         ],
     )
-    def test_outlines(self, rings, words):
+    def test_outlines(self, rings: Any, words: str) -> None:
         with pytest.raises(PatternError) as caught:
             CreasePattern(rings=rings)
         assert words in str(caught.value)
         assert str(caught.value).isprintable()
 
-    def test_crease_in_a_hole(self):
+    def test_crease_in_a_hole(self) -> None:
         hole = SQUARE * 0.4 + 3.0
         with pytest.raises(PatternError, match="leaves the sheet"):
             CreasePattern(rings=(SQUARE, hole), creases=(Crease("a", Line((0, 5), (10, 5))),))
 
-    def test_what_is_allowed(self):
+    def test_what_is_allowed(self) -> None:
         """Creases along the edge of curved sheets, that meet in end points, and closed ones."""
         meeting = (Crease("a", Line((0, 0), (5, 5))), Crease("b", Line((5, 5), (10, 0)), "valley"))
         assert CreasePattern(rings=(SQUARE,), creases=meeting).folds == {"a": "mountain", "b": "valley"}
         round_ = Crease("round", Arc((5, 5), 3.0, 0.0, 2 * math.pi))
         assert not CreasePattern(rings=(SQUARE,), creases=(round_,)).closed
 
-    def test_units_and_folds(self):
+    def test_units_and_folds(self) -> None:
         with pytest.raises(PatternError, match="units 'm' are not known"):
             CreasePattern(rings=(SQUARE,), units="m")  # type: ignore[arg-type]
         with pytest.raises(
@@ -224,7 +224,7 @@ class TestPattern:
 
 
 class TestTopology:
-    def test_two_triangles(self):
+    def test_two_triangles(self) -> None:
         """The hinge of two triangles: row, order and turning sense are those of the docstring."""
         topology = build(np.array([[0, 1, 2], [1, 3, 2]]), 4)
         assert topology.edges.tolist() == [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]
@@ -241,13 +241,13 @@ class TestTopology:
 
     @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
     @pytest.mark.parametrize("turns", [(0, 0), (1, 0), (2, 1)])
-    def test_the_first_triangle_directs_the_hinge(self, order, turns):
+    def test_the_first_triangle_directs_the_hinge(self, order: Any, turns: Any) -> None:
         triangles = np.array([np.roll(t, k) for t, k in zip([[0, 1, 2], [1, 3, 2]], turns, strict=True)])
         (hinge,) = build(triangles[list(order)], 4).hinges.tolist()
         assert hinge == ([0, 1, 2, 3] if order == (0, 1) else [3, 2, 1, 0])
 
     @pytest.mark.parametrize("kind", KINDS)
-    def test_hinges_of_a_mesh(self, kind):
+    def test_hinges_of_a_mesh(self, kind: Any) -> None:
         mesh = structured(annulus_sector(50, 8, 1.3), along=7, rows=2, kind=kind)
         topology = mesh.topology
         p, q, r, s = (mesh.points[topology.hinges[:, k], :2] for k in range(4))
@@ -265,7 +265,7 @@ class TestTopology:
         opposite = np.take_along_axis(mesh.triangles, np.zeros((len(mesh.triangles), 1), dtype=int), axis=1)
         assert not (topology.edges[topology.triangle_edges[:, 0]] == opposite).any()
 
-    def test_find_edges(self):
+    def test_find_edges(self) -> None:
         topology = build(np.array([[0, 1, 2], [1, 3, 2]]), 4)
         assert topology.find_edges(np.array([[2, 1], [0, 1], [3, 2]])).tolist() == [2, 0, 4]
         assert topology.find_edges(np.zeros((0, 2), dtype=int)).tolist() == []
@@ -285,12 +285,12 @@ class TestTopology:
             ([[0, 1]], "no triangles"),
         ],
     )
-    def test_errors(self, triangles, words):
+    def test_errors(self, triangles: Any, words: str) -> None:
         with pytest.raises(MeshError) as caught:
             build(np.array(triangles, dtype=np.int64), 5)
         assert words in one_line(caught.value)
 
-    def test_boundary_loops(self):
+    def test_boundary_loops(self) -> None:
         mesh = structured(full_annulus(50, 10), along=20, kind="one-way")
         loops = boundary_loops(mesh.topology)
         assert sorted(map(len, loops)) == [20, 20]
@@ -302,14 +302,14 @@ class TestTopology:
         assert (mesh.topology.edge_triangles[mesh.topology.find_edges(pairs), 1] < 0).all()
         assert len(pairs) == len(mesh.topology.boundary) == 10
 
-    def test_boundary_that_touches_itself(self):
+    def test_boundary_that_touches_itself(self) -> None:
         topology = build(np.array([[0, 1, 2], [0, 3, 4]]), 5)
         with pytest.raises(MeshError, match="touches itself at node 0; split"):
             boundary_loops(topology)
 
     @pytest.mark.parametrize("kind", KINDS)
     @pytest.mark.parametrize("rows", [1, 2, 3, 4])
-    def test_euler_characteristic(self, kind, rows):
+    def test_euler_characteristic(self, kind: Any, rows: int) -> None:
         sheets = {
             1: [
                 annulus_sector(50, 10, 2.0),
@@ -331,7 +331,7 @@ class TestTopology:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("rows", [1, 2, 3])
 class TestStructured:
-    def test_area_converges(self, kind, rows):
+    def test_area_converges(self, kind: Any, rows: Any) -> None:
         """Chords of arcs: the area is second order, and exact for a strip."""
         for pattern, exact in (
             (annulus_sector([60, 75], 10, 1.5), 0.75 * (85**2 - 50**2)),
@@ -345,7 +345,7 @@ class TestStructured:
             21, rel=1e-14
         )
 
-    def test_named_sets_lie_on_their_curves(self, kind, rows):
+    def test_named_sets_lie_on_their_curves(self, kind: Any, rows: Any) -> None:
         for pattern in (annulus_sector([60, 75], 10, 1.5), full_annulus(60, 10), strip(20, 5, [2, 3])):
             mesh = structured(pattern, along=30, rows=rows, kind=kind)
             assert set(mesh.edge_sets) == set(mesh.curves)
@@ -362,7 +362,7 @@ class TestStructured:
                 lengths = np.linalg.norm(np.diff(mesh.points[pairs], axis=1)[:, 0], axis=1)
                 assert lengths.sum() == pytest.approx(curve.length, rel=2e-3)
 
-    def test_edges_make_up_the_boundary_and_creases_lie_inside(self, kind, rows):
+    def test_edges_make_up_the_boundary_and_creases_lie_inside(self, kind: Any, rows: Any) -> None:
         for pattern in (annulus_sector([60, 75], 10, 1.5), full_annulus(60, 10)):
             mesh = structured(pattern, along=30, rows=rows, kind=kind)
             rim = mesh.topology.edge_triangles[:, 1] < 0
@@ -373,23 +373,26 @@ class TestStructured:
             for crease in mesh.creases:
                 assert not rim[mesh.topology.find_edges(mesh.crease_edges(crease))].any()
 
-    def test_triangles_are_counter_clockwise(self, kind, rows):
+    def test_triangles_are_counter_clockwise(self, kind: Any, rows: Any) -> None:
         for pattern in (annulus_sector([60, 75], 10, 1.5), full_annulus(60, 10), strip(20, 5, [2])):
             mesh = structured(pattern, along=30, rows=rows, kind=kind)
             assert mesh.flat
             assert (winding(mesh) > 0).all()
 
-    def test_corners(self, kind, rows):
+    def test_corners(self, kind: Any, rows: Any) -> None:
         mesh = structured(annulus_sector(60, 10, 1.5), along=9, rows=rows, kind=kind)
         end = np.array([math.cos(1.5), math.sin(1.5)])
         for name, point in {
-            "inner-start": [50, 0], "outer-start": [70, 0], "inner-end": 50 * end, "outer-end": 70 * end,
-        }.items():  # fmt: skip
+            "inner-start": [50, 0],
+            "outer-start": [70, 0],
+            "inner-end": 50 * end,
+            "outer-end": 70 * end,
+        }.items():
             (node,) = mesh.nodes(f"corner:{name}")
             np.testing.assert_allclose(mesh.points[node, :2], point, atol=1e-12)
         assert not structured(full_annulus(60, 10), along=30, rows=rows, kind=kind).corners
 
-    def test_spans(self, kind, rows):
+    def test_spans(self, kind: Any, rows: Any) -> None:
         """On a strip the spans are |dx| and |dy|; on an annulus they make up the edge's length."""
         mesh = structured(strip(20, 5, [2]), along=7, rows=rows, kind=kind)
         a, b = (mesh.points[mesh.topology.edges[:, k], :2] for k in range(2))
@@ -402,7 +405,7 @@ class TestStructured:
             np.testing.assert_allclose(np.hypot(*mesh.spans.T), length, rtol=1e-12)
             np.testing.assert_allclose(mesh.spans[:, 1], radial, atol=0.06)
 
-    def test_across_edges(self, kind, rows):
+    def test_across_edges(self, kind: Any, rows: Any) -> None:
         """A staggered mesh joins no two nodes straight across, save at its ends; the others do everywhere."""
         for pattern in (annulus_sector([60, 75], 10, 1.5), full_annulus(60, 10)):
             mesh = structured(pattern, along=30, rows=rows, kind=kind)
@@ -415,7 +418,7 @@ class TestStructured:
                 lines = (len(pattern.rails) - 1) * rows
                 assert len(across) == lines * (30 if pattern.closed else 31)
 
-    def test_aspect_ratio(self, kind, rows):
+    def test_aspect_ratio(self, kind: Any, rows: Any) -> None:
         """The number of cells is whole, so alpha comes out within half a cell."""
         for alpha in (0.7, 3.0, 8.0, 12.5):
             mesh = structured(strip(100, 12, [6]), aspect_ratio=alpha, rows=rows, kind=kind)
@@ -447,24 +450,24 @@ class TestDiagonals:
             found.setdefault(round(float(y), 6), []).append((x, int(np.sign((b - a)[0] * (b - a)[1]))))
         return {y: [slope for _, slope in sorted(row)] for y, row in sorted(found.items())}
 
-    def test_one_way(self):
+    def test_one_way(self) -> None:
         assert self.slopes("one-way") == {0.5: [1, 1, 1, 1], 1.5: [1, 1, 1, 1]}
 
-    def test_mirrored(self):
+    def test_mirrored(self) -> None:
         assert self.slopes("mirrored") == {0.5: [1, 1, 1, 1], 1.5: [-1, -1, -1, -1]}
         assert self.slopes("mirrored", 2) == {0.25: [1] * 4, 0.75: [1] * 4, 1.25: [-1] * 4, 1.75: [-1] * 4}
 
-    def test_alternating(self):
+    def test_alternating(self) -> None:
         assert self.slopes("alternating") == {0.5: [1, -1, 1, -1], 1.5: [-1, 1, -1, 1]}
 
-    def test_staggered(self):
+    def test_staggered(self) -> None:
         slopes = self.slopes("staggered")
         assert slopes == {0.5: [1, -1] * 4, 1.5: [-1, 1] * 4} or slopes == {
             0.5: [-1, 1] * 4,
             1.5: [1, -1] * 4,
         }
 
-    def test_staggered_crease_has_whole_cells(self):
+    def test_staggered_crease_has_whole_cells(self) -> None:
         mesh = structured(strip(4, 2, [1]), along=4)
         assert mesh.points[mesh.nodes("crease:crease"), 0].tolist() == [0, 1, 2, 3, 4]
         assert mesh.points[mesh.nodes("edge:inner"), 0].tolist() == [0, 0.5, 1.5, 2.5, 3.5, 4]
@@ -484,21 +487,21 @@ class TestDiagonals:
         ({"along": 4, "kind": "zigzag"}, "mesh kind 'zigzag' is not known"),
     ],
 )
-def test_structured_errors(arguments, words):
+def test_structured_errors(arguments: Any, words: str) -> None:
     with pytest.raises(MeshError) as caught:
         structured(strip(20, 5, [2]), **arguments)
     assert words in str(caught.value)
     assert str(caught.value).isprintable()
 
 
-def test_structured_needs_rails_and_a_ring_of_three():
+def test_structured_needs_rails_and_a_ring_of_three() -> None:
     with pytest.raises(MeshError, match="no rails"):
         structured(CreasePattern(rings=(SQUARE,)), along=3)
     with pytest.raises(MeshError, match="along = 2 cells cannot be; use a whole number from 3"):
         structured(full_annulus(50, 45), along=2)
 
 
-def test_rails_that_run_clockwise_give_counter_clockwise_triangles():
+def test_rails_that_run_clockwise_give_counter_clockwise_triangles() -> None:
     """The turning sense comes from the positions, not from the order of the rails."""
     rails = tuple(Line((0, y), (5, y)) for y in (2.0, 1.0, 0.0))
     pattern = CreasePattern(
@@ -515,7 +518,7 @@ class TestSheetMesh:
     def mesh(self) -> SheetMesh:
         return structured(annulus_sector(50, 10, 1.0, "valley"), along=4)
 
-    def test_arrays_are_read_only(self):
+    def test_arrays_are_read_only(self) -> None:
         mesh = SheetMesh(
             [[0, 0], [1, 0], [1, 1], [0, 1]],
             [[0, 1, 2], [0, 2, 3]],
@@ -533,7 +536,7 @@ class TestSheetMesh:
             with pytest.raises(TypeError):
                 mapping["x"] = 0  # type: ignore[index]
 
-    def test_inputs_are_copied(self):
+    def test_inputs_are_copied(self) -> None:
         points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
         triangles, edges = np.array([[0, 1, 2]]), np.array([[0, 1]])
         mesh = SheetMesh(points, triangles, edge_sets={"edge:x": edges})
@@ -542,7 +545,7 @@ class TestSheetMesh:
         assert mesh.triangles.tolist() == [[0, 1, 2]]
         assert mesh.edge_sets["edge:x"].tolist() == [[0, 1]]
 
-    def test_two_dimensional_points_lie_in_z_0(self):
+    def test_two_dimensional_points_lie_in_z_0(self) -> None:
         mesh = SheetMesh([[0, 0], [3, 0], [0, 4]], [[0, 1, 2]])
         assert mesh.points.shape == (3, 3)
         assert mesh.areas.tolist() == [6.0]
@@ -573,13 +576,13 @@ class TestSheetMesh:
             ),
         ],
     )
-    def test_errors(self, points, triangles, more, words):
+    def test_errors(self, points: Any, triangles: Any, more: Any, words: str) -> None:
         with pytest.raises(MeshError) as caught:
             SheetMesh(points, triangles, **more)
         assert words in str(caught.value)
         assert str(caught.value).isprintable()
 
-    def test_places(self):
+    def test_places(self) -> None:
         mesh = self.mesh()
         assert mesh.creases == ("crease",)
         assert mesh.folds["crease"] == "valley"
@@ -594,19 +597,19 @@ class TestSheetMesh:
     @pytest.mark.parametrize(
         "place", ["", "node:", "node:99", "node:-1", "node:1.5", "node:²", "edge:left", "crease"]
     )
-    def test_unknown_places(self, place):
+    def test_unknown_places(self, place: str) -> None:
         with pytest.raises(MeshError) as caught:
             self.mesh().nodes(place)
         assert f"'{place}'" in one_line(caught.value)
 
-    def test_unknown_creases(self):
+    def test_unknown_creases(self) -> None:
         with pytest.raises(MeshError, match="no crease 'x'; its creases: crease"):
             self.mesh().crease_edges("x")
         with pytest.raises(MeshError, match="none"):
             structured(strip(4, 2), along=2).crease_edges("x")
 
 
-def test_errors_are_value_errors_of_one_family():
+def test_errors_are_value_errors_of_one_family() -> None:
     for name in ("PatternError", "MeshError", "FileFormatError"):
         assert issubclass(getattr(meshes, name), InputError)
     assert issubclass(InputError, ValueError)

@@ -32,7 +32,7 @@ def band(A: Array) -> BandMatrix:
     return BandMatrix(ab, np.arange(n))
 
 
-class Toy(Silent):
+class Small(Silent):
     """A system given by its energy, gradient and Hessian in q; lambda is a dead load along `load`."""
 
     rotation = 0.0
@@ -68,7 +68,7 @@ class Toy(Silent):
         return -float(self.load @ q)
 
 
-class Springs(Toy):
+class Springs(Small):
     """Linear: a chain of three springs."""
 
     K = np.array([[3.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
@@ -80,7 +80,7 @@ class Springs(Toy):
         return 0.5 * float(q @ self.K @ q), self.K @ q, self.K
 
 
-class Stiffening(Toy):
+class Stiffening(Small):
     """Energy q^2 / 2 + q^4 / 4 under a load of 10: q + q^3 = 10 lambda."""
 
     def __init__(self) -> None:
@@ -90,7 +90,7 @@ class Stiffening(Toy):
         return float((q**2 / 2 + q**4 / 4).sum()), q + q**3, np.diag(1 + 3 * q**2)
 
 
-class Arch(Toy):
+class Arch(Small):
     """A shallow arch: energy (q^2 - 1)^2 / 4 from q = -1; the load path has a limit point at q = -1 / sqrt 3."""
 
     limit = 2.0 / (3.0 * math.sqrt(3.0))
@@ -102,7 +102,7 @@ class Arch(Toy):
         return float(((q**2 - 1) ** 2 / 4).sum()), q**3 - q, np.diag(3 * q**2 - 1)
 
 
-class Column(Toy):
+class Column(Small):
     """A column that buckles: shortening u and sway w, energy u^2 / 2 + (0.3 - u) w^2 + w^4; load 1 along u.
 
     The straight column u = lambda, w = 0 is stable up to 0.3; beyond, w^2 = (u - 0.3) / 2.
@@ -118,7 +118,7 @@ class Column(Toy):
         return float(energy), gradient, np.array([[1.0, -2 * w], [-2 * w, 2 * (0.3 - u) + 12 * w * w]])
 
 
-def finish(system: Toy, strategy: LoadControl, q: Array) -> list[Increment]:
+def finish(system: Small, strategy: LoadControl, q: Array) -> list[Increment]:
     return list(walk(Walk(system, strategy, (point(system, q, 0.0),))))
 
 
@@ -286,7 +286,7 @@ def test_leaving_a_saddle() -> None:
 
 
 def test_a_saddle_without_a_way_out_is_kept() -> None:
-    class Hill(Toy):
+    class Hill(Small):
         def internal(self, q: Array) -> tuple[float, Array, Array]:
             return -0.5 * float(q @ q), -q, -np.eye(1)
 

@@ -604,18 +604,28 @@ def test_errors_of_files(tmp_path: FilePath) -> None:
         assert "\n" not in str(caught.value), name
         assert str(tmp_path) in str(caught.value), name
     assert sorted(p.name for p in tmp_path.iterdir()) == [
-        "empty.bh", "half.bh", "notes.txt", "other.db", "whole.bh",
-    ]  # fmt: skip
+        "empty.bh",
+        "half.bh",
+        "notes.txt",
+        "other.db",
+        "whole.bh",
+    ]
     assert not tmp_path.with_name(tmp_path.name + ".part").exists()
 
 
 @pytest.mark.parametrize(
     "damage",
-    ["UPDATE meta SET value = '{' WHERE key = 'model'", "DELETE FROM arrays WHERE name = 'points'",
-     "UPDATE states SET unknowns = x'0011'", "DELETE FROM meta WHERE key = 'provenance'", "DROP TABLE steps",
-     "UPDATE meta SET value = replace(value, 'bars-and-hinges', 'wishes')", "UPDATE arrays SET shape = '[7]'",
-     "UPDATE states SET cuts = 'no'"],
-)  # fmt: skip
+    [
+        "UPDATE meta SET value = '{' WHERE key = 'model'",
+        "DELETE FROM arrays WHERE name = 'points'",
+        "UPDATE states SET unknowns = x'0011'",
+        "DELETE FROM meta WHERE key = 'provenance'",
+        "DROP TABLE steps",
+        "UPDATE meta SET value = replace(value, 'bars-and-hinges', 'wishes')",
+        "UPDATE arrays SET shape = '[7]'",
+        "UPDATE states SET cuts = 'no'",
+    ],
+)
 def test_damaged_files(damage: str, tmp_path: FilePath) -> None:
     file = tmp_path / "run.bh"
     reached(MODELS["held"], file=file)
@@ -643,17 +653,26 @@ def described() -> dict[str, Model]:
     polyline = meshes.Polyline(np.array([[0.0, 5.0], [10.0, 5.5], [20.0, 5.0]]))
     odd = replace(
         meshes.structured(meshes.strip(20.0, 10.0, [5.0]), along=4),
-        curves={"crease:crease": polyline}, fold_angles={"crease": np.full(4, 0.3)}, spans=None,
-    )  # fmt: skip
+        curves={"crease:crease": polyline},
+        fold_angles={"crease": np.full(4, 0.3)},
+        spans=None,
+    )
     return {
         **MODELS,
         "all kinds": Model(odd, Sheet(E=4000, t=0.1, nu=0.3))
-        .support([0, 1], [[1.0, 2.0, 0.0]]).support("edge:start", "yz").support("rigid-body")
+        .support([0, 1], [[1.0, 2.0, 0.0]])
+        .support("edge:start", "yz")
+        .support("rigid-body")
         .crease("crease", stiffness=0.2, rest=3.0)
-        .step(Fold("crease", rest=np.full(4, 2.9).tolist()), Force(np.array([3, 4]), total=np.array([1e-3, 0, 0])))
+        .step(
+            Fold("crease", rest=np.full(4, 2.9).tolist()),
+            Force(np.array([3, 4]), total=np.array([1e-3, 0, 0])),
+        )
         .displace((5, 6), np.array([0.0, 0.0, 2.0]), 0.1),
-        "full annulus": Model(meshes.structured(meshes.full_annulus(20.0, 5.0), along=12), SHEET).fold("all", by=0.1),
-    }  # fmt: skip
+        "full annulus": Model(meshes.structured(meshes.full_annulus(20.0, 5.0), along=12), SHEET).fold(
+            "all", by=0.1
+        ),
+    }
 
 
 @pytest.mark.parametrize("name", described())
@@ -759,8 +778,11 @@ def test_reaction_is_the_slope_of_the_energy() -> None:
     """Castigliano: the reaction at a displaced node is dU / du, by central differences over three paths."""
 
     def solved(by: float) -> bh.State:
-        return reached(CORNERS.fold("crease", to=2.5).fold("crease", to=2.5) if by is None else
-                       CORNERS.step(Fold("crease", to=2.5), Displace("corner:outer-end", "z", by)))[-1]  # fmt: skip
+        return reached(
+            CORNERS.fold("crease", to=2.5).fold("crease", to=2.5)
+            if by is None
+            else CORNERS.step(Fold("crease", to=2.5), Displace("corner:outer-end", "z", by))
+        )[-1]
 
     by, h = 0.8, 1e-3
     slope = (solved(by + h).energy.total - solved(by - h).energy.total) / (2.0 * h)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -218,7 +219,7 @@ def test_shell_has_the_profile_itself() -> None:
     assert along[inside][:-1, 1] == pytest.approx(along[inside][1:, 0], abs=1e-3)
 
 
-def test_a_saved_path_knows_its_pinch(tmp_path) -> None:
+def test_a_saved_path_knows_its_pinch(tmp_path: Path) -> None:
     from bh import Path
 
     path = trace(folded().pinch("crease", to=CLOSED, length=20.0), file=tmp_path / "path.bh")

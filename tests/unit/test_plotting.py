@@ -18,6 +18,7 @@ import bh
 import meshes
 from bh import plotting
 from bh.plotting import offscreen, pictures
+from bh.plotting.camera import camera_of
 from meshes.errors import InputError
 
 
@@ -77,10 +78,17 @@ def test_picture_is_the_same_again_and_leaves_nothing_else(path: bh.Path, tmp_pa
 
 
 @needs_opengl
-@pytest.mark.parametrize("options", [
-    {"colour": "total"}, {"colour": "folding"}, {"colour": None}, {"top": 1e-6}, {"camera": (0.3, 0.9)},
-    {"caption": "of $ sorts"},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"colour": "total"},
+        {"colour": "folding"},
+        {"colour": None},
+        {"top": 1e-6},
+        {"camera": (0.3, 0.9)},
+        {"caption": "of $ sorts"},
+    ],
+)
 def test_options_change_the_picture(path: bh.Path, tmp_path: Path, options: dict[str, Any]) -> None:
     plain = pixels(plotting.picture(path[-1], tmp_path / "a.png", size=(240, 180)))
     other = pixels(plotting.picture(path[-1], tmp_path / "b.png", size=(240, 180), **options))
@@ -155,7 +163,7 @@ def test_window_needs_a_display(path: bh.Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_camera_keeps_z_up_and_sees_the_upper_side(path: bh.Path) -> None:
     for state in (path[0], path[-1]):
-        camera = pictures._camera(state, 4 / 3, None)
+        camera = camera_of(state, 4 / 3, None)
         axes = np.array((camera.across, camera.up, camera.back))
         assert np.allclose(axes @ axes.T, np.eye(3))
         assert camera.across[2] == 0.0

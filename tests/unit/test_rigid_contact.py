@@ -146,9 +146,14 @@ def test_distance_is_that_of_a_rounded_rectangle() -> None:
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [({"width": 0.0}, "width = 0"), ({"radius": 3.0}, "more than half"), ({"gap": -1.0}, "gap = -1"),
-     ({"at": (0.0, 0.0)}, "three numbers"), ({"stiffness": float("nan")}, "stiffness = nan")],
-)  # fmt: skip
+    [
+        ({"width": 0.0}, "width = 0"),
+        ({"radius": 3.0}, "more than half"),
+        ({"gap": -1.0}, "gap = -1"),
+        ({"at": (0.0, 0.0)}, "three numbers"),
+        ({"stiffness": float("nan")}, "stiffness = nan"),
+    ],
+)
 def test_bad_bars(change: dict[str, object], message: str) -> None:
     good = {"name": "bar", "at": (0.0, 0.0, 0.0), "azimuth": 0.0, "width": 4.0, "height": 2.0, "radius": 0.5}
     with pytest.raises(ModelError, match=message):

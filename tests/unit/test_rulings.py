@@ -34,7 +34,7 @@ def cone() -> bh.State:
     return fold(unstructured(meshes.annulus_sector(100.0, 15.0, 1.0), size=5.0), "consistent")[-1]
 
 
-def test_rulings_of_a_cone_pass_its_centre(cone):
+def test_rulings_of_a_cone_pass_its_centre(cone: bh.State) -> None:
     lines = rulings(cone, 5.0)
     assert len(lines) > 20
     ends = np.array(lines)
@@ -47,7 +47,7 @@ def test_rulings_of_a_cone_pass_its_centre(cone):
     assert (np.abs(radius - 100.0).min(axis=1) < 0.2).mean() > 0.8
 
 
-def test_curvature_of_a_rolled_strip():
+def test_curvature_of_a_rolled_strip() -> None:
     """A strip laid on a cylinder: curvature 1 / radius along it, none across."""
     mesh = unstructured(meshes.strip(60.0, 10.0), size=2.5)
     points = mesh.points.copy()
@@ -68,13 +68,13 @@ def test_curvature_of_a_rolled_strip():
 
 
 @pytest.fixture(scope="module")
-def lens(tmp_path_factory) -> meshes.CreasePattern:
+def lens(tmp_path_factory: pytest.TempPathFactory) -> meshes.CreasePattern:
     file = tmp_path_factory.mktemp("lens") / "lens.svg"
     file.write_text(LENS)
     return read_pattern(file)
 
 
-def test_bars_and_hinges_do_not_lock_on_rulings(lens):
+def test_bars_and_hinges_do_not_lock_on_rulings(lens: meshes.CreasePattern) -> None:
     """By gmsh their energy is nearly twice that of the consistent formulation; along its rulings within 20 %."""
     coarse = unstructured(lens, size=4.0)
     judge = fold(coarse, "consistent")
@@ -86,7 +86,7 @@ def test_bars_and_hinges_do_not_lock_on_rulings(lens):
     assert fold(mesh, "bars-and-hinges")[-1].energy.total == pytest.approx(right, rel=0.2)
 
 
-def test_the_mesh_keeps_creases_and_rulings(lens):
+def test_the_mesh_keeps_creases_and_rulings(lens: meshes.CreasePattern) -> None:
     lines = [np.array([(50.0, 72.5), (50.0, 100.0)]), np.array([(50.0, 72.4), (50.0, 27.5)])]
     mesh = ruled(lens, lines, 10.0)
     flat = mesh.edge_sets["edge:flat"]
@@ -97,7 +97,7 @@ def test_the_mesh_keeps_creases_and_rulings(lens):
         assert np.linalg.norm(creases - mesh.points[node, :2], axis=1).min() < 0.5
 
 
-def test_what_cannot_be(lens, cone):
+def test_what_cannot_be(lens: meshes.CreasePattern, cone: bh.State) -> None:
     with pytest.raises(MeshError, match="spacing"):
         ruled(lens, [], 0.0)
     with pytest.raises(MeshError, match="do not make a mesh"):

@@ -15,8 +15,8 @@ import meshes
 from bh.applications import scan
 from meshes import InputError
 from meshes.errors import FileFormatError
-from verification.studies.ch3.scan import DENSITY, NOISE, corners, folded_sector, sampled, scanned
 from verification.studies.ch3.scan import MOTION as OF_THE_CASE
+from verification.studies.ch3.scan_clouds import DENSITY, NOISE, corners, folded_sector, sampled, scanned
 from verification.theory import cone
 
 Array = NDArray[np.float64]
@@ -275,7 +275,10 @@ TRIANGLE = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
         ("picked on the sheet lie on one line", lambda: scan.picked(TRIANGLE, LINE)),
         ("at least 3", lambda: scan.picked(TRIANGLE[:2], TRIANGLE[:2])),
         ("give as many", lambda: scan.picked(TRIANGLE, [*TRIANGLE, (1.0, 1.0, 1.0)])),
-        ("point 1 is not finite", lambda: scan.picked([TRIANGLE[0], (np.nan, 0.0, 0.0), TRIANGLE[2]], TRIANGLE)),
+        (
+            "point 1 is not finite",
+            lambda: scan.picked([TRIANGLE[0], (np.nan, 0.0, 0.0), TRIANGLE[2]], TRIANGLE),
+        ),
         ("holds no points", lambda: scan.distances([], flat())),
         ("not an array of numbers", lambda: scan.distances("cloud.ply", flat())),
         ("at least 6", lambda: scan.register(TRIANGLE, flat())),
@@ -286,6 +289,6 @@ TRIANGLE = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
         ("spacing", lambda: scan.distances(TRIANGLE, flat(), "sheet-to-cloud", spacing=1e-6)),
         ("slide", lambda: scan.register([(x, y, 0.0) for x in (5.0, 9.0, 15.0) for y in (3.0, 6.0)], flat())),
     ],
-)  # fmt: skip
+)
 def test_bad_input(words: str, call: object) -> None:
     one_line(words, call)

@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,37 +28,44 @@ MESH = "[mesh]\nalong = 4\n"
 STEP = '[[steps]]\nfold = { crease = "crease", to = 2.5 }\n'
 
 
-def scene(pattern=SECTOR, sheet=SHEET, mesh=MESH, more="", steps=STEP, folder="."):
+def scene(
+    pattern: Any = SECTOR,
+    sheet: Any = SHEET,
+    mesh: Any = MESH,
+    more: Any = "",
+    steps: Any = STEP,
+    folder: Any = ".",
+) -> Any:
     return parse_scene(pattern + sheet + mesh + more + steps, folder)
 
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
-def test_every_example_is_a_scene(file):
+def test_every_example_is_a_scene(file: Any) -> None:
     loaded = load_scene(file)
     assert loaded.name == file.stem
     assert loaded.source == file
     assert loaded.model.steps
 
 
-def test_there_are_the_examples_of_the_issue():
+def test_there_are_the_examples_of_the_issue() -> None:
     names = {file.stem for file in SCENES}
     assert names >= {"appendix_b_a", "appendix_b_d", "free_annulus", "full_annulus", "miura"}
 
 
 @pytest.mark.parametrize("file", [f for f in SCENES if f.stem != "full_annulus"], ids=lambda file: file.stem)
-def test_examples_reach_their_end(file):
+def test_examples_reach_their_end(file: Any) -> None:
     path = bh.trace(load_scene(file).model)
     assert path.outcome == "reached"
     assert path[-1].energy.total == pytest.approx(energy_in_readme(file), rel=1e-3)
 
 
-def energy_in_readme(file):
+def energy_in_readme(file: Any) -> Any:
     rows = (EXAMPLES / "README.md").read_text(encoding="utf-8").splitlines()
     return next(float(row.split("|")[3]) for row in rows if row.startswith(f"| `{file.name}`"))
 
 
 @pytest.mark.slow
-def test_full_annulus_buckles_out_of_plane():
+def test_full_annulus_buckles_out_of_plane() -> None:
     path = bh.trace(load_scene(EXAMPLES / "full_annulus.toml").model)
     assert path.outcome == "reached"
     # a folded crease that stayed round would stay plane; the saddle leaves that plane by centimetres
@@ -68,7 +76,7 @@ def test_full_annulus_buckles_out_of_plane():
     assert path[-1].energy.total == pytest.approx(energy_in_readme(EXAMPLES / "full_annulus.toml"), rel=1e-3)
 
 
-def test_miura_example_is_drawn_right():
+def test_miura_example_is_drawn_right() -> None:
     data = json.loads((EXAMPLES / "miura.fold").read_text())
     letters = dict(zip(map(tuple, data["edges_vertices"]), data["edges_assignment"], strict=True))
     for vertex in range(len(data["vertices_coords"])):
@@ -82,7 +90,7 @@ def test_miura_example_is_drawn_right():
     assert path[-1].energy.bending < 0.05 * path[-1].energy.folding
 
 
-def test_appendix_b_says_what_the_api_says():
+def test_appendix_b_says_what_the_api_says() -> None:
     from bh.model.serialise import fingerprint
     from meshes import annulus_sector, structured
 
@@ -98,7 +106,7 @@ def test_appendix_b_says_what_the_api_says():
     assert fingerprint(load_scene(EXAMPLES / "appendix_b_a.toml").model) == fingerprint(model)
 
 
-def test_defaults():
+def test_defaults() -> None:
     model = scene().model
     assert model.sheet.nu == 0.0
     assert model.mesh.kind == "staggered"
@@ -108,11 +116,11 @@ def test_defaults():
     assert scene().source is None
 
 
-def test_whole_numbers_are_numbers():
+def test_whole_numbers_are_numbers() -> None:
     assert scene(sheet="[sheet]\nE = 4000\nnu = 0\nt = 1\n").model.sheet == bh.Sheet(E=4000.0, nu=0.0, t=1.0)
 
 
-def test_patterns():
+def test_patterns() -> None:
     strip = scene(
         '[pattern]\nkind = "strip"\nlength = 50\nwidth = 20\ncreases = [5, 12.5]\nfold = ["mountain", "valley"]\n',
         steps='[[steps]]\nfold = { crease = "all", by = 0.2 }\n',
@@ -158,13 +166,13 @@ fold = { crease = "crease", by = 0.8 }
 
 
 @pytest.mark.parametrize("kind", ["staggered", "alternating", "one-way", "mirrored"])
-def test_mesh_kinds_and_density(kind):
+def test_mesh_kinds_and_density(kind: str) -> None:
     mesh = scene(mesh=f'[mesh]\nkind = "{kind}"\naspect_ratio = 3.0\nrows = 2\n').model.mesh
     assert mesh.kind == kind
     assert mesh.aspect_ratio == pytest.approx(3.0, rel=0.05)
 
 
-def test_supports():
+def test_supports() -> None:
     model = scene(
         more="""
         [[supports]]
@@ -187,7 +195,7 @@ def test_supports():
     )
 
 
-def test_steps_act_together_and_one_after_another():
+def test_steps_act_together_and_one_after_another() -> None:
     model = scene(
         more="[creases.crease]\nLstar = 25.0\nrest = 3.0\n",
         steps="""
@@ -218,7 +226,7 @@ def test_steps_act_together_and_one_after_another():
     )
 
 
-def test_angles_an_edge_and_drawn(tmp_path):
+def test_angles_an_edge_and_drawn(tmp_path: Path) -> None:
     listed = scene(steps='[[steps]]\nfold = { crease = "crease", to = [3.0, 2.9, 2.9, 3.0] }\n').model
     assert listed.steps[0].actuations[0] == Fold("crease", to=(3.0, 2.9, 2.9, 3.0))
     sheet = {
@@ -238,13 +246,13 @@ def test_angles_an_edge_and_drawn(tmp_path):
     assert load_steps(drawn.model)[0].prescribed.end.tolist() == pytest.approx([1.25 * math.pi])
 
 
-def test_outputs():
+def test_outputs() -> None:
     assert scene(more="[outputs]\npictures = true\nvtu = false\nfold = true\n").outputs == Outputs(
         True, False, True
     )
 
 
-def test_schema_knows_every_key_of_the_actuations():
+def test_schema_knows_every_key_of_the_actuations() -> None:
     assert list(ACTUATIONS) == list(KINDS)
     for name, table in ACTUATIONS.items():
         assert set(table.model_fields) == {field.name for field in fields(KINDS[name])}
@@ -252,13 +260,13 @@ def test_schema_knows_every_key_of_the_actuations():
     assert set(CreaseTable.model_fields) == {field.name for field in fields(CreaseLaw)}
 
 
-def test_byte_order_mark_and_windows_line_ends(tmp_path):
+def test_byte_order_mark_and_windows_line_ends(tmp_path: Path) -> None:
     text = (SECTOR + SHEET + MESH + STEP).replace("\n", "\r\n")
     (tmp_path / "windows.toml").write_bytes(b"\xef\xbb\xbf" + text.encode())
     assert load_scene(tmp_path / "windows.toml").name == "windows"
 
 
-def test_a_modulus_in_pascal_is_told_its_unit():
+def test_a_modulus_in_pascal_is_told_its_unit() -> None:
     with pytest.raises(
         SceneError, match=r"sheet\.E = 4000000000\.0 cannot be; .* up to 1e9 MPa \(1 GPa is 1000 MPa\)"
     ):

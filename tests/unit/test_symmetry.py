@@ -225,13 +225,19 @@ def unlike(model: bh.Model) -> bh.Model:
         (lambda m: m, "x", "has no image"),
         (unlike, "y", "not its own image; take staggered"),
         (lambda m: m.support("corner:inner-start", "xyz").support("rigid-body"), "y", "supports are not"),
-        (lambda m: m.support("edge:start").support("edge:end").force("corner:outer-end", each=(0, 0, 1)), "y",
-         "step 2: the forces are not"),
-        (lambda m: m.support("edge:start").support("edge:end").fold("crease", to=[2.0] * 7 + [2.1]), "y",
-         "step 2: the creases are not"),
+        (
+            lambda m: m.support("edge:start").support("edge:end").force("corner:outer-end", each=(0, 0, 1)),
+            "y",
+            "step 2: the forces are not",
+        ),
+        (
+            lambda m: m.support("edge:start").support("edge:end").fold("crease", to=[2.0] * 7 + [2.1]),
+            "y",
+            "step 2: the creases are not",
+        ),
         (lambda m: replace(m, formulation="shell"), "y", "take one of: bars-and-hinges, consistent"),
     ],
-)  # fmt: skip
+)
 def test_what_is_not_symmetric_is_named(
     changed: Callable[[bh.Model], bh.Model], plane: str, words: str
 ) -> None:

@@ -61,9 +61,14 @@ def test_depth_does_not_depend_on_rigid_motion() -> None:
 
 @pytest.mark.parametrize(
     ("observable", "of", "value"),
-    [("energy", None, 2.0), ("fold_angle", "crease-2", -0.4), ("bending", None, 1.0),
-     (height, None, 4.0), ("displacement_z", "corner:inner-start", None)],
-)  # fmt: skip
+    [
+        ("energy", None, 2.0),
+        ("fold_angle", "crease-2", -0.4),
+        ("bending", None, 1.0),
+        (height, None, 4.0),
+        ("displacement_z", "corner:inner-start", None),
+    ],
+)
 def test_any_observable_ends_a_step(observable: str, of: str | None, value: float | None) -> None:
     model = corrugation()
     if value is None:
@@ -160,7 +165,10 @@ def test_scene() -> None:
         parse_scene(SCENE.replace("UNTIL", 'observable = "fold_angle", of = "crease-1", value = 0.5')).model
     )
     assert path[-1].fold_angle("crease-1").mean() == pytest.approx(0.5, abs=1e-4)
-    for text, message in (("depth = -1.0", r"until\.depth = -1"), ("value = 1.0", "needs either depth"),
-                          ('observable = "dept", value = 1.0', "not known")):  # fmt: skip
+    for text, message in (
+        ("depth = -1.0", r"until\.depth = -1"),
+        ("value = 1.0", "needs either depth"),
+        ('observable = "dept", value = 1.0', "not known"),
+    ):
         with pytest.raises(bh.SceneError, match=message):
             parse_scene(SCENE.replace("UNTIL", text))

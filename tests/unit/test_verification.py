@@ -19,11 +19,23 @@ from verification.framework.checks import CaseResult, Check, Context, line, plot
 from verification.framework.run import run, write_json
 from verification.studies.solver import campaign
 
-# DESIGN.md, section 2, and the outcome of the path that the value was read from
+# the keys of a stored record
 KEYS = {
-    "case", "quantity", "params", "value", "unit", "reference", "source", "error", "tolerance", "passed", "unknowns",
-    "iterations", "wall_time_s", "outcome",
-}  # fmt: skip
+    "case",
+    "quantity",
+    "params",
+    "value",
+    "unit",
+    "reference",
+    "source",
+    "error",
+    "tolerance",
+    "passed",
+    "unknowns",
+    "iterations",
+    "wall_time_s",
+    "outcome",
+}
 SLOW = {
     "appendix_b",
     "fig3_9",
@@ -44,9 +56,15 @@ SLOW = {
 
 def check(**changes: Any) -> Check:
     given = {
-        "case": "c", "quantity": "q", "params": {"alpha": 2.0}, "value": 1.05, "unit": "mm", "reference": 1.0,
-        "source": "s", "tolerance": 0.1,
-    } | changes  # fmt: skip
+        "case": "c",
+        "quantity": "q",
+        "params": {"alpha": 2.0},
+        "value": 1.05,
+        "unit": "mm",
+        "reference": 1.0,
+        "source": "s",
+        "tolerance": 0.1,
+    } | changes
     return Check(**given)
 
 
@@ -207,7 +225,7 @@ def test_case_in_quick_mode(name: str, tmp_path: Path) -> None:
 
 
 def test_records_of_the_strips(tmp_path: Path) -> None:
-    """The quantities and parameters that the issue names."""
+    """The quantities and parameters that a report of Chapter 3 needs."""
     records = run(["strips"], tmp_path, quick=True)["checks"]
     assert {r["quantity"] for r in records} == {
         "tension",

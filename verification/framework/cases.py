@@ -1,5 +1,7 @@
-"""All named cases. Adding one is adding a file of that name with a function `run`, and a line here: the commands, the
-tests and the page of its chapter in the report find it (docs/extending.md).
+"""All named cases.
+
+Adding one is adding a file of that name with a function `run`, and a line here: the commands, the tests and the page
+of its chapter in the report find it (docs/extending.md).
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ class Study:
 
     @property
     def module(self) -> str:
+        """Full name of the module that has its function `run`."""
         return f"verification.studies.{ROOMS[self.chapter]}.{self.name}"
 
 

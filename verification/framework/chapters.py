@@ -1,5 +1,6 @@
-"""The chapters of the source that the cases belong to, and the pages of the report; a case says where it belongs in
-`verification.framework.cases`.
+"""The chapters of the source that the cases belong to, and the pages of the report.
+
+A case says where it belongs in `verification.framework.cases`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ class Chapter:
 
     @property
     def name(self) -> str:
-        """ "Chapter 3", "Appendix B", "Solver"."""
+        """As in "Chapter 3", "Appendix B", "Solver"."""
         if self.key.isdigit():
             return f"Chapter {self.key}"
         return f"Appendix {self.key}" if len(self.key) == 1 else self.key.capitalize()
@@ -36,21 +37,9 @@ CHAPTERS = (
         "Bars and hinges",
         "Does the bar-and-hinge model reproduce the strips, cones, creases, stiffnesses and fans of the source?",
     ),
-    Chapter(
-        "4",
-        "Corrugations",
-        "How stiff are curved-crease corrugations in bending, in every direction?",
-    ),
-    Chapter(
-        "5",
-        "Pinching",
-        "Which shapes does a pinch give a creased sheet, and what do they resist?",
-    ),
-    Chapter(
-        "6",
-        "Inverse design",
-        "Which crease pattern folds to a wanted shape?",
-    ),
+    Chapter("4", "Corrugations", "How stiff are curved-crease corrugations in bending, in every direction?"),
+    Chapter("5", "Pinching", "Which shapes does a pinch give a creased sheet, and what do they resist?"),
+    Chapter("6", "Inverse design", "Which crease pattern folds to a wanted shape?"),
     Chapter(
         "A",
         "Isometric theory",
@@ -66,7 +55,7 @@ CHAPTERS = (
         "Formulations, solver and hard cases",
         "Do the formulations converge, is the shell to be trusted as a judge, and what can stop the solver?",
     ),
-)  # fmt: skip
+)
 OTHER = Chapter("other", "Further cases", "What else has been checked?")
 
 

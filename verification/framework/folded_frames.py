@@ -10,7 +10,7 @@ from bh.plotting.interactive import frames
 from bh.plotting.pictures import picture
 from bh.solvers.outcome import Outcome
 from meshes.structured import Kind
-from verification.framework.checks import CaseResult, Check, Context, cost_of
+from verification.framework.checks import CaseResult, Context, Cost
 from verification.framework.run import write_json
 
 # rows of cells a side and mesh pattern that suit each
@@ -40,8 +40,20 @@ def by_every_formulation(
     params: dict[str, Any],
     tolerance: float,
 ) -> dict[str, Path]:
-    """A sheet folded in frames by every formulation, `model` of its name, rows a side and mesh pattern, and compared
-    with the shell: the consistent one within a tolerance, bars and hinges without."""
+    """A sheet folded in frames by every formulation, and compared with the shell.
+
+    Args:
+        result: where the energies go.
+        context: of the case.
+        name: of the sheet, for the progress.
+        model: the model by the name of a formulation, rows a side and mesh pattern.
+        fold: the model folded by a share of the whole fold.
+        params: of every check.
+        tolerance: relative, on the total energy of the consistent formulation; bars and hinges are reported only.
+
+    Returns:
+        the paths by formulation.
+    """
     paths: dict[str, Path] = {}
     for formulation, (rows, kind) in MESHES.items():
         context.tell(f"{result.name}: {name}, {formulation}")
@@ -56,15 +68,21 @@ def compare(
     result: CaseResult, params: dict[str, Any], path: Path, shell: Path, tolerance: float | None
 ) -> None:
     """Energies at the end of a path against the shell's; the total is judged where there is a tolerance."""
-    outcome = path.outcome if not path.reached else shell.outcome
+    took = Cost.of(path, outcome=path.outcome if not path.reached else shell.outcome)
     energy, reference = path[-1].energy.as_dict(), shell[-1].energy.as_dict()
     for kind, value in energy.items():
         if value or reference[kind]:
             judged = tolerance if kind == "total" else None
-            result.checks.append(
-                Check(result.name, f"{kind} energy, folded", params, value, "N mm", reference[kind],
-                      "the shell on the same sheet", judged, outcome=outcome, **cost_of(path))
-            )  # fmt: skip
+            result.check(
+                f"{kind} energy, folded",
+                value,
+                unit="N mm",
+                reference=reference[kind],
+                source="the shell on the same sheet",
+                tolerance=judged,
+                params=params,
+                path=took,
+            )
 
 
 def step_ends(path: Path) -> list[Any]:

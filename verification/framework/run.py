@@ -17,8 +17,9 @@ from typing import Any
 
 from meshes.errors import InputError
 from verification.framework.cases import BY_NAME, CASES, LONG_CASES, case
-from verification.framework.checks import RECORD, CaseResult, Context
+from verification.framework.checks import CaseResult, Context
 from verification.framework.environment import environment
+from verification.framework.records import KEYS
 
 OF_A_RUN = ("versions", "date", "machine", "quick")  # kept for every case, as cases may be run one by one
 LATER = ("scenes",)  # lists that records of earlier versions have not
@@ -29,7 +30,7 @@ def run(
     cases: Sequence[str] | None,
     folder: Path,
     quick: bool = False,
-    report: Callable[[str], None] = lambda text: None,
+    report: Callable[[str], None] = lambda _text: None,
     jobs: int = 1,
 ) -> dict[str, Any]:
     """Run the named cases (all if None) and write `folder`/checks.json and the pictures, `jobs` cases at a time.
@@ -91,7 +92,7 @@ def _results(
 
 def _silent(name: str, folder: Path, quick: bool) -> CaseResult:
     """A case in a process of its own; what it tells on the way would mix with what others tell."""
-    return _timed(name, Context(folder, quick, lambda text: None))
+    return _timed(name, Context(folder, quick, lambda _text: None))
 
 
 def _timed(name: str, context: Context) -> CaseResult:
@@ -155,7 +156,7 @@ def _stored(file: Path) -> dict[str, Any]:
     names = [info["name"] for info in cases]
     whole = (
         all(set(info) == {*summary, *OF_A_RUN} for info in cases)
-        and all(set(check) >= RECORD and check["case"] in names for check in checks)
+        and all(set(check) >= set(KEYS) and check["case"] in names for check in checks)
         and len(set(names)) == len(names)
     )
     return {"checks": checks, "cases": cases} if whole else nothing

@@ -26,8 +26,11 @@ SHEAR = {4.0: (3.286, 6.698)}  # end force: tip -u, w (table 1 of the paper)
 RING = Sheet(E=21.0e6, nu=0.0, t=0.03)
 RING_RADII, RING_LOAD = (6.0, 10.0), 0.8 * 4.0  # line force of 0.8 a length on the lip
 RING_TABLE = {  # share of the load: deflection at the inner and the outer end of the lip
-    0.1: (4.277, 5.876), 0.2: (6.725, 9.160), 0.5: (10.468, 13.768), 1.0: (13.891, 17.528),
-}  # fmt: skip
+    0.1: (4.277, 5.876),
+    0.2: (6.725, 9.160),
+    0.5: (10.468, 13.768),
+    1.0: (13.891, 17.528),
+}
 
 
 def grid(place: Callable[[Array, Array], Array], along: int, across: int, turned: bool = False) -> SheetMesh:
@@ -35,6 +38,8 @@ def grid(place: Callable[[Array, Array], Array], along: int, across: int, turned
 
     Args:
         place: maps (k,) parameters u along and v across to (k, 2) points.
+        along: cells in the direction of u.
+        across: cells in the direction of v.
         turned: True where `place` reverses the orientation.
 
     Edge sets: "edge:start" (u = 0), "edge:end" (u = 1), "edge:rail-j"; corners "corner:low-end" and "corner:high-end".
@@ -54,9 +59,11 @@ def grid(place: Callable[[Array, Array], Array], along: int, across: int, turned
     for j in range(across + 1):
         sets[f"edge:rail-{j}"] = np.column_stack((node[j, :-1], node[j, 1:]))
     return SheetMesh(
-        place(u.ravel(), v.ravel()), cells[:, ::-1] if turned else cells, edge_sets=sets,
+        place(u.ravel(), v.ravel()),
+        cells[:, ::-1] if turned else cells,
+        edge_sets=sets,
         corners={"corner:low-end": int(node[0, -1]), "corner:high-end": int(node[-1, -1])},
-    )  # fmt: skip
+    )
 
 
 def rectangle(length: float, width: float, along: int, across: int = 1) -> SheetMesh:
@@ -97,9 +104,9 @@ def rolled_strip(along: int, steps: int = 3) -> tuple[Model, list[EdgeMoments]]:
 
 
 def rolled_strip_exact(moment: float = FULL_MOMENT) -> tuple[float, float, float]:
-    """Energy and tip (x, z) of the strip under an end moment, exactly for energies quadratic in Green's strain and in
-    the second fundamental form.
+    """Energy (N mm) and tip x, z (mm) of the strip under an end moment, exactly.
 
+    That is for energies quadratic in Green's strain and in the second fundamental form.
     With stretch s and rotation a length r the form is s r. Stationary energy: E A e s + E I s r^2 = 0 with
     e = (s^2 - 1) / 2, hence e = -(t^2 / 12) r^2, and s^2 E I r = M. The strip shortens by t^2 r^2 / 12, 2e-4 here: the
     error of any theory that takes the sheet as thin.

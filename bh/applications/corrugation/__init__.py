@@ -23,6 +23,18 @@ from bh.applications.corrugation.sections import bottom_up, section_moments, top
 from bh.applications.corrugation.tangent import Directional, tangent_bending
 
 __all__ = [
-    "DIRECTIONS", "POLYESTER", "BendingTest", "Directional", "Folded", "Rig", "all_directions", "bottom_up", "fold",
-    "laid", "section_moments", "tangent_bending", "three_point", "top_down",
-]  # fmt: skip
+    "DIRECTIONS",
+    "POLYESTER",
+    "BendingTest",
+    "Directional",
+    "Folded",
+    "Rig",
+    "all_directions",
+    "bottom_up",
+    "fold",
+    "laid",
+    "section_moments",
+    "tangent_bending",
+    "three_point",
+    "top_down",
+]

@@ -37,10 +37,14 @@ class Rig:
     """The test stand of the source: two flat supports, a flat bar, polyester on tape.
 
     Attributes:
-        span: between the inner edges of the supports, mm; bar: its width, mm; travel: of the bar, mm.
-        tape: 0 is a sheet that lies free, without friction. Else valley creases over the supports are first pulled down
-            onto them and stay there, held along x and y by this stiffness, N/mm in all (double-sided tape, 4.5.1).
-        gap, stiffness: of the contact (`bh.model.actuations.Indenter`).
+        span: between the inner edges of the supports, mm.
+        bar: its width, mm.
+        travel: of the bar, mm.
+        tape: 0 is a sheet that lies free, without friction. Else valley creases over the supports are first
+            pulled down onto them and stay there, held along x and y by this stiffness, N/mm in all
+            (double-sided tape, 4.5.1).
+        gap: of the contact, mm (`bh.model.actuations.Indenter`).
+        stiffness: of the contact (`bh.model.actuations.Indenter`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
         largest: displacement between two states, mm.
         offset: of the sheet's middle from the bar, along the span, mm.
@@ -57,6 +61,7 @@ class Rig:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         for name in ("span", "bar", "travel", "gap", "stiffness", "largest"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
@@ -73,10 +78,13 @@ class BendingTest:
 
     Attributes:
         azimuth: of the bar from the x axis, rad.
-        displacement: (k,) of the bar from the trigger load on, mm; load: (k,) on it, N.
-        stiffness: slope of the regression over the second stage, N/mm; r2: its coefficient of determination.
-        window: displacements where that begins and ends, mm; peak: first peak of the load, N.
-        outcome: Outcome.REACHED if the bar went all the way; else why not, and the curve ends there.
+        displacement: (k,) of the bar from the trigger load on, mm.
+        load: (k,) on it, N.
+        stiffness: slope of the regression over the second stage, N/mm.
+        r2: its coefficient of determination.
+        window: displacements where that begins and ends, mm.
+        peak: first peak of the load, N.
+        outcome: `Outcome.REACHED` if the bar went all the way; else why not, and the curve ends there.
     """
 
     azimuth: float
@@ -102,7 +110,16 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     The sheet is laid on the supports as a load in the middle would hold it, touching them at three points; supports and
     bar are smooth barriers on all edges of the mesh. The bar's axis has the given azimuth: 0 is bending about x.
 
-    Returns the curve; its outcome says if it goes all the way.
+    Args:
+        folded: the corrugation.
+        azimuth: of the bar from the x axis, rad.
+        rig: supports and bar; None for those of the source.
+
+    Returns:
+        The curve; its outcome says if it goes all the way.
+
+    Raises:
+        ModelError: the corrugation does not reach the supports, falls off them, or cannot be taped down.
     """
     rig = rig or Rig()
     along = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
@@ -176,6 +193,11 @@ def second_stage(
     load before the displacement `reach` (mm) if there is none (peaks below half of that do not count): the bar has
     found its mountains and no crease has flattened yet. The line is fitted to 101 points evenly spaced along the curve,
     as a test stand samples it.
+
+    Args:
+        x: (k,) displacements, mm.
+        y: (k,) loads, N.
+        reach: displacement up to which the largest load is looked for, mm.
     """
     if x[-1] > reach:
         x, y = np.append(x[x < reach], reach), np.append(y[x < reach], np.interp(reach, x, y))
@@ -203,6 +225,16 @@ def settle(folded: Folded, along: Array, across: Array, span: float, offset: flo
 
     Of all positions in which nothing over the supports is below them that of the lowest origin: a linear program for
     the two slopes and the height, repeated after each finite turn.
+
+    Args:
+        folded: the corrugation.
+        along: (3,) unit vector along the bar.
+        across: (3,) unit vector along the span.
+        span: between the supports, mm.
+        offset: of the sheet's middle from the bar, along the span, mm.
+
+    Raises:
+        ModelError: the sheet does not reach the supports, or falls off them.
     """
     points = folded.points - 0.5 * (folded.points.max(axis=0) + folded.points.min(axis=0)) * [1.0, 1.0, 0.0]
     edges = folded.mesh.topology.edges
@@ -224,7 +256,7 @@ def settle(folded: Folded, along: Array, across: Array, span: float, offset: flo
         points[:, 2] -= _over(points, edges, across, 0.5 * span)[:, 2].min()
         if np.linalg.norm(slope) < 1e-9:
             break
-    return points
+    return np.asarray(points)
 
 
 def _about(points: Array, along: Array, across: Array) -> tuple[float, float]:
@@ -258,7 +290,15 @@ def _turn(up: Array) -> Array:
 
 
 def lid(folded: Folded, points: Array, along: Array, across: Array, half: float) -> tuple[float, float]:
-    """Slope of the bar's axis and its height over the origin, as it lies on the sheet, free to turn."""
+    """Slope of the bar's axis and its height over the origin, as it lies on the sheet, free to turn.
+
+    Args:
+        folded: the corrugation.
+        points: (n, 3) nodes as they lie, mm.
+        along: (3,) unit vector along the bar.
+        across: (3,) unit vector along the span.
+        half: half the width of the bar, mm.
+    """
     under = _under(folded, points, across, half)
     w = under @ along
     if not w.min() < 0.0 < w.max():
@@ -286,7 +326,18 @@ def _under(folded: Folded, points: Array, across: Array, half: float) -> Array:
 
 
 def all_directions(folded: Folded, rig: Rig | None = None) -> dict[str, BendingTest]:
-    """The three tests of the source: bending about x, xy and y."""
+    """The three tests of the source: bending about x, xy and y.
+
+    Args:
+        folded: the corrugation.
+        rig: supports and bar; None for those of the source.
+
+    Returns:
+        The tests by direction.
+
+    Raises:
+        ModelError: see `three_point`.
+    """
     return {name: three_point(folded, azimuth, rig) for name, azimuth in DIRECTIONS.items()}
 
 

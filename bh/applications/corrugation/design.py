@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
-from bh.applications.corrugation.folding import LSTAR, POLYESTER, Folded, fold
+from bh.applications.corrugation.folded import Folded
+from bh.applications.corrugation.folding import LSTAR, POLYESTER, fold
 from bh.applications.corrugation.tangent import Directional, tangent_bending
 from bh.errors import InputError, ModelError
 from bh.model.sheet import Sheet
@@ -59,6 +60,7 @@ class Candidate:
 
     @property
     def isotropy(self) -> float:
+        """Least over largest stiffness; 0 where there is none."""
         return 0.0 if self.bending is None else self.bending.isotropy
 
     @property
@@ -74,9 +76,16 @@ class Task:
     """What all candidates have in common.
 
     Attributes:
-        area: of the flat sheet, mm^2 (that of the parabolic patterns of the source by default); depth: mm.
-        panels: numbers of panels to choose from; sheet, Lstar: material and creases; span: of the bending, mm.
-        along, rows, formulation: of the simulation; directions: that stiffness is looked at in.
+        area: of the flat sheet, mm^2 (that of the parabolic patterns of the source by default).
+        depth: of the folded sheet, mm.
+        panels: numbers of panels to choose from.
+        sheet: material and thickness.
+        Lstar: length scale of the creases, mm.
+        span: of the bending, mm.
+        along: cells along the creases.
+        rows: of cells in a panel.
+        formulation: of the simulation.
+        directions: that stiffness is looked at in.
     """
 
     area: float = 2e4 / 3.0
@@ -91,6 +100,7 @@ class Task:
     directions: int = 12
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         for name in ("area", "depth", "span"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
@@ -99,11 +109,20 @@ class Task:
             raise ModelError("a design needs at least one number of panels to choose from")
 
     def folded(self, design: Design) -> Folded:
-        """The design, folded and laid down."""
+        """The design, folded and laid down.
+
+        Raises:
+            ModelError: it cannot be folded so deep.
+        """
         return fold(
-            design.pattern(self.area), self.depth, sheet=self.sheet, Lstar=self.Lstar, along=self.along,
-            rows=self.rows, formulation=self.formulation,
-        )  # fmt: skip
+            design.pattern(self.area),
+            self.depth,
+            sheet=self.sheet,
+            Lstar=self.Lstar,
+            along=self.along,
+            rows=self.rows,
+            formulation=self.formulation,
+        )
 
     def simulate(self, design: Design) -> Candidate:
         """Fold a design and probe it; what cannot be folded or does not reach the supports says so."""
@@ -145,19 +164,25 @@ def pareto(
 
     Begins with a Sobol sample, some of which are replaced by `known` designs.
 
+    Args:
+        task: what all candidates have in common.
+        population: candidates a generation.
+        generations: how many.
+        seed: the same seed gives the same front.
+        known: designs to begin with.
+
     Raises:
         ModelError: pymoo is missing; add the extra "design".
     """
     job = task or Task()
     pymoo = _pymoo()
-    base: Any = pymoo["Problem"]
     found: list[Candidate] = []
 
-    class Problem(base):
+    class Problem(pymoo.Problem):  # type: ignore[misc, name-defined]
         def __init__(self) -> None:
             super().__init__(n_var=4, n_obj=2, xl=np.zeros(4), xu=np.ones(4))
 
-        def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        def _evaluate(self, x: Array, out: dict[str, Array], *_: object, **__: object) -> None:
             here = [job.simulate(_design(row, job)) for row in x]
             found.extend(here)
             out["F"] = np.array([[-c.weakest, -c.isotropy] for c in here])
@@ -167,8 +192,8 @@ def pareto(
     start = qmc.Sobol(4, seed=seed).random(population)
     for k, design in enumerate(known):
         start[k] = _numbers(design, job)
-    method = pymoo["NSGA2"](pop_size=population, sampling=start)
-    pymoo["minimize"](Problem(), method, ("n_gen", generations), seed=seed, verbose=False)
+    method = pymoo.NSGA2(pop_size=population, sampling=start)
+    pymoo.minimize(Problem(), method, ("n_gen", generations), seed=seed, verbose=False)
     return Front(job, tuple(found))
 
 
@@ -178,6 +203,13 @@ def with_ratio(
     """The stiffest design whose k_x / k_y is as wanted, by differential evolution (SciPy).
 
     Minimises (ln of the ratio over the wanted one)^2, less a hundredth of the ln of the weakest stiffness.
+
+    Args:
+        wanted: k_x / k_y.
+        task: what all candidates have in common.
+        iterations: generations of the search.
+        population: candidates for each of the four variables.
+        seed: the same seed gives the same design.
 
     Raises:
         ModelError: a ratio that cannot be, or nothing that folds was found.
@@ -226,10 +258,13 @@ def _numbers(design: Design, task: Task) -> Array:
     if design.panels not in task.panels:
         raise ModelError(f"a known design has {design.panels} panels, which are not among {task.panels}")
     parts = [(getattr(design, name) - low) / (high - low) for name, (low, high) in BOUNDS.items()]
-    return np.clip([*parts, (task.panels.index(design.panels) + 0.5) / len(task.panels)], 0.0, 1.0)
+    return np.asarray(
+        np.clip([*parts, (task.panels.index(design.panels) + 0.5) / len(task.panels)], 0.0, 1.0)
+    )
 
 
-def _pymoo() -> dict[str, Any]:
+def _pymoo() -> SimpleNamespace:
+    """The parts of pymoo that are used, in one name space."""
     try:
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.config import Config
@@ -240,4 +275,4 @@ def _pymoo() -> dict[str, Any]:
             f"the Pareto front needs pymoo ({missing}); add the extra: pip install 'curved-crease-workbench[design]'"
         ) from missing
     Config.warnings["not_compiled"] = False
-    return {"NSGA2": NSGA2, "Problem": Problem, "minimize": minimize}
+    return SimpleNamespace(NSGA2=NSGA2, Problem=Problem, minimize=minimize)

@@ -34,10 +34,12 @@ class Folded:
 
     @property
     def mesh(self) -> SheetMesh:
+        """The flat mesh."""
         return self.path.model.mesh
 
     @property
     def sheet(self) -> Sheet:
+        """Material and thickness."""
         return self.path.model.sheet
 
     @cached_property

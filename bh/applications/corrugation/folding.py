@@ -39,8 +39,13 @@ def fold(
 
     Args:
         pattern: the name of one of the five patterns of the source, a pattern, or a mesh of one.
-        sheet: its material; Lstar: length scale of the creases, mm (Eq. 3.12).
-        along, rows: of the mesh (`meshes.structured`), unless one is given.
+        depth_mm: of the folded corrugation, mm.
+        sheet: material and thickness.
+        Lstar: length scale of the creases, mm (Eq. 3.12).
+        along: cells along the creases (`meshes.structured`), unless a mesh is given.
+        rows: of cells in a panel, unless a mesh is given.
+        formulation: of the model.
+        strategy: of `bh.trace`.
 
     Raises:
         ModelError: it cannot be folded so deep; the message says why.
@@ -60,7 +65,11 @@ def fold(
 
 
 def laid(path: Path) -> Folded:
-    """The last state of the path of a free corrugation, moved rigidly so that it lies as `Folded` says."""
+    """The last state of the path of a free corrugation, moved rigidly so that it lies as `Folded` says.
+
+    Raises:
+        ModelError: supports hold the sheet, so that it cannot be moved.
+    """
     state = path[-1]
     if not path.solved()[0].constraints.rigid_body:
         raise ModelError("only a free sheet can be laid down; fold it with the rigid-body support alone")

@@ -24,7 +24,8 @@ class Sections:
 
     Attributes:
         azimuth: of the axis that bending is about, in the plane of the sections, rad from the x axis.
-        at: (k,) where the planes cut, from the middle, mm; moment: (k,) second moments, mm^4.
+        at: (k,) where the planes cut, from the middle, mm.
+        moment: (k,) second moments, mm^4.
         area: (k,) of the sheet cut by each plane, mm^2.
     """
 
@@ -48,6 +49,7 @@ def rectangles(segments: Array, thickness: float) -> tuple[float, float]:
 
     Args:
         segments: (k, 2, 2) ends (along the section, height) of the middle line of each rectangle, mm.
+        thickness: of the sheet, mm.
     """
     if len(segments) == 0:
         return 0.0, 0.0
@@ -68,8 +70,13 @@ def section_moments(folded: Folded, azimuth: float, count: int = 100) -> Section
     """Second moments of sections by vertical planes that contain the axis, evenly over the span (top-down, 4.4.1).
 
     Args:
-        azimuth: of the axis that bending is about, from x, rad: the planes are parallel to it, the span across.
+        folded: the corrugation.
+        azimuth: of the axis that bending is about, from x, rad: the planes are parallel to it, the span
+            across.
         count: of planes; each in the middle of its part of the span.
+
+    Raises:
+        ModelError: less than two planes.
     """
     import pyvista as pv
 
@@ -96,11 +103,18 @@ def _cut(surface: object, normal: Array, place: float, shift: float) -> Array:
     if cut.n_cells == 0:
         return np.zeros((0, 2, 3))
     cells = np.asarray(cut.lines).reshape(-1, 3)[:, 1:]
-    return np.asarray(cut.points, dtype=float)[cells]
+    return np.asarray(np.asarray(cut.points, dtype=float)[cells])
 
 
 def top_down(folded: Folded, azimuth: float, count: int = 100, part: float = 0.8) -> float:
-    """Mean second moment over the central `part` of the span for bending about an axis, mm^4 (4.4.1)."""
+    """Mean second moment over the central `part` of the span for bending about an axis, mm^4 (4.4.1).
+
+    Args:
+        folded: the corrugation.
+        azimuth: of the axis from x, rad.
+        count: of planes.
+        part: of the span, 0 to 1.
+    """
     return section_moments(folded, azimuth, count).mean(part)
 
 
@@ -109,8 +123,10 @@ class BottomUp:
     """Second moments of unit sections at the bars of the mountain creases (4.4.2).
 
     Attributes:
-        at: (k, 3) middle of each bar, mm; tangent: (k,) azimuth of the crease there, rad.
-        weight: (k,) length of the bar over that of all; moment: (k,) I_L + I_R, mm^4, not weighted.
+        at: (k, 3) middle of each bar, mm.
+        tangent: (k,) azimuth of the crease there, rad.
+        weight: (k,) length of the bar over that of all.
+        moment: (k,) I_L + I_R, mm^4, not weighted.
         skipped: bars without a valley on both sides in their plane.
     """
 
@@ -131,7 +147,7 @@ class BottomUp:
         return float(np.abs(self.weight * self.moment * np.cos(self.tangent)).sum())
 
     def about(self, azimuth: float) -> float:
-        """Second moment for bending about any axis at an angle from x, mm^4 (Eq. 4.20, by symmetry)."""
+        """Second moment for bending about any axis, mm^4 (Eq. 4.20, by symmetry); azimuth from x, rad."""
         return self.x * abs(math.cos(azimuth)) + self.y * abs(math.sin(azimuth))
 
 
@@ -142,7 +158,11 @@ def bottom_up(folded: Folded, restrained: NDArray[np.bool_] | None = None) -> Bo
     meets the next valley crease or edge of the sheet on that side.
 
     Args:
+        folded: the corrugation.
         restrained: (n,) nodes that rest on supports; bars between two of them are left out.
+
+    Raises:
+        ModelError: no bar of a mountain crease has a valley on both sides.
     """
     points, mesh = folded.points, folded.mesh
     valleys = [
@@ -170,9 +190,12 @@ def bottom_up(folded: Folded, restrained: NDArray[np.bool_] | None = None) -> Bo
         raise ModelError("no bar of a mountain crease has a valley on both sides")
     length = np.array([row[2] for row in rows])
     return BottomUp(
-        np.array([row[0] for row in rows]), np.array([row[1] for row in rows]), length / length.sum(),
-        np.array([row[3] for row in rows]), skipped,
-    )  # fmt: skip
+        np.array([row[0] for row in rows]),
+        np.array([row[1] for row in rows]),
+        length / length.sum(),
+        np.array([row[3] for row in rows]),
+        skipped,
+    )
 
 
 def _mountain(fold: str | None, name: str) -> bool:

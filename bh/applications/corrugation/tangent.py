@@ -25,7 +25,8 @@ class Directional:
     """Bending stiffness by direction.
 
     Attributes:
-        azimuth: (k,) of the bar from the x axis, rad; stiffness: (k,) load on the bar over its displacement, N/mm.
+        azimuth: (k,) of the bar from the x axis, rad.
+        stiffness: (k,) load on the bar over its displacement, N/mm.
     """
 
     azimuth: Array
@@ -58,7 +59,12 @@ def tangent_bending(
     that contact on a few points adds.
 
     Args:
-        directions: how many, evenly from 0 to pi, or their azimuths.
+        folded: the corrugation.
+        directions: how many, evenly from 0 to pi, or their azimuths, rad.
+        span: between the lines, mm.
+
+    Raises:
+        ModelError: a span that the corrugation does not reach over, or no directions.
     """
     if isinstance(directions, int):
         azimuths = np.arange(directions) * math.pi / directions

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.applications.inverse.crossing import Crossing, Projected
 from bh.applications.inverse.optimisers import Found, Genetic, Optimiser, Polished, polish
 from bh.applications.inverse.problems import FitCurve, MoveTip
 from bh.applications.inverse.segments import DesignError
+from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule
 from bh.applications.inverse.surrogate import Surrogate, shipped
 
 Array = NDArray[np.float64]
@@ -31,7 +31,14 @@ def fit_curve(
     Cutting a segment in two changes nothing, so the error cannot grow with their number.
 
     Args:
+        curve: (k, 2) points, mm, the first one at the origin.
+        most: segments.
+        optimiser: how the best design is searched; None for a polished genetic algorithm.
+        seed: the same seed gives the same designs.
         problem: other settings than the default ones (samples, heading).
+
+    Returns:
+        For 1 to `most` segments the problem and the best design.
 
     Raises:
         DesignError: no curve, or no segments.
@@ -62,6 +69,7 @@ class _Squares:
 
     def residuals(self, x: Array, on: Bools) -> Array:
         """(N, 2 samples), over the length of the curve."""
+        del on  # nothing is switched here
         apart = self.problem.points(x) - self.problem.goal
         return np.asarray(apart.reshape(len(x), -1) / self.problem.size)
 
@@ -85,10 +93,24 @@ def move_tip(
     most: int,
     optimiser: Optimiser | None = None,
     seed: int = 1,
-    rules: Sequence[Crossing] | None = None,
+    rules: Sequence[SelfIntersectionRule] | None = None,
     surrogate: Surrogate | None = None,
 ) -> list[tuple[MoveTip, Found]]:
-    """Problem B for 1 to `most` segments: creases whose end a pinch moves as far as it can."""
+    """Problem B for 1 to `most` segments: creases whose end a pinch moves as far as it can.
+
+    Args:
+        most: segments.
+        optimiser: how the best design is searched; None for a polished genetic algorithm.
+        seed: the same seed gives the same designs.
+        rules: what is forbidden; None for the source's rule.
+        surrogate: of the segments; None for the shipped one.
+
+    Returns:
+        For 1 to `most` segments the problem and the best design.
+
+    Raises:
+        DesignError: less than one segment.
+    """
     if most < 1:
         raise DesignError(f"{most} segments cannot be; give 1 or more")
     optimiser = optimiser or Polished(Genetic(150, 80))
@@ -120,7 +142,11 @@ def arc_length(points: ArrayLike) -> float:
 
 
 def curvature(curve: ArrayLike) -> tuple[Array, Array]:
-    """(arc length, curvature), mm and 1/mm, of a fine polygon (k, 2): turns at vertices over mean edge lengths."""
+    """(arc length, curvature), mm and 1/mm, of a fine polygon (k, 2): turns at vertices over mean edge lengths.
+
+    Args:
+        curve: (k, 2) vertices, mm.
+    """
     points = np.asarray(curve, dtype=float)
     steps = np.diff(points, axis=0)
     size = np.linalg.norm(steps, axis=1)

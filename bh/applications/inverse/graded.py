@@ -77,7 +77,13 @@ class Graded:
         self._spline = NdBSpline(tuple(knots), table, 3)
 
     def local(self, k0: ArrayLike, length: ArrayLike, intensity: ArrayLike) -> tuple[Array, Array]:
-        """(..., 3) translations and (..., 3, 3) rotations of segments pinched to intensities in [0, 1]."""
+        """(..., 3) translations and (..., 3, 3) rotations of segments pinched to intensities in [0, 1].
+
+        Args:
+            k0: (...) curvatures before folding, 1/mm.
+            length: (...), mm.
+            intensity: (...) in [0, 1].
+        """
         k0, length, a = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (k0, length, intensity)))
         at = np.clip(length, *self.full.domain.length)
         s, a = np.clip(k0 / self.full.sector_bound(at), -1.0, 1.0), np.clip(a, 0.0, 1.0)
@@ -89,7 +95,16 @@ class Graded:
         return found[..., :3], matrix(found[..., 3:])
 
     def forward(self, k0: ArrayLike, length: ArrayLike, intensity: ArrayLike) -> tuple[Array, Array]:
-        """Points and frames of designs (..., n) whose segments are pinched to some intensities."""
+        """Points and frames of designs (..., n) whose segments are pinched to some intensities.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+            intensity: (..., n) in [0, 1].
+
+        Returns:
+            (..., n + 1, 3) points, mm, and (..., n + 1, 3, 3) frames.
+        """
         return chain(*self.local(k0, length, intensity))
 
 
@@ -104,10 +119,12 @@ class ReachGraded:
 
     @property
     def lower(self) -> Array:
+        """(3 n,) least values of the variables."""
         return np.repeat([-1.0, self.graded.full.domain.length[0], 0.0], self.n)
 
     @property
     def upper(self) -> Array:
+        """(3 n,) largest values of the variables."""
         return np.repeat([1.0, self.graded.full.domain.length[1], 1.0], self.n)
 
     def split(self, x: Array) -> tuple[Array, Array, Array]:
@@ -117,14 +134,22 @@ class ReachGraded:
 
     def residuals(self, x: Array, on: NDArray[np.bool_]) -> Array:
         """(N, 3) from the target to the ends, mm."""
+        del on  # nothing is switched here
         found: Array = self.graded.forward(*self.split(x))[0][..., -1, :] - self.target
         return found
 
     def evaluate(self, x: Array, on: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """(N,) distances from the target, mm, and violations, which are zero."""
         return np.linalg.norm(self.residuals(x, on), axis=-1), np.zeros(len(x))
 
     def best(self, starts: int = 4000, polished: int = 8, seed: int = 1) -> tuple[Array, float]:
-        """Variables that come nearest to the target, mm: the nearest of random ones, polished."""
+        """Variables that come nearest to the target, mm: the nearest of random ones, polished.
+
+        Args:
+            starts: random designs.
+            polished: how many of the nearest ones are polished.
+            seed: the same seed gives the same design.
+        """
         rng = np.random.default_rng([seed, self.n])
         x = self.lower + (self.upper - self.lower) * rng.random((starts, 3 * self.n))
         none: NDArray[np.bool_] = np.zeros(0, dtype=bool)

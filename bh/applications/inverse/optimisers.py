@@ -5,9 +5,10 @@ A problem has continuous variables in a box and switches (pinched or not); an op
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from types import SimpleNamespace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,23 +21,35 @@ FORBIDDEN = 1e6  # added to the value of a design that breaks a rule, where an o
 
 
 class Problem(Protocol):
-    """What is minimised: values (N,) and violations (N,) (0: allowed) of candidates x (N, m) in a box and on (N, b)."""
+    """What is minimised: candidates are m continuous variables in a box and b switches."""
 
     @property
-    def lower(self) -> Array: ...
+    def lower(self) -> Array:
+        """(m,) least values of the variables."""
 
     @property
-    def upper(self) -> Array: ...
+    def upper(self) -> Array:
+        """(m,) largest values of the variables."""
 
     @property
-    def switches(self) -> int: ...
+    def switches(self) -> int:
+        """Number of switches, b."""
 
-    def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]: ...
+    def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:
+        """Values (N,) and violations (N,), 0 where allowed, of candidates x (N, m) and on (N, b)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The best candidate of a search: variables, switches, value, whether it is allowed, and candidates evaluated."""
+    """The best candidate of a search.
+
+    Attributes:
+        x: (m,) variables.
+        on: (b,) switches.
+        value: what was minimised.
+        allowed: whether it breaks no rule.
+        evaluations: candidates evaluated.
+    """
 
     x: Array
     on: Bools
@@ -50,6 +63,8 @@ class Found:
 
 
 class Optimiser(Protocol):
+    """A way to search for the best candidate."""
+
     def minimise(
         self,
         problem: Problem,
@@ -57,12 +72,25 @@ class Optimiser(Protocol):
         start: Sequence[tuple[Array, Bools]] = (),
         enough: float = -np.inf,
     ) -> Found:
-        """Search from some candidates (or none), until a value of `enough` is met."""
+        """Search from some candidates (or none), until a value of `enough` is met.
+
+        Args:
+            problem: what is minimised.
+            seed: the same seed gives the same candidate.
+            start: initial guesses, variables (m,) and switches (b,) each.
+            enough: value at which the search ends.
+        """
         ...
 
 
 def best(problem: Problem, x: Array, on: Bools) -> Found:
-    """The best of some candidates."""
+    """The best of some candidates.
+
+    Args:
+        problem: what is minimised.
+        x: (N, m) variables.
+        on: (N, b) switches.
+    """
     value, violation = problem.evaluate(x, on)
     i = int(np.lexsort((value, violation))[0])
     return Found(x[i], on[i], float(value[i]), bool(violation[i] <= 0.0), len(x))
@@ -70,7 +98,13 @@ def best(problem: Problem, x: Array, on: Bools) -> Found:
 
 @dataclass(frozen=True)
 class Genetic:
-    """pymoo's genetic algorithm for mixed variables; the source used MATLAB's `ga` with 100 generations (6.3.3)."""
+    """pymoo's genetic algorithm for mixed variables; the source used MATLAB's `ga` with 100 generations (6.3.3).
+
+    Attributes:
+        population: candidates a generation.
+        generations: at most.
+        patience: generations without progress after which the search ends.
+    """
 
     population: int = 100
     generations: int = 100
@@ -83,22 +117,29 @@ class Genetic:
         start: Sequence[tuple[Array, Bools]] = (),
         enough: float = -np.inf,
     ) -> Found:
+        """See `Optimiser.minimise`.
+
+        Raises:
+            DesignError: pymoo is not installed.
+        """
         ea = _pymoo()
         m, b = len(problem.lower), problem.switches
         names = [f"x{i:03d}" for i in range(m)], [f"on{i:03d}" for i in range(b)]
 
-        def arrays(rows: Any) -> tuple[Array, Bools]:
+        def arrays(rows: Sequence[Mapping[str, float]]) -> tuple[Array, Bools]:
             x = np.array([[row[n] for n in names[0]] for row in rows], dtype=float).reshape(len(rows), m)
             on = np.array([[row[n] for n in names[1]] for row in rows], dtype=bool).reshape(len(rows), b)
             return x, on
 
-        class Wrapped(ea.Problem):  # type: ignore[name-defined]
+        class Wrapped(ea.Problem):  # type: ignore[misc, name-defined]
             def __init__(self) -> None:
                 bounds = zip(problem.lower, problem.upper, strict=True)
                 real = {n: ea.Real(bounds=(lo, hi)) for n, (lo, hi) in zip(names[0], bounds, strict=True)}
                 super().__init__(vars=real | {n: ea.Binary() for n in names[1]}, n_obj=1, n_ieq_constr=1)
 
-            def _evaluate(self, rows: Any, out: dict[str, Any], *_: Any, **__: Any) -> None:
+            def _evaluate(
+                self, rows: Sequence[Mapping[str, float]], out: dict[str, Array], *_: object, **__: object
+            ) -> None:
                 value, violation = problem.evaluate(*arrays(rows))
                 out["F"], out["G"] = value[:, None], violation[:, None]
 
@@ -126,7 +167,12 @@ class Genetic:
 
 @dataclass(frozen=True)
 class Evolution:
-    """SciPy's differential evolution; switches are integer variables, rules a penalty."""
+    """SciPy's differential evolution; switches are integer variables, rules a penalty.
+
+    Attributes:
+        population: candidates for each variable.
+        generations: at most.
+    """
 
     population: int = 15
     generations: int = 200
@@ -138,6 +184,7 @@ class Evolution:
         start: Sequence[tuple[Array, Bools]] = (),
         enough: float = -np.inf,
     ) -> Found:
+        """See `Optimiser.minimise`."""
         from scipy.optimize import differential_evolution
 
         m, b = len(problem.lower), problem.switches
@@ -152,11 +199,18 @@ class Evolution:
 
         bounds = [*zip(problem.lower, problem.upper, strict=True), *([(0.0, 1.0)] * b)]
         found = differential_evolution(
-            cost, bounds, popsize=self.population, maxiter=self.generations, rng=seed, vectorized=True,
-            updating="deferred", polish=False, integrality=[False] * m + [True] * b,
+            cost,
+            bounds,
+            popsize=self.population,
+            maxiter=self.generations,
+            rng=seed,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            integrality=[False] * m + [True] * b,
             x0=np.concatenate([start[0][0], start[0][1].astype(float)]) if start else None,
             callback=lambda intermediate_result: bool(intermediate_result.fun <= enough),
-        )  # fmt: skip
+        )
         top = best(problem, found.x[None, :m], found.x[None, m:] > 0.5)
         return Found(top.x, top.on, top.value, top.allowed, count)
 
@@ -167,6 +221,9 @@ class Polished:
 
     Least squares (trust region) where the problem has `residuals(x, on)`, else L-BFGS-B on the value; differences are
     taken in one batch.
+
+    Attributes:
+        first: the other optimiser.
     """
 
     first: Optimiser = field(default_factory=Genetic)
@@ -178,6 +235,7 @@ class Polished:
         start: Sequence[tuple[Array, Bools]] = (),
         enough: float = -np.inf,
     ) -> Found:
+        """See `Optimiser.minimise`."""
         found = self.first.minimise(problem, seed, start, enough)
         better = polish(problem, found.x, found.on)
         more = found.evaluations + better.evaluations
@@ -186,7 +244,13 @@ class Polished:
 
 
 def polish(problem: Problem, x: Array, on: Bools) -> Found:
-    """The local minimum next to a candidate with the same switches; the candidate itself where rules forbid that."""
+    """The local minimum next to a candidate with the same switches; the candidate itself where rules forbid that.
+
+    Args:
+        problem: what is minimised.
+        x: (m,) variables of the candidate.
+        on: (b,) its switches.
+    """
     from scipy.optimize import least_squares, minimize
 
     lower, upper = problem.lower, problem.upper
@@ -209,9 +273,15 @@ def polish(problem: Problem, x: Array, on: Bools) -> Found:
             return np.asarray(((found[1:] - found[0]) / inward[:, None]).T)
 
         done = least_squares(
-            lambda z: residuals((lower + width * z)[None], on[None])[0], z0, jacobian, bounds=(0.0, 1.0),
-            xtol=1e-10, ftol=1e-10, gtol=1e-10, max_nfev=60,
-        )  # fmt: skip
+            lambda z: residuals((lower + width * z)[None], on[None])[0],
+            z0,
+            jacobian,
+            bounds=(0.0, 1.0),
+            xtol=1e-10,
+            ftol=1e-10,
+            gtol=1e-10,
+            max_nfev=60,
+        )
     else:
 
         def value(z: Array) -> tuple[float, Array]:
@@ -227,10 +297,8 @@ def polish(problem: Problem, x: Array, on: Bools) -> Found:
     return Found(found.x, found.on, found.value, found.allowed, int(done.nfev) + 2)
 
 
-def _pymoo() -> Any:
+def _pymoo() -> SimpleNamespace:
     """The parts of pymoo that are used, in one name space."""
-    from types import SimpleNamespace
-
     try:
         from pymoo.config import Config
         from pymoo.core.mixed import MixedVariableGA

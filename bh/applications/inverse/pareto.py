@@ -19,7 +19,13 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Trade:
-    """A design that no other one beats in both: `missed` (mm, by the surrogate) and `total`, its length (mm)."""
+    """A design that no other one beats in both.
+
+    Attributes:
+        design: crease and pinches.
+        missed: distance from the point by the surrogate, mm.
+        total: length of the crease, mm.
+    """
 
     design: Design
     missed: float
@@ -36,8 +42,11 @@ def pareto(
     """The shortest creases found that end within some distances of a point, the nearest first; dominated ones left out.
 
     Args:
-        allowances: distances, mm, rising; most: segments; starts: library designs that each search begins with, for
-            each number of segments.
+        target: (3,) point, mm.
+        allowances: distances, mm, rising.
+        most: segments.
+        starts: library designs that each search begins with, for each number of segments.
+        books: libraries to take; those of the shipped data set where there is none of a number of segments.
 
     Raises:
         DesignError: the target is no point, or nothing ends within the largest allowance.
@@ -84,10 +93,14 @@ def _shortened(problem: ReachPoint, x: Array, on: Bools, allowed: float) -> Trad
     length = np.concatenate((np.zeros(n), width[n:])) / 100.0
     start = np.clip((x - problem.lower) / width, 0.0, 1.0)
     done = minimize(
-        lambda z: float(length @ z), start, jac=lambda z: length, method="SLSQP",
-        bounds=[(0.0, 1.0)] * (2 * n), options={"maxiter": 80, "ftol": 1e-8},
+        lambda z: (float(length @ z), length),
+        start,
+        jac=True,
+        method="SLSQP",
+        bounds=[(0.0, 1.0)] * (2 * n),
+        options={"maxiter": 80, "ftol": 1e-8},
         constraints={"type": "ineq", "fun": lambda z: gap(z)[0], "jac": lambda z: gap(z)[1]},
-    )  # fmt: skip
+    )
     best = (problem.lower + width * np.clip(done.x, 0.0, 1.0))[None]
     missed, broken = problem.evaluate(best, on[None])
     if broken[0] > 0.0 or missed[0] > allowed * 1.001 + 1e-6:

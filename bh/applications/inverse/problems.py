@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.applications.inverse.crossing import Crossing, Projected, allowed
 from bh.applications.inverse.segments import DesignError, folded
+from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule, allowed
 from bh.applications.inverse.surrogate import Surrogate
 from bh.applications.inverse.transforms import chain, matrix
 from meshes.curves import arc_lengths, interpolated
@@ -22,7 +22,13 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A crease pattern with its actuation: curvature before folding (1/mm), length (mm) and pinch of every segment."""
+    """A crease pattern with its actuation: curvature before folding (1/mm), length (mm) and pinch of every segment.
+
+    Attributes:
+        k0: (n,) curvatures before folding, 1/mm.
+        length: (n,), mm.
+        pinched: (n,).
+    """
 
     k0: Array
     length: Array
@@ -30,6 +36,7 @@ class Design:
 
     @property
     def n(self) -> int:
+        """Number of segments."""
         return len(self.k0)
 
     @property
@@ -56,6 +63,10 @@ class Design:
 
 def resample(curve: ArrayLike, count: int) -> Array:
     """(count, 2) points at equal distances along a curve given by points (k, 2), both ends included.
+
+    Args:
+        curve: (k, 2), mm.
+        count: of the points.
 
     Raises:
         DesignError: fewer than two different points.
@@ -102,6 +113,7 @@ class FitCurve:
 
     @cached_property
     def goal(self) -> Array:
+        """(samples, 2) points of the target at equal distances, mm."""
         return resample(self.target, self.samples)
 
     @cached_property
@@ -111,13 +123,17 @@ class FitCurve:
 
     @property
     def lower(self) -> Array:
+        """(2 n,) least values of the variables."""
         return np.concatenate((np.full(self.n, -2.0 * math.pi), np.zeros(self.n)))
 
     @property
     def upper(self) -> Array:
+        """(2 n,) largest values of the variables."""
         return np.concatenate((np.full(self.n, 2.0 * math.pi), np.full(self.n, 1.2 * self.size)))
 
     def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:
+        """(N,) mean distances over the length of the curve, and violations, which are zero."""
+        del on  # nothing is switched here
         distance = np.linalg.norm(self.points(x) - self.goal, axis=-1).mean(axis=-1) / self.size
         return distance, np.zeros(len(x))
 
@@ -137,6 +153,7 @@ class FitCurve:
         return found
 
     def design(self, x: Array) -> Design:
+        """The design of variables (2 n,)."""
         theta, length = x[: self.n], np.maximum(x[self.n :], 1e-9)
         return Design(theta / length * math.sin(0.5 * self.fold), length, np.zeros(self.n, dtype=bool))
 
@@ -153,7 +170,7 @@ class _Segments:
 
     surrogate: Surrogate
     n: int
-    rules: Sequence[Crossing] = field(default_factory=lambda: (Projected(),))
+    rules: Sequence[SelfIntersectionRule] = field(default_factory=lambda: (Projected(),))
 
     @property
     def lower(self) -> Array:
@@ -190,6 +207,7 @@ class MoveTip(_Segments):
     """Problem B (Eq. 6.21): distance between the ends of the folded and of the pinched crease, negative, mm."""
 
     def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:
+        """(N,) distances between both ends, negative, mm, and (N,) violations of the rules."""
         k0, length = self.split(x)
         pinched = self.surrogate.forward(k0, length, on, check=False)[0][..., -1, :]
         before = self.surrogate.unpinched(k0, length)[0][..., -1, :]
@@ -203,10 +221,16 @@ class ReachPoint(_Segments):
     target: Array = field(default_factory=lambda: np.zeros(3))
 
     def end(self, x: Array, on: Bools) -> Array:
-        """(..., 3) ends of designs, mm."""
+        """(..., 3) ends of designs, mm.
+
+        Args:
+            x: (..., 2 n) variables.
+            on: (..., n) pinches.
+        """
         return self.surrogate.forward(*self.split(x), on, check=False)[0][..., -1, :]
 
     def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:
+        """(N,) distances from the point, mm, and (N,) violations of the rules."""
         return np.linalg.norm(self.end(x, on) - self.target, axis=-1), self.violation(x, on)
 
     def residuals(self, x: Array, on: Bools) -> Array:

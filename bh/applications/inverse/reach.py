@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from bh.applications.inverse.crossing import Crossing, Projected, Swept
 from bh.applications.inverse.optimisers import Found, polish
 from bh.applications.inverse.problems import Design, ReachPoint
 from bh.applications.inverse.segments import DesignError
+from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule, Swept
 from bh.applications.inverse.simulate import Simulated, simulate
 from bh.applications.inverse.surrogate import Surrogate, shipped
 from bh.errors import InputError
@@ -41,7 +41,7 @@ class Library:
     n: int
     size: int = 50_000
     seed: int = 1
-    rules: Sequence[Crossing] = field(default_factory=lambda: (Projected(),))
+    rules: Sequence[SelfIntersectionRule] = field(default_factory=lambda: (Projected(),))
 
     @cached_property
     def designs(self) -> tuple[Array, Bools, Array]:
@@ -56,13 +56,20 @@ class Library:
 
     @cached_property
     def tree(self) -> cKDTree:
+        """Of the ends, to look for near ones."""
         return cKDTree(self.designs[2])
 
     def problem(self, target: Array) -> ReachPoint:
+        """The problem of a target (3,), mm."""
         return ReachPoint(self.surrogate, self.n, self.rules, target)
 
     def nearest(self, target: Array, count: int) -> Iterator[tuple[Array, Bools]]:
-        """Candidates in the order of their distance from a point, as far as they are near enough to be polished."""
+        """Candidates in the order of their distance from a point, as far as they are near enough to be polished.
+
+        Args:
+            target: (3,), mm.
+            count: candidates at most.
+        """
         x, on, _ = self.designs
         near = self.tree.query(target, k=min(count, len(x)), distance_upper_bound=REACH[min(self.n, 3)])[1]
         for i in np.atleast_1d(near):
@@ -72,7 +79,12 @@ class Library:
 
 @cache
 def library(n: int, seed: int = 1) -> Library:
-    """A library of the shipped data set, made once a process."""
+    """A library of the shipped data set, made once a process.
+
+    Args:
+        n: segments.
+        seed: of its random designs.
+    """
     return Library(shipped(), n, seed=seed)
 
 
@@ -81,9 +93,9 @@ class Reached:
     """A design for a target.
 
     Attributes:
-        target, end: the point asked for and where the surrogate ends, mm; `missed` their distance.
-        simulated: the whole strip by bars and hinges, or None where that was not asked for; `missed_simulated` the
-            distance of its end.
+        target: (3,) the point asked for, mm.
+        end: (3,) where the surrogate ends, mm.
+        simulated: the whole strip by bars and hinges, or None where that was not asked for.
         clear: the strips do not touch themselves in space (`Swept`).
         simulations: how many it took.
     """
@@ -97,10 +109,12 @@ class Reached:
 
     @property
     def missed(self) -> float:
+        """Distance of the surrogate's end from the target, mm."""
         return float(np.linalg.norm(self.end - self.target))
 
     @property
     def missed_simulated(self) -> float:
+        """Distance of the simulated strip's end from the target, mm; nan where it was not simulated."""
         return math.nan if self.simulated is None else float(np.linalg.norm(self.simulated.t - self.target))
 
 
@@ -109,9 +123,13 @@ class Reach:
     """How a point is reached: segments are added until it is, as in Fig. 6.14.
 
     Attributes:
-        most: segments; tolerance: of the end, mm; candidates: designs polished for each number of segments.
-        verify: simulate the strip, and aim again up to `rounds` times where that misses by more than `aim` (mm).
-        clear: prefer designs whose strips clear themselves in space; of the others only where no candidate does.
+        most: segments.
+        tolerance: of the end, mm.
+        candidates: designs polished for each number of segments.
+        verify: simulate the strip, and aim again up to `rounds` times where that misses by more than `aim`
+            (mm).
+        clear: prefer designs whose strips clear themselves in space; of the others only where no candidate
+            does.
     """
 
     most: int = 4
@@ -163,6 +181,7 @@ class Reach:
         )
 
     def book(self, n: int) -> Library:
+        """The library of designs of n segments."""
         return next((book for book in self.libraries if book.n == n), None) or library(n, self.seed)
 
     def _candidates(self, book: Library, point: Array) -> Iterator[Found]:

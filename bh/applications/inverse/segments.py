@@ -23,7 +23,8 @@ class Domain:
     """Which segments there are (Eq. 6.21, 6.22).
 
     Attributes:
-        k0: largest curvature before folding, 1/mm; length: shortest and longest, mm.
+        k0: largest curvature before folding, 1/mm.
+        length: shortest and longest, mm.
         sector: largest sector angle |k| l after folding, rad.
         fold: dihedral angle phi_R of the folded crease, rad.
     """
@@ -38,10 +39,16 @@ class Domain:
         return np.asarray(k0, dtype=float) / math.sin(0.5 * self.fold)
 
     def holds(self, k0: ArrayLike, length: ArrayLike, slack: float = 1e-9) -> NDArray[np.bool_]:
-        """Is a segment inside? The source prints the sector's bound without the modulus that it means."""
+        """Whether segments are inside. The source prints the sector's bound without the modulus that it means.
+
+        Args:
+            k0: curvatures before folding, 1/mm.
+            length: mm.
+            slack: relative, on every bound.
+        """
         k0, length = np.asarray(k0, dtype=float), np.asarray(length, dtype=float)
         low, high = self.length
-        return (
+        return np.asarray(
             (np.abs(k0) <= self.k0 * (1.0 + slack))
             & (length >= low * (1.0 - slack))
             & (length <= high * (1.0 + slack))
@@ -57,11 +64,16 @@ class Domain:
 def folded(k0: ArrayLike, length: ArrayLike, fold: float = 0.5 * math.pi) -> tuple[Array, Array]:
     """Shape of segments folded to the dihedral angle `fold` and not pinched: plane arcs (Eq. 6.6 to 6.8).
 
-    Returns:
-        (..., 3) translations and (..., 3) Tait-Bryan angles (0, 0, k l).
-
     With theta = k l, sin(theta) / k = l sinc(theta) and (1 - cos(theta)) / k = l (theta / 2) sinc(theta / 2)^2: one
     expression for all curvatures, zero included.
+
+    Args:
+        k0: (...) curvatures before folding, 1/mm.
+        length: (...), mm.
+        fold: dihedral angle, rad.
+
+    Returns:
+        (..., 3) translations and (..., 3) Tait-Bryan angles (0, 0, k l).
     """
     k0, length = np.broadcast_arrays(np.asarray(k0, dtype=float), np.asarray(length, dtype=float))
     theta = k0 / math.sin(0.5 * fold) * length
@@ -72,7 +84,10 @@ def folded(k0: ArrayLike, length: ArrayLike, fold: float = 0.5 * math.pi) -> tup
 
 
 def folded_transforms(k0: ArrayLike, length: ArrayLike, fold: float = 0.5 * math.pi) -> tuple[Array, Array]:
-    """(t, r) of segments that are not pinched."""
+    """Local translations (..., 3), mm, and rotations (..., 3, 3) of segments that are not pinched.
+
+    The arguments are those of `folded`.
+    """
     t, uvw = folded(k0, length, fold)
     return t, matrix(uvw)
 
@@ -80,7 +95,13 @@ def folded_transforms(k0: ArrayLike, length: ArrayLike, fold: float = 0.5 * math
 def grid(
     domain: Domain | None = None, step_k0: float = 5e-4, step_length: float = 4.0
 ) -> tuple[Array, Array]:
-    """(m,) curvatures and lengths of the source's grid that lie in the domain; 2,487 by default."""
+    """(m,) curvatures and lengths of the source's grid that lie in the domain; 2,487 by default.
+
+    Args:
+        domain: None for the source's.
+        step_k0: between curvatures, 1/mm.
+        step_length: between lengths, mm.
+    """
     domain = domain or Domain()
     steps = round(domain.k0 / step_k0)
     k0 = np.arange(-steps, steps + 1) * step_k0
@@ -97,6 +118,11 @@ def beyond(
     """(m,) curvatures and lengths that continue the grid to the sector's bound, and one step past it.
 
     Interpolation runs over parts of the largest sector angle; without these its edge would be extrapolated.
+
+    Args:
+        domain: None for the source's.
+        step_k0: between curvatures, 1/mm.
+        step_length: between lengths, mm.
     """
     domain = domain or Domain()
     steps = round(domain.k0 / step_k0)

@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +31,18 @@ class Setting:
     """How a strip is made and pinched. The defaults are the source's (6.2.4) where it prints them.
 
     Attributes:
-        E: MPa; t: thickness, mm; Lstar: length scale of the spring crease, mm; width: of either panel, mm.
+        E: MPa.
+        t: thickness, mm.
+        Lstar: length scale of the spring crease, mm.
+        width: of either panel, mm.
         edge: of the mesh along the crease, mm: with one row of cells the aspect ratio is width / edge = 5.
-        fold: rest dihedral angle phi_R, rad; pinch: dihedral angle phi_p in the middle of a pinched segment, rad.
-        zone: length of the pinched zone, mm, over which the angle goes to phi_p and back by a raised cosine. The source
-            prints none.
-        kind, rows, formulation: of the mesh and the model.
+        fold: rest dihedral angle phi_R, rad.
+        pinch: dihedral angle phi_p in the middle of a pinched segment, rad.
+        zone: length of the pinched zone, mm, over which the angle goes to phi_p and back by a raised cosine.
+            The source prints none.
+        kind: of the mesh (`meshes.structured`).
+        rows: of cells in either panel.
+        formulation: of the model.
     """
 
     E: float = 4000.0
@@ -66,7 +72,10 @@ def model(
     """A strip along a crease of segments, to be folded in its first step and pinched in its second.
 
     Args:
-        k0: curvature before folding of every segment, 1/mm; lengths: mm; pinched: f_i of every segment.
+        k0: curvature before folding of every segment, 1/mm.
+        lengths: of every segment, mm.
+        pinched: f_i of every segment.
+        setting: sheet, fold and pinch.
 
     Raises:
         DesignError: lists of different lengths.
@@ -136,7 +145,9 @@ class Simulated:
     """A strip that was folded and pinched.
 
     Attributes:
-        path: all states; t: (3,) end of the crease in the frame at its start, mm; r: (3, 3) its frame there.
+        path: all states.
+        t: (3,) end of the crease in the frame at its start, mm.
+        r: (3, 3) frame of the end in that of the start.
         ends: (2,) dihedral angles of the first and the last edge of the crease, rad.
     """
 
@@ -159,6 +170,12 @@ def simulate(
 ) -> Simulated:
     """Fold and pinch a strip; see `model`.
 
+    Args:
+        k0: curvature before folding of every segment, 1/mm.
+        lengths: of every segment, mm.
+        pinched: f_i of every segment.
+        setting: sheet, fold and pinch.
+
     Raises:
         DesignError: the path ended early.
     """
@@ -168,6 +185,28 @@ def simulate(
     start, end = frames(path[-1])
     t, r = relative(start, end)
     return Simulated(path, t, r, path[-1].dihedral("crease")[[0, -1]])
+
+
+class SegmentValues(TypedDict):
+    """What is measured of a segment.
+
+    Attributes:
+        t: (3,) end of the crease in the frame at its start, mm.
+        uvw: (3,) Tait-Bryan angles of the frame there, rad.
+        end_dihedral: (2,) dihedral angles of the first and the last edge of the crease, rad.
+        energy: elastic, N mm.
+        stable: 1 if the state is stable, else 0.
+        critical_points: on the way.
+        iterations: of the solver.
+    """
+
+    t: Array
+    uvw: Array
+    end_dihedral: Array
+    energy: float
+    stable: float
+    critical_points: int
+    iterations: int
 
 
 @dataclass(frozen=True)
@@ -181,9 +220,15 @@ class SegmentTask:
 
     @property
     def identity(self) -> str:
+        """What the task is, for the identity of a sweep."""
         return f"pinched segment {self.setting.identity}"
 
-    def __call__(self, point: Mapping[str, Any]) -> dict[str, Any]:
+    def __call__(self, point: Mapping[str, float | int | str | bool]) -> SegmentValues:
+        """Simulate a segment and measure its end.
+
+        Raises:
+            DesignError: the path ended early.
+        """
         from dataclasses import replace
 
         k0, length = float(point["k0"]), float(point["length"])

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +36,8 @@ class Surrogate:
     """Segments of one setting, pinched ones by interpolation, others in closed form.
 
     Attributes:
-        domain: where it may be asked; setting: what was simulated.
+        domain: where it may be asked.
+        setting: what was simulated.
     """
 
     def __init__(
@@ -103,6 +104,11 @@ class Surrogate:
     def pinched(self, k0: ArrayLike, length: ArrayLike, check: bool = True) -> tuple[Array, Array]:
         """(..., 3) translations and (..., 3) Tait-Bryan angles of pinched segments.
 
+        Args:
+            k0: (...) curvatures before folding, 1/mm.
+            length: (...), mm.
+            check: refuse segments outside the domain.
+
         Raises:
             DesignError: a segment outside the domain (unless `check` is off: then it is taken at its edge).
         """
@@ -125,7 +131,17 @@ class Surrogate:
     def local(
         self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike, check: bool = True
     ) -> tuple[Array, Array]:
-        """(..., 3) translations and (..., 3, 3) rotations of segments."""
+        """(..., 3) translations and (..., 3, 3) rotations of segments.
+
+        Args:
+            k0: (...) curvatures before folding, 1/mm.
+            length: (...), mm.
+            pinched: (...) truth values.
+            check: refuse pinched segments outside the domain.
+
+        Raises:
+            DesignError: a pinched segment outside the domain (unless `check` is off).
+        """
         k0, length, on = np.broadcast_arrays(
             np.asarray(k0, dtype=float), np.asarray(length, dtype=float), np.asarray(pinched, dtype=bool)
         )
@@ -140,18 +156,29 @@ class Surrogate:
         """Points and frames of designs of n segments: the forward process (Eq. 6.1 to 6.4).
 
         Args:
-            k0, length, pinched: (..., n) of every segment; 1/mm, mm, truth values.
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+            pinched: (..., n) truth values.
+            check: refuse pinched segments outside the domain.
 
         Returns:
             (..., n + 1, 3) points P_0 to P_n, mm, and (..., n + 1, 3, 3) frames.
+
+        Raises:
+            DesignError: a pinched segment outside the domain (unless `check` is off).
         """
         return chain(*self.local(k0, length, pinched, check))
 
     def unpinched(self, k0: ArrayLike, length: ArrayLike) -> tuple[Array, Array]:
-        """Points and frames of designs before they are pinched."""
+        """Points and frames of designs before they are pinched.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+        """
         return chain(*folded_transforms(k0, length, self.setting.fold))
 
-    def about(self) -> Mapping[str, Any]:
+    def about(self) -> Mapping[str, object]:
         """The setting as plain data."""
         return asdict(self.setting)
 

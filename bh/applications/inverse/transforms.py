@@ -51,7 +51,13 @@ def angles(rotation: ArrayLike) -> Array:
 
 
 def frame(crease: ArrayLike, left: ArrayLike, right: ArrayLike) -> Array:
-    """(..., 3, 3) frame of a cross-section from its three nodes (..., 3) (Eq. 6.10 to 6.13)."""
+    """(..., 3, 3) frame of a cross-section from its three nodes (..., 3) (Eq. 6.10 to 6.13).
+
+    Args:
+        crease: (..., 3) node on the crease, mm.
+        left: (..., 3) node on the left edge, mm.
+        right: (..., 3) node on the right edge, mm.
+    """
     p, p_left, p_right = (np.asarray(x, dtype=float) for x in (crease, left, right))
     x = np.cross(p_right - p, p_left - p)
     x /= np.linalg.norm(x, axis=-1, keepdims=True)
@@ -61,7 +67,7 @@ def frame(crease: ArrayLike, left: ArrayLike, right: ArrayLike) -> Array:
 
 
 def relative(start: tuple[ArrayLike, ArrayLike], end: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Array]:
-    """(t, r) from the (point, frame) of a start to that of an end."""
+    """Translation (..., 3) and rotation (..., 3, 3) from the (point, frame) of a start to that of an end."""
     (p0, r0), (p1, r1) = (tuple(np.asarray(x, dtype=float) for x in pair) for pair in (start, end))
     back = np.swapaxes(r0, -1, -2)
     return (back @ (p1 - p0)[..., None])[..., 0], back @ r1
@@ -73,8 +79,10 @@ def chain(
     """Points and frames along a chain of n segments (Eq. 6.1, 6.2, 6.4).
 
     Args:
-        t: (..., n, 3) local translations; r: (..., n, 3, 3) local rotations.
-        origin: (3,) P_0, the origin if not given; start: (3, 3) R_0, the identity if not given.
+        t: (..., n, 3) local translations, mm.
+        r: (..., n, 3, 3) local rotations.
+        origin: (3,) P_0, the origin if not given.
+        start: (3, 3) R_0, the identity if not given.
 
     Returns:
         (..., n + 1, 3) points P_0 to P_n and (..., n + 1, 3, 3) frames R_0 to R_n.

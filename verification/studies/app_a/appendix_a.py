@@ -23,7 +23,7 @@ from bh.analysis.isometric import (
 )
 from bh.solvers.outcome import Outcome
 from verification.framework.alignment import aligned
-from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.theory import cone
 
 Array = NDArray[np.float64]
@@ -59,9 +59,12 @@ def examples(samples: int = 401) -> dict[str, FoldedCrease]:
 def varied(samples: int = 401) -> FoldedCrease:
     """Curvature, dihedral angle and torsion all vary."""
     return of_flat(
-        lambda s: 0.01 + 0.005 * np.sin(s / 20.0), lambda s: 1.57 + 0.2 * np.cos(s / 30.0), 60.0,
-        torsion=lambda s: 0.002 * np.cos(s / 25.0), samples=samples,
-    )  # fmt: skip
+        lambda s: 0.01 + 0.005 * np.sin(s / 20.0),
+        lambda s: 1.57 + 0.2 * np.cos(s / 30.0),
+        60.0,
+        torsion=lambda s: 0.002 * np.cos(s / 25.0),
+        samples=samples,
+    )
 
 
 def run(context: Context) -> CaseResult:
@@ -84,23 +87,43 @@ def run(context: Context) -> CaseResult:
     return result
 
 
-def add(result: CaseResult, quantity: str, value: float, unit: str, reference: float | None, tolerance: float | None,
-        source: str = SOURCE, **params: object) -> None:  # fmt: skip
-    result.checks.append(Check(CASE, quantity, params, float(value), unit, reference, source, tolerance))
-
-
 def _patterns(result: CaseResult, folds: dict[str, FoldedCrease]) -> None:
     """What A.4 observes of the generators, and that both panels reach as far as drawn."""
     one, two, three = folds.values()
     worst = np.abs(one.left.angle + one.right.angle - math.pi).max()
-    add(result, "planar: gamma_L + gamma_R - pi", worst, "rad", 0.0, 1e-6, "source A.4, Fig. A.7 (a)")
+    result.check(
+        "planar: gamma_L + gamma_R - pi",
+        worst,
+        unit="rad",
+        reference=0.0,
+        source="source A.4, Fig. A.7 (a)",
+        tolerance=1e-6,
+    )
     worst = np.abs(two.left.angle - two.right.angle).max()
-    add(result, "uniform fold: gamma_L - gamma_R", worst, "rad", 0.0, 1e-6, "source A.4, Fig. A.7 (b)")
+    result.check(
+        "uniform fold: gamma_L - gamma_R",
+        worst,
+        unit="rad",
+        reference=0.0,
+        source="source A.4, Fig. A.7 (b)",
+        tolerance=1e-6,
+    )
     worst = max(np.abs(panel.angle - 0.5 * math.pi).max() for panel in three.panels)
-    add(result, "planar and uniform: gamma - pi/2", worst, "rad", 0.0, 1e-6, "source A.4, Fig. A.7 (c)")
+    result.check(
+        "planar and uniform: gamma - pi/2",
+        worst,
+        unit="rad",
+        reference=0.0,
+        source="source A.4, Fig. A.7 (c)",
+        tolerance=1e-6,
+    )
     for name, fold in folds.items():
-        add(result, "largest width before a regression curve", fold.largest_width, "", None, None, "source Fig. A.7",
-            fold=name)  # fmt: skip
+        result.check(
+            "largest width before a regression curve",
+            fold.largest_width,
+            source="source Fig. A.7",
+            params={"fold": name},
+        )
 
 
 def first_form_gap(fold: FoldedCrease, v: float) -> float:
@@ -134,18 +157,41 @@ def _isometry(result: CaseResult) -> None:
             geodesic = sign * np.einsum("kc,kc->k", turn, conormal)
             gap = max(gap, float(np.abs(geodesic - fold.geodesic_curvature).max()))
         bends.append(gap / float(np.abs(fold.curvature).max()))
-    add(result, "first fundamental form, folded against flat", lengths[-1], "", 0.0, 1e-6, samples=counts[-1])
-    add(result, "geodesic curvature, folded against flat", bends[-1], "", 0.0, 1e-6, samples=counts[-1])
+    result.check(
+        "first fundamental form, folded against flat",
+        lengths[-1],
+        reference=0.0,
+        tolerance=1e-6,
+        params={"samples": counts[-1]},
+    )
+    result.check(
+        "geodesic curvature, folded against flat",
+        bends[-1],
+        reference=0.0,
+        tolerance=1e-6,
+        params={"samples": counts[-1]},
+    )
     again = varied()
     back = of_crease(again.points, again.dihedral, u=again.u)
-    add(result, "flat pattern from the folded crease", np.abs(back.flat_points - again.flat_points).max(), "mm", 0.0,
-        1e-6)  # fmt: skip
+    result.check(
+        "flat pattern from the folded crease",
+        np.abs(back.flat_points - again.flat_points).max(),
+        unit="mm",
+        reference=0.0,
+        tolerance=1e-6,
+    )
     x = [float(count) for count in counts]
     result.plots.append(
-        plot("appendix-a-isometry", "Development of a crease with everything varying", "samples along the crease",
-             "relative error", [line("lengths", x, lengths), line("geodesic curvature", x, bends)],
-             "First fundamental form 10 mm along the generators, and the geodesic curvature of the crease.", log="xy")
-    )  # fmt: skip
+        plot(
+            "appendix-a-isometry",
+            "Development of a crease with everything varying",
+            "samples along the crease",
+            "relative error",
+            [line("lengths", x, lengths), line("geodesic curvature", x, bends)],
+            "First fundamental form 10 mm along the generators, and the geodesic curvature of the crease.",
+            log="xy",
+        )
+    )
 
 
 def _printed_signs(result: CaseResult) -> None:
@@ -162,8 +208,14 @@ def _printed_signs(result: CaseResult) -> None:
             rate = InterpolatingSpline().derivatives(fold.u, g, fold.u, 1)[1]
             out = np.einsum("kc,kc->k", np.cross(fold.tangent, g), rate) / np.linalg.norm(rate, axis=1)
             worst = max(worst, float(np.abs(out).max()))
-        add(result, "t x g . g' / |g'|, zero on a developable surface", worst, "", 0.0, tolerance,
-            "source A.12, with A.5, A.7 and A.10", signs=name)  # fmt: skip
+        result.check(
+            "t x g . g' / |g'|, zero on a developable surface",
+            worst,
+            reference=0.0,
+            source="source A.12, with A.5, A.7 and A.10",
+            tolerance=tolerance,
+            params={"signs": name},
+        )
 
 
 def _cone(result: CaseResult) -> None:
@@ -177,11 +229,24 @@ def _cone(result: CaseResult) -> None:
             exact = 1.0 / (tangent * r * abs(math.cos(0.5 * phi)) * math.sqrt(1.0 + tangent**2))
             found = panel.curvature(np.full(len(fold.u), v))
             worst = max(worst, float(np.abs(panel.sign * found / exact - 1.0).max()))
-        add(result, "kappa_2 at the edges over that of the cone, less one", worst, "", 0.0, 1e-6, "source Eq. 3.13",
-            dihedral=round(phi, 4))  # fmt: skip
+        result.check(
+            "kappa_2 at the edges over that of the cone, less one",
+            worst,
+            reference=0.0,
+            source="source Eq. 3.13",
+            tolerance=1e-6,
+            params={"dihedral": round(phi, 4)},
+        )
         exact = cone.bending_energy(SHEET.bending_stiffness(), SECTOR, RADIUS - WIDTH, RADIUS + WIDTH, phi)
-        add(result, "bending energy", fold.bending_energy(SHEET, WIDTH), "N mm", exact, 1e-8, "cone, in closed form",
-            dihedral=round(phi, 4))  # fmt: skip
+        result.check(
+            "bending energy",
+            fold.bending_energy(SHEET, WIDTH),
+            unit="N mm",
+            reference=exact,
+            source="cone, in closed form",
+            tolerance=1e-8,
+            params={"dihedral": round(phi, 4)},
+        )
 
 
 def _folding(result: CaseResult, context: Context) -> None:
@@ -193,10 +258,13 @@ def _folding(result: CaseResult, context: Context) -> None:
             shapes.append(_uniform(result, formulation, cells))
             _generators(result, formulation, cells)
         if len(shapes) > 1:
-            result.checks.append(
-                Check(CASE, "uniform fold: change of that distance with the mesh", {"formulation": formulation},
-                      abs(shapes[1] - shapes[0]), "mm", None, "coarse against fine", None)
-            )  # fmt: skip
+            result.check(
+                "uniform fold: change of that distance with the mesh",
+                abs(shapes[1] - shapes[0]),
+                unit="mm",
+                source="coarse against fine",
+                params={"formulation": formulation},
+            )
 
 
 def _model(formulation: str, cells: tuple[int, int], angle: Callable[[Array], Array]) -> Model:
@@ -226,22 +294,40 @@ def _uniform(result: CaseResult, formulation: str, cells: tuple[int, int]) -> fl
             ENERGY,
         ),
     ):
-        result.checks.append(
-            Check(CASE, quantity, params, value, unit, reference, "isometric sheet", tolerance, **cost_of(path),
-                  outcome=path.outcome)
-        )  # fmt: skip
+        result.check(
+            quantity,
+            value,
+            unit=unit,
+            reference=reference,
+            source="isometric sheet",
+            tolerance=tolerance,
+            params=params,
+            path=path,
+        )
     began = time.perf_counter()
     guess = relax(model, known)
     spent = time.perf_counter() - began
-    result.checks.append(
-        Check(CASE, "isometric sheet as first guess: energy of the state found", params, guess.state.energy.total,
-              "N mm", path[-1].energy.total, "folded from flat", 1e-8, path.unknowns, guess.iterations, spent,
-              Outcome.REACHED if guess.converged else Outcome.STALLED)
-    )  # fmt: skip
-    result.checks.append(
-        Check(CASE, "iterations from the isometric sheet over those from flat", params,
-              guess.iterations / path.iterations, "", None, "folded from flat", None)
-    )  # fmt: skip
+    result.check(
+        "isometric sheet as first guess: energy of the state found",
+        guess.state.energy.total,
+        unit="N mm",
+        reference=path[-1].energy.total,
+        source="folded from flat",
+        tolerance=1e-8,
+        params=params,
+        path=Cost(
+            unknowns=path.unknowns,
+            iterations=guess.iterations,
+            wall_time_s=spent,
+            outcome=Outcome.REACHED if guess.converged else Outcome.STALLED,
+        ),
+    )
+    result.check(
+        "iterations from the isometric sheet over those from flat",
+        guess.iterations / path.iterations,
+        source="folded from flat",
+        params=params,
+    )
     return gap
 
 
@@ -264,16 +350,38 @@ def _generators(result: CaseResult, formulation: str, cells: tuple[int, int]) ->
     params = {"formulation": formulation, "along": cells[0], "rows": cells[1]}
     judged = formulation == "consistent"  # slanted hinges of one row exaggerate the twist of a panel
     for quantity, value, unit, tolerance, source in (
-        ("varying fold: kappa over that of Eq. 5.3, less one", float(np.abs(theory - 1.0)[inner].max()), "", 0.01,
-         "5.3"),
-        ("varying fold: generators of the panels, off A.12 as derived", off["as derived"], "degrees",
-         0.5 if judged else None, "A.12"),
-        ("varying fold: generators of the panels, off A.12 as printed", off["as printed"], "degrees", None, "A.12"),
-    ):  # fmt: skip
-        result.checks.append(
-            Check(CASE, quantity, params, value, unit, 0.0, f"source Eq. {source}", tolerance, **cost_of(path),
-                  outcome=path.outcome)
-        )  # fmt: skip
+        (
+            "varying fold: kappa over that of Eq. 5.3, less one",
+            float(np.abs(theory - 1.0)[inner].max()),
+            "",
+            0.01,
+            "5.3",
+        ),
+        (
+            "varying fold: generators of the panels, off A.12 as derived",
+            off["as derived"],
+            "degrees",
+            0.5 if judged else None,
+            "A.12",
+        ),
+        (
+            "varying fold: generators of the panels, off A.12 as printed",
+            off["as printed"],
+            "degrees",
+            None,
+            "A.12",
+        ),
+    ):
+        result.check(
+            quantity,
+            value,
+            unit=unit,
+            reference=0.0,
+            source=f"source Eq. {source}",
+            tolerance=tolerance,
+            params=params,
+            path=path,
+        )
 
 
 def _pictures(result: CaseResult, context: Context, folds: dict[str, FoldedCrease]) -> None:
@@ -306,9 +414,12 @@ def _pictures(result: CaseResult, context: Context, folds: dict[str, FoldedCreas
     file = "appendix_a_fig_a7.png"
     figure.savefig(context.folder / file, dpi=110)
     result.pictures.append(
-        {"file": file, "alt": "Three isometrically folded creases with generators, and their flat patterns",
-         "caption": "Fig. A.7: folded sheets with their generators above, their developments below."}
-    )  # fmt: skip
+        {
+            "file": file,
+            "alt": "Three isometrically folded creases with generators, and their flat patterns",
+            "caption": "Fig. A.7: folded sheets with their generators above, their developments below.",
+        }
+    )
 
 
 def _notes(result: CaseResult) -> None:

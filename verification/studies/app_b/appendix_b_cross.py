@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from fem.state import ShellState
 from meshes.structured import Kind
 from verification.framework.alignment import aligned, hausdorff
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.studies.app_b.shell_folding import ACTUATIONS, ANGLE, Solved, solve
 
 Array = NDArray[np.float64]
@@ -94,8 +95,9 @@ def both(solved: Solved, judge: Solved | None) -> str:
 
 
 def _common(
-    actuation: str, along: int, member: Member, solved: Solved
-) -> tuple[dict[str, Any], dict[str, Any]]:
+    actuation: str, along: int, member: Member, solved: Solved, judge: Solved | None
+) -> tuple[dict[str, Any], Cost]:
+    """Parameters of every check of a member, and what it took; not reached if either sheet is not."""
     params = {
         "actuation": actuation,
         "how": ACTUATIONS[actuation],
@@ -104,35 +106,34 @@ def _common(
         "along": along,
         "rows": member.rows,
     }
-    cost = {
-        "unknowns": solved.unknowns,
-        "iterations": solved.iterations,
-        "wall_time_s": solved.wall_time_s,
-    }
-    return params, cost
+    return params, Cost.of(solved, outcome=both(solved, judge))
 
 
 def _energies(
     result: CaseResult, actuation: str, along: int, member: Member, solved: Solved, judge: Solved | None
 ) -> None:
     """Energies, load and moment, against the shell's where there is one."""
-    params, cost = _common(actuation, along, member, solved)
-    cost["outcome"] = both(solved, judge)
+    params, cost = _common(actuation, along, member, solved, judge)
     source = "the judge" if judge is None else "the shell on the same sheet"
     reference = {} if judge is None else sheet_energies(judge)
     for kind, value in sheet_energies(solved).items():
         tolerance = member.tolerance if kind == "total" and actuation != "c-spring" else None
-        result.checks.append(
-            Check(
-                CASE, f"{kind} energy", params, value, "N mm", reference.get(kind), source, tolerance, **cost
-            )
+        result.check(
+            f"{kind} energy",
+            value,
+            unit="N mm",
+            reference=reference.get(kind),
+            source=source,
+            tolerance=tolerance,
+            params=params,
+            path=cost,
         )
     if math.isnan(solved.load):
         what, unit = "mean moment a length of crease", "N"
     else:
         what, unit = UNITS.get(actuation, FORCE)
     other = None if judge is None else _load(judge)
-    result.checks.append(Check(CASE, what, params, _load(solved), unit, other, source, **cost))
+    result.check(what, _load(solved), unit=unit, reference=other, source=source, params=params, path=cost)
 
 
 def _load(solved: Solved) -> float:
@@ -144,23 +145,31 @@ def compare(
     result: CaseResult, actuation: str, along: int, member: Member, solved: Solved, judge: Solved
 ) -> None:
     """Fold angles and the curve of the crease against the shell's, edge by edge and node by node."""
-    params, cost = _common(actuation, along, member, solved)
-    cost["outcome"] = both(solved, judge)
+    params, cost = _common(actuation, along, member, solved, judge)
     one, two = (s.state.fold_angle("crease") for s in (solved, judge))
     source = "the shell on the same sheet"
-    result.checks += [
-        Check(CASE, "mean fold angle", params, float(one.mean()), "rad", ANGLE, "B.3", 1e-6, **cost),
-        Check(CASE, "range of the fold angle along the crease", params, float(np.ptp(one)), "rad",
-              float(np.ptp(two)), source, **cost),
-        Check(CASE, "root mean square difference of fold angles", params,
-              float(np.sqrt(((one - two) ** 2).mean())), "rad", 0.0, source, **cost),
-    ]  # fmt: skip
+    check = partial(result.check, params=params, path=cost)
+    check("mean fold angle", one.mean(), unit="rad", reference=ANGLE, source="B.3", tolerance=1e-6)
+    check(
+        "range of the fold angle along the crease",
+        np.ptp(one),
+        unit="rad",
+        reference=float(np.ptp(two)),
+        source=source,
+    )
+    check(
+        "root mean square difference of fold angles",
+        np.sqrt(((one - two) ** 2).mean()),
+        unit="rad",
+        reference=0.0,
+        source=source,
+    )
     largest, apart = crease_distance(solved, judge)
     near = 0.1 if member.tolerance is not None and actuation != "c-spring" else None  # mm
-    result.checks += [
-        Check(CASE, "largest distance of crease nodes", params, largest, "mm", 0.0, source, near, **cost),
-        Check(CASE, "Hausdorff distance of the crease", params, apart, "mm", 0.0, source, **cost),
-    ]
+    check(
+        "largest distance of crease nodes", largest, unit="mm", reference=0.0, source=source, tolerance=near
+    )
+    check("Hausdorff distance of the crease", apart, unit="mm", reference=0.0, source=source)
 
 
 def crease_distance(solved: Solved, judge: Solved) -> tuple[float, float]:
@@ -183,7 +192,12 @@ def _plot(result: CaseResult, actuation: str, found: dict[str, Solved]) -> None:
             at = (np.arange(len(angle)) + 0.5) / len(angle)
             series.append(line(name, at.tolist(), angle.tolist(), "reference" if name == "shell" else "line"))
     result.plots.append(
-        plot(f"appendix-b-cross-{actuation}", f"Fold angle along the crease, ({actuation})",
-             "place along the crease", "fold angle, degrees", series,
-             f"{ACTUATIONS[actuation].capitalize()}, mean fold angle 90 degrees; dashed is the shell.")
-    )  # fmt: skip
+        plot(
+            f"appendix-b-cross-{actuation}",
+            f"Fold angle along the crease, ({actuation})",
+            "place along the crease",
+            "fold angle, degrees",
+            series,
+            f"{ACTUATIONS[actuation].capitalize()}, mean fold angle 90 degrees; dashed is the shell.",
+        )
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from bh import State
 from bh.plotting.pictures import picture
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 from verification.studies.app_b.shell_folding import ACTUATIONS, ANGLE, SHEET, Solved, solve
 
 Array = NDArray[np.float64]
@@ -117,36 +118,39 @@ def _checks(
     result: CaseResult, actuation: str, solved: Solved, grid: Grid | None, mesh: dict[str, Any]
 ) -> None:
     params = {"actuation": actuation, "how": ACTUATIONS[actuation], **mesh, "formulation": "shell"}
-    cost: dict[str, Any] = {
-        "unknowns": solved.unknowns,
-        "iterations": solved.iterations,
-        "wall_time_s": solved.wall_time_s,
-        "outcome": solved.outcome,
-    }
+    check = partial(result.check, params=params, path=solved)
     if grid is None:  # not reached: said once, with no figure
-        result.checks.append(
-            Check(CASE, "energy fields", params, math.nan, "N mm", None, "source Fig. B.5", **cost)
-        )
+        check("energy fields", math.nan, unit="N mm", source="source Fig. B.5")
         return
     crease = np.abs(grid.r - CREASE) < NEAR
     edges = (grid.r - INNER < NEAR) | (OUTER - grid.r < NEAR)
     for kind, name in KINDS.items():
         held = float((grid.density[kind] * grid.area).sum())
-        result.checks.append(
-            Check(CASE, f"{name} energy of the field", params, held, "N mm", getattr(solved.state.energy, kind),
-                  "the state's own total; cells are sectors, triangles flat-edged", 2e-3, **cost)
-        )  # fmt: skip
+        check(
+            f"{name} energy of the field",
+            held,
+            unit="N mm",
+            reference=getattr(solved.state.energy, kind),
+            source="the state's own total; cells are sectors, triangles flat-edged",
+            tolerance=2e-3,
+        )
         for rows, where in ((crease, "the crease"), (edges, "the inner and outer edges")):
-            result.checks.append(
-                Check(CASE, f"part of the {name} energy within {NEAR} mm of {where}", params, grid.part(kind, rows),
-                      "1", None, "of the area it is 0.25", **cost)
-            )  # fmt: skip
+            check(
+                f"part of the {name} energy within {NEAR} mm of {where}",
+                grid.part(kind, rows),
+                unit="1",
+                source="of the area it is 0.25",
+            )
     inside = np.abs(grid.r - 95.0) < NEAR
     middle = float((grid.along_r("bending")[inside] / _cone(grid.r[inside])).mean())
-    result.checks.append(
-        Check(CASE, "bending energy over the cone's, middle of the arc, inner panel", params, middle, "1", 1.0,
-              "1/2 D cot^2(phi / 2) / r^2, D with nu", 0.15 if actuation != "c-spring" else None, **cost)
-    )  # fmt: skip
+    check(
+        "bending energy over the cone's, middle of the arc, inner panel",
+        middle,
+        unit="1",
+        reference=1.0,
+        source="1/2 D cot^2(phi / 2) / r^2, D with nu",
+        tolerance=0.15 if actuation != "c-spring" else None,
+    )
 
 
 def _cone(r: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -161,10 +165,16 @@ def _profiles(result: CaseResult, grids: dict[str, Grid]) -> None:
         if kind == "bending":
             series.append(line("cone", any_grid.r.tolist(), _cone(any_grid.r).tolist(), "reference"))
         result.plots.append(
-            plot(f"appendix-b-fields-{kind}-r", f"{name.capitalize()} energy along r", "r, mm",
-                 "energy an area, N mm / mm^2", series,
-                 "Mean over the middle tenth of the arc; the crease is at 100 mm.", log="y")
-        )  # fmt: skip
+            plot(
+                f"appendix-b-fields-{kind}-r",
+                f"{name.capitalize()} energy along r",
+                "r, mm",
+                "energy an area, N mm / mm^2",
+                series,
+                "Mean over the middle tenth of the arc; the crease is at 100 mm.",
+                log="y",
+            )
+        )
     for kind, radius, where in (
         ("bending", INNER, "at the inner edge"),
         ("bending", CREASE + 1e-6, "beside the crease"),
@@ -175,11 +185,15 @@ def _profiles(result: CaseResult, grids: dict[str, Grid]) -> None:
             for a, g in grids.items()
         ]
         result.plots.append(
-            plot(f"appendix-b-fields-{kind}-theta-{radius:.0f}",
-                 f"{KINDS[kind].capitalize()} energy along theta, {where}", "theta over the arc",
-                 "energy an area, N mm / mm^2", series,
-                 f"The row of cells {where}" + (", on its outer side." if radius > CREASE else "."))
-        )  # fmt: skip
+            plot(
+                f"appendix-b-fields-{kind}-theta-{radius:.0f}",
+                f"{KINDS[kind].capitalize()} energy along theta, {where}",
+                "theta over the arc",
+                "energy an area, N mm / mm^2",
+                series,
+                f"The row of cells {where}" + (", on its outer side." if radius > CREASE else "."),
+            )
+        )
 
 
 def _pictures(result: CaseResult, context: Context, states: dict[str, State]) -> None:

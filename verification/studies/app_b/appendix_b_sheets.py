@@ -35,10 +35,14 @@ def run(context: Context) -> CaseResult:
             result, context, f"({actuation})", model, _fold, params, TOLERANCE[context.quick]
         )
         store(
-            result, context, f"{CASE}_{actuation}", paths, f"App. B ({actuation}), {how}",
+            result,
+            context,
+            f"{CASE}_{actuation}",
+            paths,
+            f"App. B ({actuation}), {how}",
             f"App. B ({actuation}), folded by 90 degrees, {how}.",
             f"The creased annulus sector of App. B ({actuation}), folded by 90 degrees",
-        )  # fmt: skip
+        )
     result.notes.append(
         "Drag to turn, scroll to come nearer; all models turn together and share one scale of colours, which ends at "
         "the 99th percentile of the last frame. Bars and hinges take Poisson's ratio as 0, the others as 0.38."

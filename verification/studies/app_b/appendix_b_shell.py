@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 import meshes
 from bh import Model
 from bh.solvers.outcome import Outcome
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.framework.richardson import limit
 from verification.studies.app_b import appendix_b
 from verification.studies.app_b.shell_folding import (
@@ -69,9 +70,16 @@ def run(context: Context) -> CaseResult:
             )
         )
     result.plots.append(
-        plot("appendix-b-shell-convergence", "Total energy over unknowns", "unknowns", "energy, N mm", series,
-             "Energy of the sheet at a mean fold angle of 90 degrees (as Fig. B.3).", log="x")
-    )  # fmt: skip
+        plot(
+            "appendix-b-shell-convergence",
+            "Total energy over unknowns",
+            "unknowns",
+            "energy, N mm",
+            series,
+            "Energy of the sheet at a mean fold angle of 90 degrees (as Fig. B.3).",
+            log="x",
+        )
+    )
     _arcs(result, context)
     _variants(result, context)
     result.notes.append(NOTE)
@@ -93,27 +101,25 @@ def record(
     params["formulation"] = "shell"
     for index, kind in enumerate(KINDS):
         values = [_energies(s)[index] for s in solved]
-        result.checks.append(
-            Check("appendix_b_shell", f"{kind} energy against the table", known(values), limit(values).value, "N mm",
-                  TABLE_B1[actuation[0]][index], appendix_b.SOURCE, **cost)
-        )  # fmt: skip
+        result.check(
+            f"{kind} energy against the table",
+            limit(values).value,
+            unit="N mm",
+            reference=TABLE_B1[actuation[0]][index],
+            source=appendix_b.SOURCE,
+            params=known(values),
+            path=cost,
+        )
     angles = finest.state.fold_angle("crease")
-    result.checks.append(
-        Check("appendix_b_shell", "mean fold angle", params, float(angles.mean()), "rad", ANGLE, "B.3",
-              1e-6, **cost)
-    )  # fmt: skip
+    check = partial(result.check, params=params, path=cost)
+    check("mean fold angle", angles.mean(), unit="rad", reference=ANGLE, source="B.3", tolerance=1e-6)
     moment = float(finest.state.crease_moment("crease").mean())
     if not math.isnan(finest.load):
         what = "couple a length of crease" if actuation == "b" else "force a length of crease"
         unit = "N" if actuation == "b" else "N/mm"
-        result.checks.append(
-            Check("appendix_b_shell", what, params, finest.load, unit, None, "not in the source", **cost)
-        )
+        check(what, finest.load, unit=unit, source="not in the source")
     else:
-        result.checks.append(
-            Check("appendix_b_shell", "mean moment a length of crease", params, moment, "N", None,
-                  "not in the source", **cost)
-        )  # fmt: skip
+        check("mean moment a length of crease", moment, unit="N", source="not in the source")
 
 
 def _arcs(result: CaseResult, context: Context) -> None:
@@ -132,17 +138,25 @@ def _arcs(result: CaseResult, context: Context) -> None:
             ratio = solved.state.energy.total / exact
             ratios.append(ratio if solved.reached else np.nan)
             params = {"arc": arc * math.pi, "nu": nu, "along": along, "formulation": "shell"}
-            result.checks.append(
-                Check("appendix_b_shell", "total energy over the cone's", params, ratio, "1", None,
-                      "source Fig. B.6 (d): about 0.9 for nu = 0.38, closer to 1 for nu = 0",
-                      unknowns=solved.unknowns, iterations=solved.iterations, wall_time_s=solved.wall_time_s,
-                      outcome=solved.outcome)
-            )  # fmt: skip
+            result.check(
+                "total energy over the cone's",
+                ratio,
+                unit="1",
+                source="source Fig. B.6 (d): about 0.9 for nu = 0.38, closer to 1 for nu = 0",
+                params=params,
+                path=solved,
+            )
         series.append(line(f"nu = {nu:g}", [arc * math.pi for arc in ARCS], ratios))
     result.plots.append(
-        plot("appendix-b-shell-arc", "Approach to the cone", "arc of the sector, rad", "energy over the cone's", series,
-             "Energy of the folded sector over 1/2 D theta_a ln(r_o / r_i) cot^2(phi / 2), D with the same nu.")
-    )  # fmt: skip
+        plot(
+            "appendix-b-shell-arc",
+            "Approach to the cone",
+            "arc of the sector, rad",
+            "energy over the cone's",
+            series,
+            "Energy of the folded sector over 1/2 D theta_a ln(r_o / r_i) cot^2(phi / 2), D with the same nu.",
+        )
+    )
 
 
 def _variants(result: CaseResult, context: Context) -> None:
@@ -169,15 +183,19 @@ def _limits(result: CaseResult, params: dict[str, Any], solved: list[Solved]) ->
     known, cost = _converged(solved, params)
     for index, kind in enumerate(KINDS):
         values = [_energies(s)[index] for s in solved]
-        result.checks.append(
-            Check("appendix_b_shell", f"{kind} energy", known(values), limit(values).value, "N mm", None,
-                  "not in the source", **cost)
-        )  # fmt: skip
+        result.check(
+            f"{kind} energy",
+            limit(values).value,
+            unit="N mm",
+            source="not in the source",
+            params=known(values),
+            path=cost,
+        )
 
 
 def _converged(
     solved: list[Solved], params: dict[str, Any]
-) -> tuple[Callable[[list[float]], dict[str, Any]], dict[str, Any]]:
+) -> tuple[Callable[[list[float]], dict[str, Any]], Cost]:
     """Parameters of a check on the limit of values over meshes, and what the finest mesh cost.
 
     A mesh that was not solved spoils the limit: the outcome says so and there is no value.
@@ -191,10 +209,4 @@ def _converged(
         found = limit(values)
         return dict(params, formulation="shell", rate=found.rate, error_bar=found.bar, finest=values[-1])
 
-    cost: dict[str, Any] = {
-        "unknowns": finest.unknowns,
-        "iterations": finest.iterations,
-        "wall_time_s": finest.wall_time_s,
-        "outcome": outcome,
-    }
-    return known, cost
+    return known, Cost.of(finest, outcome=outcome)

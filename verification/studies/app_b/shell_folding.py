@@ -55,6 +55,7 @@ class Solved:
 
     @property
     def reached(self) -> bool:
+        """Whether the fold was reached."""
         return self.outcome == Outcome.REACHED
 
 

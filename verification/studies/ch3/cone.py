@@ -12,7 +12,7 @@ import meshes
 from bh import Model, Path, Sheet, trace
 from meshes.structured import Kind
 from verification.framework import setups
-from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 from verification.theory import cone
 
 RADIUS, WIDTH = 100.0, 10.0  # mm
@@ -88,9 +88,11 @@ def run(context: Context) -> CaseResult:
             )
         )
     setups.draw(
-        result, context, cone_model(math.pi / 2, 8.0, "staggered"),
+        result,
+        context,
+        cone_model(math.pi / 2, 8.0, "staggered"),
         "a sector of 90 degrees at alpha = 8; its crease is kept in its plane",
-    )  # fmt: skip
+    )
     _notes(result)
     return result
 
@@ -104,40 +106,31 @@ def _record(result: CaseResult, path: Path, angle: float, alpha: float, kind: st
         "mesh": kind,
         "formulation": "bars-and-hinges",
     }
-    cost = cost_of(path)
     # judged where the measured behaviour is that of the cone: staggered rows from alpha 4; the free ends store less
     # than the cone, the more so the shorter the sector
     judged = 0.03 if kind == "staggered" and 4.0 <= alpha <= 12.0 else None
-    result.checks.append(
-        Check(
-            "cone",
-            "energy ratio",
-            params,
-            ratio,
-            "U_BH / U_Th",
-            1.0,
-            SOURCE,
-            judged,
-            outcome=path.outcome,
-            **cost,
-        )
+    result.check(
+        "energy ratio",
+        ratio,
+        unit="U_BH / U_Th",
+        reference=1.0,
+        source=SOURCE,
+        tolerance=judged,
+        params=params,
+        path=path,
     )
     radius = circle_radius(state.crease_points("crease"))
     exact = cone.crease_radius(RADIUS, DIHEDRAL)
     judged = 0.01 if kind == "staggered" and alpha >= 4.0 else None
-    result.checks.append(
-        Check(
-            "cone",
-            "crease radius",
-            params,
-            radius,
-            "mm",
-            exact,
-            "r_f sin(phi/2), Fuchs and Tabachnikov 1999",
-            judged,
-            outcome=path.outcome,
-            **cost,
-        )
+    result.check(
+        "crease radius",
+        radius,
+        unit="mm",
+        reference=exact,
+        source="r_f sin(phi/2), Fuchs and Tabachnikov 1999",
+        tolerance=judged,
+        params=params,
+        path=path,
     )
     return ratio if path.reached else float("nan")
 

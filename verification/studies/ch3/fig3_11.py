@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from bh import Automatic, Displace, LoadControl, Model, Path, State, trace
 from bh.analysis.stiffness_probe import Probe
 from verification.framework import setups
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.studies.solver.hard_cases.pinching import PLEATS, Fan
 
 Array = NDArray[np.float64]
@@ -36,6 +37,7 @@ class Curve:
 
     @property
     def ratio(self) -> Array:
+        """K_r / K_a, (states,)."""
         return self.turning / self.axial
 
 
@@ -114,33 +116,44 @@ def _judge(result: CaseResult, found: Curve, params: dict[str, object]) -> None:
     path, ratio = found.path, found.ratio
     fold = found.progress <= 1.0
 
-    def add(
-        quantity: str, value: float, unit: str, reference: float | None, source: str, tolerance: float | None
-    ) -> None:
-        result.checks.append(
-            Check("fig3_11", quantity, params, value, unit, reference, source, tolerance, path.unknowns,
-                  path.iterations, path.wall_time_s + found.probe_s, path.outcome)
-        )  # fmt: skip
-
-    add("K_a > K_r at every increment", float((found.axial > found.turning).all() and (found.axial > 0.0).all()), "",
-        1.0, SOURCE + ": for all increments", 0.0)  # fmt: skip
-    add("largest K_r / K_a", float(ratio.max()), "", None, SOURCE, None)
-    add("K_r / K_a, folded to 90 degrees", float(ratio[fold][-1]), "", None, SOURCE, None)
+    check = partial(
+        result.check, params=params, path=Cost.of(path, wall_time_s=path.wall_time_s + found.probe_s)
+    )
+    check(
+        "K_a > K_r at every increment",
+        (found.axial > found.turning).all() and (found.axial > 0.0).all(),
+        reference=1.0,
+        source=SOURCE + ": for all increments",
+        tolerance=0.0,
+    )
+    check("largest K_r / K_a", ratio.max())
+    check("K_r / K_a, folded to 90 degrees", ratio[fold][-1])
     pinch = ratio[~fold]
-    add("K_r / K_a, first state of the pinch", float(pinch[0]), "", None, SOURCE, None)
-    add("K_r / K_a, last over first state of the pinch, below one", float(pinch[-1] < pinch[0]), "", 1.0,
-        SOURCE + ": decreases as the model is pinched", 0.0)  # fmt: skip
-    add("K_r / K_a, largest rise between two states of the pinch", float(np.diff(pinch).max(initial=0.0)), "", None,
-        SOURCE + ": decreases; where pleats snap it need not", None)  # fmt: skip
-    add("snaps to another branch on the way", float(sum(record.jumped for record in path.records)), "", None,
-        SOURCE + ": sequential folds buckle together", None)  # fmt: skip
-    add("K_r / K_a at the end", float(ratio[-1]), "", LAST, SOURCE + ": about 0.2 %", None)
-    add("K_r / K_a falls below 1 %", float(ratio[-1] < 0.01), "", 1.0, SOURCE, 0.0)
-    add("K_a, folded to 90 degrees", float(found.axial[fold][-1]), "N/mm", None, SOURCE, None)
-    add("K_r, folded to 90 degrees", float(found.turning[fold][-1]), "N/mm", None, SOURCE, None)
-    add("K_r / K_a of a hinge between rigid arcs", hinge_bound(ANGLE), "", None, "tan^2(angle / 4)", None)
-    add("states in both regimes", float(len(path)), "", None, SOURCE + ": 100 increments each", None)
-    add("states that are not stable", float((~found.stable).sum()), "", None, "inertia of the tangent", None)
+    check("K_r / K_a, first state of the pinch", pinch[0])
+    check(
+        "K_r / K_a, last over first state of the pinch, below one",
+        pinch[-1] < pinch[0],
+        reference=1.0,
+        source=SOURCE + ": decreases as the model is pinched",
+        tolerance=0.0,
+    )
+    check(
+        "K_r / K_a, largest rise between two states of the pinch",
+        np.diff(pinch).max(initial=0.0),
+        source=SOURCE + ": decreases; where pleats snap it need not",
+    )
+    check(
+        "snaps to another branch on the way",
+        sum(record.jumped for record in path.records),
+        source=SOURCE + ": sequential folds buckle together",
+    )
+    check("K_r / K_a at the end", ratio[-1], reference=LAST, source=SOURCE + ": about 0.2 %")
+    check("K_r / K_a falls below 1 %", ratio[-1] < 0.01, reference=1.0, tolerance=0.0)
+    check("K_a, folded to 90 degrees", found.axial[fold][-1], unit="N/mm")
+    check("K_r, folded to 90 degrees", found.turning[fold][-1], unit="N/mm")
+    check("K_r / K_a of a hinge between rigid arcs", hinge_bound(ANGLE), source="tan^2(angle / 4)")
+    check("states in both regimes", len(path), source=SOURCE + ": 100 increments each")
+    check("states that are not stable", (~found.stable).sum(), source="inertia of the tangent")
 
 
 def _against_refined(result: CaseResult, curves: dict[str, Curve], along: int, rows: int) -> None:
@@ -154,10 +167,15 @@ def _against_refined(result: CaseResult, curves: dict[str, Curve], along: int, r
         for name, value, reference in (("K_a", found.axial[at], axial), ("K_r", found.turning[at], turning)):
             quantity = f"{name}, folded to 90 degrees, against the refined fan"
             params = {"formulation": formulation, "refined": f"{along} x {rows}"}
-            result.checks.append(
-                Check("fig3_11", quantity, params, float(value), "N/mm", reference, "consistent formulation, refined",
-                      None, found.path.unknowns, found.path.iterations, spent, path.outcome)
-            )  # fmt: skip
+            result.check(
+                quantity,
+                value,
+                unit="N/mm",
+                reference=reference,
+                source="consistent formulation, refined",
+                params=params,
+                path=Cost.of(found.path, wall_time_s=spent, outcome=path.outcome),
+            )
 
 
 def _plots(result: CaseResult, curves: dict[str, Curve]) -> None:
@@ -172,13 +190,27 @@ def _plots(result: CaseResult, curves: dict[str, Curve]) -> None:
     ratios.append(line("source, at the end", end, [LAST, LAST], "reference"))
     progress = "0 to 1 folding, 1 to 2 pinching"
     result.plots.append(
-        plot("fig3-11-stiffness", "Stiffness of the fan", progress, "stiffness, N/mm", both,
-             "Point load on the end of the middle crease, along and across it.", log="y")
-    )  # fmt: skip
+        plot(
+            "fig3-11-stiffness",
+            "Stiffness of the fan",
+            progress,
+            "stiffness, N/mm",
+            both,
+            "Point load on the end of the middle crease, along and across it.",
+            log="y",
+        )
+    )
     result.plots.append(
-        plot("fig3-11-ratio", "Rotational over axial stiffness", progress, "K_r / K_a", ratios,
-             "The lower, the more the fan is a hinge.", log="y")
-    )  # fmt: skip
+        plot(
+            "fig3-11-ratio",
+            "Rotational over axial stiffness",
+            progress,
+            "K_r / K_a",
+            ratios,
+            "The lower, the more the fan is a hinge.",
+            log="y",
+        )
+    )
 
 
 def _notes(result: CaseResult, curves: dict[str, Curve]) -> None:

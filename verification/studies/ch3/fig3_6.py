@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh import Path, Sheet, State, trace
-from bh.solvers.outcome import Outcome
 from meshes.structured import Kind
-from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 from verification.studies.ch3 import cone
 
 Array = NDArray[np.float64]
@@ -44,8 +44,14 @@ class Mesh:
 
     def params(self, angle: float) -> dict[str, object]:
         """Parameters of a record, with the sector angle."""
-        return {"angle_deg": round(math.degrees(angle), 6), "alpha": self.alpha, "rows": self.rows,
-                "mesh": self.kind, "formulation": self.formulation, "t_mm": SHEET.t}  # fmt: skip
+        return {
+            "angle_deg": round(math.degrees(angle), 6),
+            "alpha": self.alpha,
+            "rows": self.rows,
+            "mesh": self.kind,
+            "formulation": self.formulation,
+            "t_mm": SHEET.t,
+        }
 
 
 @dataclass(frozen=True)
@@ -130,17 +136,6 @@ def run(context: Context) -> CaseResult:
     return result
 
 
-def _add(
-    result: CaseResult, quantity: str, params: dict[str, object], value: float, unit: str, reference: float | None,
-    source: str, tolerance: float | None = None, path: Path | None = None,
-) -> None:  # fmt: skip
-    cost = {} if path is None else cost_of(path)
-    outcome = Outcome.REACHED if path is None else path.outcome
-    result.checks.append(
-        Check("fig3_6", quantity, params, value, unit, reference, source, tolerance, outcome=outcome, **cost)
-    )
-
-
 def _energies(result: CaseResult, angle: float, found: Found) -> None:
     """Every mesh against the cone, as the source does, and against the converged sheet."""
     exact = found[FINEST].ratio
@@ -148,12 +143,28 @@ def _energies(result: CaseResult, angle: float, found: Found) -> None:
         params = mesh.params(angle)
         # the source's word on its own meshes: judged at the first aspect ratio beyond the one it names
         said = 0.10 if (mesh.formulation, mesh.kind, mesh.alpha) == (BARS, "alternating", 8.0) else None
-        _add(result, "energy over that of the cones", params, item.ratio, "U / U_Th", 1.0,
-             SOURCE + ": within 10 % above alpha = 7", said, item.path)  # fmt: skip
+        result.check(
+            "energy over that of the cones",
+            item.ratio,
+            unit="U / U_Th",
+            reference=1.0,
+            source=SOURCE + ": within 10 % above alpha = 7",
+            tolerance=said,
+            params=params,
+            path=item.path,
+        )
         if mesh != FINEST:
             judged = 0.01 if mesh.rows > 1 else None
-            _add(result, "energy over that of the cones, converged", params, item.ratio, "U / U_Th", exact,
-                 CONVERGED, judged, item.path)  # fmt: skip
+            result.check(
+                "energy over that of the cones, converged",
+                item.ratio,
+                unit="U / U_Th",
+                reference=exact,
+                source=CONVERGED,
+                tolerance=judged,
+                params=params,
+                path=item.path,
+            )
 
 
 def _claims(result: CaseResult, angle: float, found: Found) -> None:
@@ -163,18 +174,36 @@ def _claims(result: CaseResult, angle: float, found: Found) -> None:
             (m.alpha, item.ratio) for m, item in found.items() if (m.formulation, m.kind) == (BARS, kind)
         ]
         params: dict[str, object] = {
-            "angle_deg": round(math.degrees(angle), 6), "mesh": kind, "formulation": BARS, "t_mm": SHEET.t,
-        }  # fmt: skip
-        _add(result, "the coarsest mesh stores more than the cone", params, float(curve[0][1] > 1.0), "", 1.0,
-             SOURCE, 0.0)  # fmt: skip
+            "angle_deg": round(math.degrees(angle), 6),
+            "mesh": kind,
+            "formulation": BARS,
+            "t_mm": SHEET.t,
+        }
+        check = partial(result.check, params=params)
+        check("the coarsest mesh stores more than the cone", curve[0][1] > 1.0, reference=1.0, tolerance=0.0)
         near = _first(curve, lambda ratio: abs(ratio - 1.0) <= 0.1)
         below = _first(curve, lambda ratio: ratio < 1.0)
-        _add(result, "aspect ratio from which the energy is within 10 % of the cone", params, near, "alpha", None,
-             SOURCE + ": above 7")  # fmt: skip
-        _add(result, "aspect ratio from which the energy is below that of the cone (0: none to 20)", params, below,
-             "alpha", None, SOURCE + ": at sufficiently high ones")  # fmt: skip
-    _add(result, "the converged sheet stores less than the cone", FINEST.params(angle),
-         float(found[FINEST].ratio < 1.0), "", 1.0, SOURCE + ": by end effects", 0.0, found[FINEST].path)  # fmt: skip
+        check(
+            "aspect ratio from which the energy is within 10 % of the cone",
+            near,
+            unit="alpha",
+            source=SOURCE + ": above 7",
+        )
+        check(
+            "aspect ratio from which the energy is below that of the cone (0: none to 20)",
+            below,
+            unit="alpha",
+            source=SOURCE + ": at sufficiently high ones",
+        )
+    result.check(
+        "the converged sheet stores less than the cone",
+        found[FINEST].ratio < 1.0,
+        reference=1.0,
+        source=SOURCE + ": by end effects",
+        tolerance=0.0,
+        params=FINEST.params(angle),
+        path=found[FINEST].path,
+    )
 
 
 def _first(curve: Sequence[tuple[float, float]], holds: Callable[[float], bool]) -> float:
@@ -199,17 +228,39 @@ def _ends(result: CaseResult, sectors: dict[float, Found]) -> None:
                 continue
             params, last = mesh.params(angle), mesh == FINEST
             reference = None if last else lost_length(exact)
-            _add(result, "length of cone that each free end lacks", params, lost_length(item.density), "mm",
-                 reference, CONVERGED, None, item.path)  # fmt: skip
-            _add(result, "reach of a free end", params, reach_of_end(item.density), "mm",
-                 None if last else reach_of_end(exact), CONVERGED, None, item.path)  # fmt: skip
-            _add(result, "energy density in the middle over that of the cone", params,
-                 float(np.median(item.density)), "", 1.0, "Eq. 3.13: uniform along the crease",
-                 0.02 if last else None, item.path)  # fmt: skip
+            check = partial(result.check, params=params, path=item.path)
+            check(
+                "length of cone that each free end lacks",
+                lost_length(item.density),
+                unit="mm",
+                reference=reference,
+                source=CONVERGED,
+            )
+            check(
+                "reach of a free end",
+                reach_of_end(item.density),
+                unit="mm",
+                reference=None if last else reach_of_end(exact),
+                source=CONVERGED,
+            )
+            check(
+                "energy density in the middle over that of the cone",
+                np.median(item.density),
+                reference=1.0,
+                source="Eq. 3.13: uniform along the crease",
+                tolerance=0.02 if last else None,
+            )
         if angle != max(sectors):
-            _add(result, "length of cone that each free end lacks, whatever the sector", FINEST.params(angle),
-                 lost_length(exact), "mm", lost_length(widest), "that of the longest sector", 0.1,
-                 found[FINEST].path)  # fmt: skip
+            result.check(
+                "length of cone that each free end lacks, whatever the sector",
+                lost_length(exact),
+                unit="mm",
+                reference=lost_length(widest),
+                source="that of the longest sector",
+                tolerance=0.1,
+                params=FINEST.params(angle),
+                path=found[FINEST].path,
+            )
 
 
 def _plots(result: CaseResult, angle: float, found: Found) -> None:
@@ -231,9 +282,15 @@ def _plots(result: CaseResult, angle: float, found: Found) -> None:
     series.append(line("cone", span, [1.0, 1.0], "reference"))
     series.append(line("converged", span, [found[FINEST].ratio] * 2, "reference"))
     result.plots.append(
-        plot(f"fig3-6-energy-{degrees}", f"Sector of {degrees} degrees: energy", "aspect ratio alpha", "U / U_Th",
-             series, "Folded to 90 degrees with the crease in its plane, 0.274 mm paper (Fig. 3.6 f).")
-    )  # fmt: skip
+        plot(
+            f"fig3-6-energy-{degrees}",
+            f"Sector of {degrees} degrees: energy",
+            "aspect ratio alpha",
+            "U / U_Th",
+            series,
+            "Folded to 90 degrees with the crease in its plane, 0.274 mm paper (Fig. 3.6 f).",
+        )
+    )
     series = []
     for mesh, item in found.items():
         if item.density is not None and (mesh.rows > 1 or mesh.formulation == BARS):
@@ -242,10 +299,15 @@ def _plots(result: CaseResult, angle: float, found: Found) -> None:
             series.append(line(name, where.tolist(), item.density.tolist()))
     series.append(line("cone", [0.0, cone.RADIUS * angle], [1.0, 1.0], "reference"))
     result.plots.append(
-        plot(f"fig3-6-ends-{degrees}", f"Sector of {degrees} degrees: energy along the crease",
-             "distance along the crease, mm", "energy density over that of the cone", series,
-             f"Energy of the sheet in every {BIN:g} mm of crease. Free ends at both sides.")
-    )  # fmt: skip
+        plot(
+            f"fig3-6-ends-{degrees}",
+            f"Sector of {degrees} degrees: energy along the crease",
+            "distance along the crease, mm",
+            "energy density over that of the cone",
+            series,
+            f"Energy of the sheet in every {BIN:g} mm of crease. Free ends at both sides.",
+        )
+    )
 
 
 def _notes(result: CaseResult, sectors: dict[float, Found]) -> None:

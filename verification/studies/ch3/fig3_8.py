@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,8 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Model, Path, Sheet, trace
-from bh.solvers.outcome import Outcome
 from meshes.pattern import CreasePattern
-from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 from verification.studies.solver.hard_cases.two_creases import rectangle
 
 Array = NDArray[np.float64]
@@ -81,14 +81,42 @@ def studies() -> tuple[Study, ...]:
     """The annulus, and the rectangle with its creases of opposite senses and of one."""
     both = ("crease-1", "crease-2")
     return (
-        Study("annulus", meshes.annulus_sector(100.0, 10.0, math.pi / 4), 0.127, ("crease",),
-              (150, 120, 90, 60, 30, 0), (16, 1), (64, 1), (64, 4), (64, 16)),
-        Study("two creases of opposite senses", rectangle(("mountain", "valley")), 0.274, both,
-              (150, 120, 90, 60, 30), (10, 1), (40, 1), (40, 4), (32, 16)),
+        Study(
+            "annulus",
+            meshes.annulus_sector(100.0, 10.0, math.pi / 4),
+            0.127,
+            ("crease",),
+            (150, 120, 90, 60, 30, 0),
+            (16, 1),
+            (64, 1),
+            (64, 4),
+            (64, 16),
+        ),
+        Study(
+            "two creases of opposite senses",
+            rectangle(("mountain", "valley")),
+            0.274,
+            both,
+            (150, 120, 90, 60, 30),
+            (10, 1),
+            (40, 1),
+            (40, 4),
+            (32, 16),
+        ),
         # the sheet between creases that fight is crumpled by the deep folds: four rows are not yet enough
-        Study("two creases of one sense", rectangle(("mountain", "mountain")), 0.274, both,
-              (150, 120, 90, 60), (10, 1), (40, 1), (40, 4), (32, 16), None),
-    )  # fmt: skip
+        Study(
+            "two creases of one sense",
+            rectangle(("mountain", "mountain")),
+            0.274,
+            both,
+            (150, 120, 90, 60),
+            (10, 1),
+            (40, 1),
+            (40, 4),
+            (32, 16),
+            None,
+        ),
+    )
 
 
 def model(study: Study, Lstar: float, formulation: str, mesh: tuple[int, int]) -> Model:
@@ -151,18 +179,6 @@ def run(context: Context) -> CaseResult:
     return result
 
 
-def _add(
-    result: CaseResult, study: Study, quantity: str, value: float, unit: str, reference: float | None, source: str,
-    tolerance: float | None, path: Path | None = None, **params: Any,
-) -> None:  # fmt: skip
-    cost = {} if path is None else cost_of(path)
-    outcome = Outcome.REACHED if path is None else path.outcome
-    result.checks.append(
-        Check("fig3_8", quantity, {"sheet": study.name, **params}, float(value), unit, reference, source, tolerance,
-              outcome=outcome, **cost)
-    )  # fmt: skip
-
-
 def _records(result: CaseResult, study: Study, found: Found, lengths: tuple[float, ...]) -> None:
     """Every path: its angle at one rest angle, and how far it is from the converged angles at all of them."""
     column = study.rests.index(AT)
@@ -171,22 +187,46 @@ def _records(result: CaseResult, study: Study, found: Found, lengths: tuple[floa
             item, exact = found[formulation, word, Lstar], found[CONSISTENT, "converged", Lstar].angles
             for i, crease in enumerate(study.creases):
                 off = np.abs(item.angles - exact)[i]
-                params: dict[str, Any] = {"crease": crease, "Lstar_mm": Lstar, "along": along, "rows": rows,
-                          "formulation": formulation}  # fmt: skip
+                params: dict[str, Any] = {
+                    "crease": crease,
+                    "Lstar_mm": Lstar,
+                    "along": along,
+                    "rows": rows,
+                    "formulation": formulation,
+                }
                 last = word == "converged"
-                _add(result, study, f"dihedral angle at the rest angle {AT}", item.angles[i, column], "degrees",
-                     None if last else exact[i, column], "consistent formulation, finest mesh", None, item.path,
-                     **params, largest_difference_deg=round(float(off.max()), 3))  # fmt: skip
+                result.check(
+                    f"dihedral angle at the rest angle {AT}",
+                    item.angles[i, column],
+                    unit="degrees",
+                    reference=None if last else exact[i, column],
+                    source="consistent formulation, finest mesh",
+                    params={
+                        "sheet": study.name,
+                        **params,
+                        "largest_difference_deg": round(float(off.max()), 3),
+                    },
+                    path=item.path,
+                )
                 if word == "rows" and study.settled is not None:
                     some = [k for k, rest in enumerate(study.rests) if rest >= study.settled]
-                    _add(result, study, f"difference from the finest mesh, rest angles from {study.settled}",
-                         off[some].max(), "degrees", 0.0, "within what a figure shows", SHOWN, item.path,
-                         **params)  # fmt: skip
+                    result.check(
+                        f"difference from the finest mesh, rest angles from {study.settled}",
+                        off[some].max(),
+                        unit="degrees",
+                        reference=0.0,
+                        source="within what a figure shows",
+                        tolerance=SHOWN,
+                        params={"sheet": study.name, **params},
+                        path=item.path,
+                    )
 
 
 def _deviations(study: Study, found: Found, formulation: str, word: str, lengths: tuple[float, ...]) -> Array:
     """(L*, creases, rests) reached angle less rest angle, degrees."""
-    return np.array([found[formulation, word, Lstar].angles for Lstar in lengths]) - np.array(study.rests)
+    reached: Array = np.array([found[formulation, word, Lstar].angles for Lstar in lengths])
+    off: Array = reached - np.asarray(study.rests, dtype=float)
+    return off
 
 
 def _order(result: CaseResult, study: Study, found: Found, lengths: tuple[float, ...]) -> None:
@@ -195,10 +235,20 @@ def _order(result: CaseResult, study: Study, found: Found, lengths: tuple[float,
         off = _deviations(study, found, formulation, word, lengths)[:, 0]
         judged = 0.0 if word == "converged" else None
         params: dict[str, Any] = {"formulation": formulation, "mesh": word, "crease": study.creases[0]}
-        _add(result, study, "a larger L* leaves it farther from its rest angle, at all of them",
-             float((np.diff(off, axis=0) > 0.0).all()), "", 1.0, SOURCE, judged, **params)  # fmt: skip
-        _add(result, study, "a smaller rest angle leaves it farther, at every L*",
-             float((np.diff(off, axis=1) > 0.0).all()), "", 1.0, SOURCE, judged, **params)  # fmt: skip
+        result.check(
+            "a larger L* leaves it farther from its rest angle, at all of them",
+            (np.diff(off, axis=0) > 0.0).all(),
+            reference=1.0,
+            tolerance=judged,
+            params={"sheet": study.name, **params},
+        )
+        result.check(
+            "a smaller rest angle leaves it farther, at every L*",
+            (np.diff(off, axis=1) > 0.0).all(),
+            reference=1.0,
+            tolerance=judged,
+            params={"sheet": study.name, **params},
+        )
 
 
 def _annulus(result: CaseResult, study: Study, found: Found, lengths: tuple[float, ...]) -> None:
@@ -209,24 +259,47 @@ def _annulus(result: CaseResult, study: Study, found: Found, lengths: tuple[floa
             for L in lengths
             if L >= 1.0
         )
-        _add(result, study, "difference between the coarse and the fine mesh, L* from 1 mm", gap, "degrees", 0.0,
-             SOURCE + " (a, b): no significant influence", SHOWN, formulation=formulation)  # fmt: skip
+        result.check(
+            "difference between the coarse and the fine mesh, L* from 1 mm",
+            gap,
+            unit="degrees",
+            reference=0.0,
+            source=SOURCE + " (a, b): no significant influence",
+            tolerance=SHOWN,
+            params={"sheet": study.name, "formulation": formulation},
+        )
     for formulation, word, _ in study.meshes():
         off = _deviations(study, found, formulation, word, lengths)[:, 0]
         params: dict[str, Any] = {"formulation": formulation, "mesh": word}
         real = [k for k, Lstar in enumerate(lengths) if 25.0 <= Lstar <= 100.0]
         over = [k for k, rest in enumerate(study.rests) if rest > 90]
-        _add(result, study, "largest distance from the rest angle, L* 25 to 100 mm, rest angles over 90",
-             off[np.ix_(real, over)].max(), "degrees", None, SOURCE + " (a, b): close", None, **params)  # fmt: skip
-        _add(result, study, "distance from the rest angle 30 at L* = 1 mm",
-             off[lengths.index(1.0), study.rests.index(30)], "degrees", None,
-             SOURCE + " (a, b): the stiffest takes the prescribed angle", None, **params)  # fmt: skip
-        _add(result, study, "smallest angle reached at the rest angle 0, L* from 1 mm",
-             off[[k for k, Lstar in enumerate(lengths) if Lstar >= 1.0], study.rests.index(0)].min(), "degrees",
-             None, SOURCE + " (a, b): all systems keep a finite distance from 0", None, **params)  # fmt: skip
+        check = partial(result.check, params={"sheet": study.name, **params})
+        check(
+            "largest distance from the rest angle, L* 25 to 100 mm, rest angles over 90",
+            off[np.ix_(real, over)].max(),
+            unit="degrees",
+            source=SOURCE + " (a, b): close",
+        )
+        check(
+            "distance from the rest angle 30 at L* = 1 mm",
+            off[lengths.index(1.0), study.rests.index(30)],
+            unit="degrees",
+            source=SOURCE + " (a, b): the stiffest takes the prescribed angle",
+        )
+        check(
+            "smallest angle reached at the rest angle 0, L* from 1 mm",
+            off[[k for k, Lstar in enumerate(lengths) if Lstar >= 1.0], study.rests.index(0)].min(),
+            unit="degrees",
+            source=SOURCE + " (a, b): all systems keep a finite distance from 0",
+        )
         finite = off[:, study.rests.index(0)]
-        _add(result, study, "every L* keeps a distance from the rest angle 0", float((finite > 0.0).all()), "", 1.0,
-             SOURCE + " (a, b)", 0.0 if word == "converged" else None, **params)  # fmt: skip
+        check(
+            "every L* keeps a distance from the rest angle 0",
+            (finite > 0.0).all(),
+            reference=1.0,
+            source=SOURCE + " (a, b)",
+            tolerance=0.0 if word == "converged" else None,
+        )
 
 
 def _two(result: CaseResult, study: Study, found: Found, lengths: tuple[float, ...]) -> None:
@@ -235,20 +308,32 @@ def _two(result: CaseResult, study: Study, found: Found, lengths: tuple[float, .
         off = np.abs(_deviations(study, found, formulation, word, lengths))
         params: dict[str, Any] = {"formulation": formulation, "mesh": word}
         straighter = bool((off[:, 1] < off[:, 0]).all())
-        _add(result, study, "the straighter crease is the nearer to its rest angle, at every L* and rest angle",
-             float(straighter), "", 1.0, SOURCE + " (d, e)", 0.0 if word == "converged" else None,
-             **params)  # fmt: skip
+        result.check(
+            "the straighter crease is the nearer to its rest angle, at every L* and rest angle",
+            straighter,
+            reference=1.0,
+            source=SOURCE + " (d, e)",
+            tolerance=0.0 if word == "converged" else None,
+            params={"sheet": study.name, **params},
+        )
         for i, name in enumerate(("curved", "straighter")):
             held = [Lstar for k, Lstar in enumerate(lengths) if off[k, i].max() <= NEAR]
-            _add(result, study, f"largest L* at which the {name} crease keeps within {NEAR:g} degrees",
-                 max(held, default=0.0), "mm", None,
-                 SOURCE + (" (d-f): only L* = 0.01" if i == 0 else " (d, e): regardless of L*"), None,
-                 **params)  # fmt: skip
+            result.check(
+                f"largest L* at which the {name} crease keeps within {NEAR:g} degrees",
+                max(held, default=0.0),
+                unit="mm",
+                source=SOURCE + (" (d-f): only L* = 0.01" if i == 0 else " (d, e): regardless of L*"),
+                params={"sheet": study.name, **params},
+            )
             for Lstar in (10.0, 25.0):
                 if Lstar in lengths:
-                    _add(result, study, f"largest distance of the {name} crease from its rest angles",
-                         off[lengths.index(Lstar), i].max(), "degrees", None, SOURCE + " (d, e)", None, **params,
-                         Lstar_mm=Lstar)  # fmt: skip
+                    result.check(
+                        f"largest distance of the {name} crease from its rest angles",
+                        off[lengths.index(Lstar), i].max(),
+                        unit="degrees",
+                        source=SOURCE + " (d, e)",
+                        params={"sheet": study.name, **params, "Lstar_mm": Lstar},
+                    )
 
 
 def _plots(result: CaseResult, study: Study, found: Found, lengths: tuple[float, ...]) -> None:
@@ -266,10 +351,15 @@ def _plots(result: CaseResult, study: Study, found: Found, lengths: tuple[float,
             )
             ident = f"fig3-8-{study.name}-{crease}-{formulation}-{word}".replace(" ", "-")
             result.plots.append(
-                plot(ident, f"{study.name.capitalize()}, {name}: {formulation}, {word}",
-                     "rest angle, degrees", "mean dihedral angle, degrees", series,
-                     "Angle that the crease reaches while its rest angle falls (Fig. 3.8).")
-            )  # fmt: skip
+                plot(
+                    ident,
+                    f"{study.name.capitalize()}, {name}: {formulation}, {word}",
+                    "rest angle, degrees",
+                    "mean dihedral angle, degrees",
+                    series,
+                    "Angle that the crease reaches while its rest angle falls (Fig. 3.8).",
+                )
+            )
 
 
 def _notes(result: CaseResult) -> None:

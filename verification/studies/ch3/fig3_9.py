@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 import meshes
 from bh import Model, Path, Sheet, trace
 from bh.analysis.stiffness_probe import Probe, Stiffness, sphere
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.theory.strips import arc_azimuth
 
 Array = NDArray[np.float64]
@@ -35,6 +36,11 @@ class Tip:
     path: Path
     angle: float  # mean dihedral angle, rad
     wall_time_s: float
+
+    @property
+    def cost(self) -> Cost:
+        """That of the path, in the time of the probes too."""
+        return Cost.of(self.path, wall_time_s=self.wall_time_s)
 
     @property
     def azimuth(self) -> float:
@@ -118,25 +124,32 @@ def run(context: Context) -> CaseResult:
     return result
 
 
-def _add(
-    result: CaseResult, found: Tip, quantity: str, value: float, unit: str, reference: float | None, source: str,
-    tolerance: float | None, params: dict[str, object],
-) -> None:  # fmt: skip
-    path = found.path
-    result.checks.append(
-        Check("fig3_9", quantity, params, value, unit, reference, source, tolerance, path.unknowns, path.iterations,
-              found.wall_time_s, path.outcome)
-    )  # fmt: skip
-
-
 def _claims(result: CaseResult, found: Tip, params: dict[str, object]) -> None:
-    _add(result, found, "stiffest direction, out of the plane of the crease", found.elevation, "deg", 0.0,
-         SOURCE + ": phi = 90 degrees", 1.0, params)  # fmt: skip
-    _add(result, found, "stiffest direction, azimuth", found.azimuth, "deg", STIFFEST,
-         SOURCE + ": about 80 and 260 degrees, sector angle not printed", 0.125, params)  # fmt: skip
+    check = partial(result.check, params=params, path=found.cost)
+    check(
+        "stiffest direction, out of the plane of the crease",
+        found.elevation,
+        unit="deg",
+        reference=0.0,
+        source=SOURCE + ": phi = 90 degrees",
+        tolerance=1.0,
+    )
+    check(
+        "stiffest direction, azimuth",
+        found.azimuth,
+        unit="deg",
+        reference=STIFFEST,
+        source=SOURCE + ": about 80 and 260 degrees, sector angle not printed",
+        tolerance=0.125,
+    )
     K = found.stiffness.matrix
-    _add(result, found, "asymmetry of the 3 x 3 stiffness", float(np.abs(K - K.T).max() / np.abs(K).max()), "", 0.0,
-         "reciprocity (Maxwell, Betti)", 1e-9, params)  # fmt: skip
+    check(
+        "asymmetry of the 3 x 3 stiffness",
+        np.abs(K - K.T).max() / np.abs(K).max(),
+        reference=0.0,
+        source="reciprocity (Maxwell, Betti)",
+        tolerance=1e-9,
+    )
 
 
 def _against(result: CaseResult, found: Tip, best: Tip, params: dict[str, object]) -> None:
@@ -146,8 +159,16 @@ def _against(result: CaseResult, found: Tip, best: Tip, params: dict[str, object
     ):
         # the stiffest one hangs on the stretching under the load, whose point is singular
         judged = params["formulation"] == "consistent" and int(str(params["rows"])) > 1 and name != "stiffest"
-        _add(result, found, f"{name} principal stiffness", float(value), "N/mm", float(exact),
-             "consistent formulation, finest mesh of this case", 0.05 if judged else None, params)  # fmt: skip
+        result.check(
+            f"{name} principal stiffness",
+            value,
+            unit="N/mm",
+            reference=float(exact),
+            source="consistent formulation, finest mesh of this case",
+            tolerance=0.05 if judged else None,
+            params=params,
+            path=found.cost,
+        )
 
 
 def _trends(
@@ -161,19 +182,48 @@ def _trends(
             flat = series[0].stiffness
             ring = flat.loaded(sphere(np.linspace(0.0, math.pi, 181), math.pi / 2))
             up = [float(each.stiffness.loaded([0.0, 0.0, 1.0])) for each in series]
-            _add(result, series[0], "flat: least stiffness in the plane over that across it", float(ring.min() / up[0]),
-                 "", None, SOURCE + ": high for any loading in the plane", None, params)  # fmt: skip
-            _add(result, series[0], "flat: at least 1000 times stiffer in the plane in any direction",
-                 float(ring.min() > 1e3 * up[0]), "", 1.0, SOURCE, 0.0, params)  # fmt: skip
+            result.check(
+                "flat: least stiffness in the plane over that across it",
+                ring.min() / up[0],
+                source=SOURCE + ": high for any loading in the plane",
+                params=params,
+                path=series[0].cost,
+            )
+            result.check(
+                "flat: at least 1000 times stiffer in the plane in any direction",
+                ring.min() > 1e3 * up[0],
+                reference=1.0,
+                tolerance=0.0,
+                params=params,
+                path=series[0].cost,
+            )
             for each, value in zip(series[1:], up[1:], strict=True):
                 where = {**params, "dihedral_deg": round(math.degrees(each.angle))}
-                _add(result, each, "stiffness across the plane, folded over flat", value / up[0], "", None,
-                     SOURCE + ": folding makes it stiffer out of plane", None, where)  # fmt: skip
-            _add(result, series[-1], "folded is stiffer out of plane than flat", float(min(up[1:]) > up[0]), "", 1.0,
-                 SOURCE, 0.0, params)  # fmt: skip
+                result.check(
+                    "stiffness across the plane, folded over flat",
+                    value / up[0],
+                    source=SOURCE + ": folding makes it stiffer out of plane",
+                    params=where,
+                    path=each.cost,
+                )
+            result.check(
+                "folded is stiffer out of plane than flat",
+                min(up[1:]) > up[0],
+                reference=1.0,
+                tolerance=0.0,
+                params=params,
+                path=series[-1].cost,
+            )
             shapes = np.array([each.eccentricity for each in series])
-            _add(result, series[-1], "ellipses of equal stiffness grow rounder at every fold angle",
-                 float((np.diff(shapes) < 0.0).all()), "", 1.0, SOURCE + ": less eccentric", 0.0, params)  # fmt: skip
+            result.check(
+                "ellipses of equal stiffness grow rounder at every fold angle",
+                (np.diff(shapes) < 0.0).all(),
+                reference=1.0,
+                source=SOURCE + ": less eccentric",
+                tolerance=0.0,
+                params=params,
+                path=series[-1].cost,
+            )
 
 
 def _sectors(result: CaseResult, context: Context) -> None:
@@ -187,17 +237,31 @@ def _sectors(result: CaseResult, context: Context) -> None:
         )
         exact = math.degrees(arc_azimuth(angle))
         found.append(one.azimuth)
-        _add(result, one, "flat: azimuth of the stiffest direction", one.azimuth, "deg", exact,
-             "inextensible curved cantilever, see verification.theory.strips.arc_azimuth", 0.03,
-             {"formulation": "consistent", "sector_deg": sector})  # fmt: skip
+        result.check(
+            "flat: azimuth of the stiffest direction",
+            one.azimuth,
+            unit="deg",
+            reference=exact,
+            source="inextensible curved cantilever, see verification.theory.strips.arc_azimuth",
+            tolerance=0.03,
+            params={"formulation": "consistent", "sector_deg": sector},
+            path=one.cost,
+        )
     exact_line = [math.degrees(arc_azimuth(math.radians(s))) for s in degrees]
     result.plots.append(
-        plot("fig3-9-sector", "Stiffest direction of the flat sector", "sector angle, degrees", "azimuth, degrees",
-             [line("consistent", list(degrees), found, "points"),
-              line("curved cantilever", list(degrees), exact_line, "reference"),
-              line("source, sector not printed", list(degrees), [STIFFEST] * len(degrees), "reference")],
-             "The source's 80 degrees belong to a flat sector of some 27 degrees.")
-    )  # fmt: skip
+        plot(
+            "fig3-9-sector",
+            "Stiffest direction of the flat sector",
+            "sector angle, degrees",
+            "azimuth, degrees",
+            [
+                line("consistent", list(degrees), found, "points"),
+                line("curved cantilever", list(degrees), exact_line, "reference"),
+                line("source, sector not printed", list(degrees), [STIFFEST] * len(degrees), "reference"),
+            ],
+            "The source's 80 degrees belong to a flat sector of some 27 degrees.",
+        )
+    )
 
 
 def _plots(result: CaseResult, fine: dict[tuple[str, int], Tip]) -> None:
@@ -218,14 +282,27 @@ def _plots(result: CaseResult, fine: dict[tuple[str, int], Tip]) -> None:
             n = sphere(math.radians(found.azimuth), np.radians(across))
             arch.append(line(name, across.tolist(), found.stiffness.loaded(n).tolist()))
         result.plots.append(
-            plot(f"fig3-9-plane-{formulation}", f"In the plane of the crease, {formulation}", "azimuth, degrees",
-                 "K, N/mm", ring, "Force along a direction over the displacement along it, polar angle 90 degrees.",
-                 log="y")
-        )  # fmt: skip
+            plot(
+                f"fig3-9-plane-{formulation}",
+                f"In the plane of the crease, {formulation}",
+                "azimuth, degrees",
+                "K, N/mm",
+                ring,
+                "Force along a direction over the displacement along it, polar angle 90 degrees.",
+                log="y",
+            )
+        )
         result.plots.append(
-            plot(f"fig3-9-polar-{formulation}", f"Over the pole, {formulation}", "polar angle, degrees", "K, N/mm",
-                 arch, "At the azimuth of the stiffest direction.", log="y")
-        )  # fmt: skip
+            plot(
+                f"fig3-9-polar-{formulation}",
+                f"Over the pole, {formulation}",
+                "polar angle, degrees",
+                "K, N/mm",
+                arch,
+                "At the azimuth of the stiffest direction.",
+                log="y",
+            )
+        )
 
 
 def _pictures(result: CaseResult, context: Context, fine: dict[tuple[str, int], Tip]) -> None:
@@ -258,9 +335,12 @@ def _pictures(result: CaseResult, context: Context, fine: dict[tuple[str, int], 
         context.folder.mkdir(parents=True, exist_ok=True)
         figure.savefig(context.folder / file, dpi=110)
         result.pictures.append(
-            {"file": file, "alt": f"Stiffness of the tip in all directions at four dihedral angles, {formulation}",
-             "caption": f"Stiffness 1 / (n.C.n) over all directions, {formulation}: flat maps and spheres."}
-        )  # fmt: skip
+            {
+                "file": file,
+                "alt": f"Stiffness of the tip in all directions at four dihedral angles, {formulation}",
+                "caption": f"Stiffness 1 / (n.C.n) over all directions, {formulation}: flat maps and spheres.",
+            }
+        )
 
 
 def _notes(result: CaseResult, fine: dict[tuple[str, int], Tip]) -> None:

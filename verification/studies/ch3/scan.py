@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,15 +20,26 @@ import meshes
 from bh.applications import scan
 from bh.errors import InputError
 from meshes.pattern import CreasePattern
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
+from verification.studies.ch3.scan_clouds import (
+    DENSITY,
+    DIHEDRAL,
+    HOLES,
+    NOISE,
+    RADIUS,
+    STRAYS,
+    WIDTH,
+    corners,
+    folded_sector,
+    rotation_vector,
+    sampled,
+    scanned,
+    truncated_normal,
+)
 from verification.theory import cone
 
 Array = NDArray[np.float64]
 
-NOISE = 0.127  # mm, the scanner's accuracy, taken as the standard deviation of each coordinate
-DENSITY = 104.0 / 5.0  # points a mm^2: 10,400 a cm^2, of which the source keeps every fifth
-RADIUS, WIDTH, DIHEDRAL = 100.0, 10.0, 0.5 * math.pi
-STRAYS, HOLES = 0.05, (4.0, 5.0, 6.0)  # share of the points; radii in mm
 MOTION = ((0.4, -0.9, 1.3), (30.0, -20.0, 50.0))  # rotation vector, rad, and translation, mm
 SCANNER = "known motion; noise, density and every fifth point of source 3.4.3"
 SAME_MESH = "the consistent formulation on the same mesh and with the same L*"
@@ -57,52 +69,6 @@ def samples() -> tuple[Sample, ...]:
     )
 
 
-# ------------------------------------------------------------------------------------------------- clouds
-
-
-def sampled(state: bh.State, density: float, seed: int) -> Array:
-    """Points (k, 3) spread evenly at random over a sheet, `density` a mm^2."""
-    random = np.random.default_rng(seed)
-    p = state.points[state.mesh.triangles]
-    area = 0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    count = round(density * float(area.sum()))
-    chosen = p[random.choice(len(p), count, p=area / area.sum())]
-    u, v = random.random((2, count, 1))
-    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
-    points: Array = chosen[:, 0] + u * (chosen[:, 1] - chosen[:, 0]) + v * (chosen[:, 2] - chosen[:, 0])
-    return points
-
-
-def scanned(points: Array, seed: int, strays: float = STRAYS, holes: tuple[float, ...] = HOLES) -> Array:
-    """The points as a scanner gives them: noisy, with stray points in and around the sheet's box, and with holes."""
-    random = np.random.default_rng(seed)
-    centres = points[random.choice(len(points), len(holes), replace=False)]
-    seen = points + random.normal(0.0, NOISE, points.shape)
-    low, high = points.min(axis=0) - 10.0, points.max(axis=0) + 10.0
-    seen = np.vstack((seen, random.uniform(low, high, (round(strays * len(points)), 3))))
-    for centre, radius in zip(centres, holes, strict=True):
-        seen = seen[np.linalg.norm(seen - centre, axis=1) > radius]
-    return random.permutation(seen)
-
-
-def folded_sector(formulation: str, angle: float) -> bh.State:
-    """The annulus sector of App. B with its crease in its plane, folded to a right angle.
-
-    The consistent formulation gets four rows a panel: with one the free ends stray from the cones by 0.33 mm, with two
-    by 0.24, with four by 0.21.
-    """
-    rows, alpha = (4, 4.0) if formulation == "consistent" else (1, 8.0)
-    mesh = meshes.structured(meshes.annulus_sector(RADIUS, WIDTH, angle), aspect_ratio=alpha, rows=rows)
-    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), formulation=formulation)
-    model = model.support("crease:crease", "z").support("rigid-body").fold("crease", to=DIHEDRAL)
-    return bh.trace(model)[-1]
-
-
-def corners(state: bh.State) -> Array:
-    """(4, 3) corners of the sheet: what is picked."""
-    return state.points[[state.mesh.corners[name] for name in sorted(state.mesh.corners)]]
-
-
 # ------------------------------------------------------------------------------------------------- the case
 
 
@@ -124,23 +90,6 @@ def run(context: Context) -> CaseResult:
     return result
 
 
-def _add(result: CaseResult, quantity: str, value: float, unit: str, reference: float | None, source: str,
-         tolerance: float | None, **params: Any) -> None:  # fmt: skip
-    result.checks.append(Check("scan", quantity, params, float(value), unit, reference, source, tolerance))
-
-
-def truncated_normal() -> tuple[float, float, float]:
-    """Root mean square, mean and median of |N(0, 1)| below `bh.scan`'s trim."""
-    trim = scan.TRIM
-    inside = math.erf(trim / math.sqrt(2.0))
-    density = math.exp(-0.5 * trim * trim)
-    square = 1.0 - math.sqrt(2.0 / math.pi) * trim * density / inside
-    mean = math.sqrt(2.0 / math.pi) * (1.0 - density) / inside
-    from scipy.special import erfinv
-
-    return math.sqrt(square), mean, math.sqrt(2.0) * float(erfinv(0.5 * inside))
-
-
 def _known_motion(result: CaseResult, context: Context, angle: float) -> None:
     """A scan of the solved sheet itself, so that nothing but noise, holes and strays is between them."""
     state = folded_sector("bars-and-hinges", angle)
@@ -154,33 +103,50 @@ def _known_motion(result: CaseResult, context: Context, angle: float) -> None:
         found = scan.register(cloud, state, start)
         left = found.motion.after(motion)
         params: dict[str, Any] = {
-            "angle_deg": round(math.degrees(angle), 6), "points": len(cloud), "seed": seed, "noise_mm": NOISE,
-            "strays": STRAYS, "holes": len(HOLES),
-        }  # fmt: skip
-        error = np.concatenate((left.apply(found.centre) - found.centre, _rotation_vector(left)))
+            "angle_deg": round(math.degrees(angle), 6),
+            "points": len(cloud),
+            "seed": seed,
+            "noise_mm": NOISE,
+            "strays": STRAYS,
+            "holes": len(HOLES),
+        }
+        error = np.concatenate((left.apply(found.centre) - found.centre, rotation_vector(left)))
         worst = float(np.abs(error / found.standard_error).max())
-        _add(result, "motion left, in its standard errors", worst, "", 0.0, SCANNER, 4.0, **params)
+        check = partial(result.check, params=params)
+        check("motion left, in its standard errors", worst, reference=0.0, source=SCANNER, tolerance=4.0)
         moved = np.linalg.norm(left.apply(state.points) - state.points, axis=1)
-        _add(result, "motion left, root mean square of the nodes", math.sqrt(float((moved**2).mean())), "mm", 0.0,
-             SCANNER + "; half of the noise", 0.5 * NOISE, **params)  # fmt: skip
+        check(
+            "motion left, root mean square of the nodes",
+            math.sqrt(float((moved**2).mean())),
+            unit="mm",
+            reference=0.0,
+            source=SCANNER + "; half of the noise",
+            tolerance=0.5 * NOISE,
+        )
         out = (left.apply(state.points) - state.points)[:, 2].mean()
         across = abs(float(out))
-        _add(result, "motion left across the crease plane", across, "mm", 0.0, "5 noise / sqrt(n) / sin(phi/2)",
-             5.0 * NOISE / math.sqrt(len(cloud)) / math.sin(0.5 * DIHEDRAL), **params)  # fmt: skip
+        check(
+            "motion left across the crease plane",
+            across,
+            unit="mm",
+            reference=0.0,
+            source="5 noise / sqrt(n) / sin(phi/2)",
+            tolerance=5.0 * NOISE / math.sqrt(len(cloud)) / math.sin(0.5 * DIHEDRAL),
+        )
         kept = scan.distances(found.motion.apply(cloud), state).of(found.kept)
         law = "normal noise, trimmed at 3 standard deviations"
-        _add(result, "root mean square distance", found.noise, "mm", square, law, 0.03, **params)
-        _add(result, "mean distance", kept.mean, "mm", mean, law, 0.03, **params)
-        _add(result, "median distance", kept.median, "mm", median, law, 0.03, **params)
-        _add(result, "share of the scan that is kept", float(found.kept.mean()), "", 1.0 / (1.0 + STRAYS),
-             "all but the strays", 0.01, **params)  # fmt: skip
-
-
-def _rotation_vector(motion: scan.Motion) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    vector: Array = Rotation.from_matrix(motion.rotation).as_rotvec()
-    return vector
+        check(
+            "root mean square distance", found.noise, unit="mm", reference=square, source=law, tolerance=0.03
+        )
+        check("mean distance", kept.mean, unit="mm", reference=mean, source=law, tolerance=0.03)
+        check("median distance", kept.median, unit="mm", reference=median, source=law, tolerance=0.03)
+        check(
+            "share of the scan that is kept",
+            found.kept.mean(),
+            reference=1.0 / (1.0 + STRAYS),
+            source="all but the strays",
+            tolerance=0.01,
+        )
 
 
 def _exact_cones(result: CaseResult, context: Context, angle: float) -> None:
@@ -210,10 +176,24 @@ def _exact_cones(result: CaseResult, context: Context, angle: float) -> None:
         clean = scan.distances(found.registration.motion.apply(exact), state)
         square = float((clean.values**2).mean())
         expected = math.sqrt((NOISE * truncated_normal()[0]) ** 2 + square)
-        _add(result, "cones: root mean square distance", math.sqrt(float((kept.values**2).mean())), "mm", expected,
-             "the scanner's noise, and the sheet off the exact cones", 0.03, **params)  # fmt: skip
-        _add(result, "cones: root mean square of the sheet off the cones", math.sqrt(square), "mm", 0.0,
-             "source 3.4.2: portions of cones; free ends are not", 0.5 * NOISE, **params)  # fmt: skip
+        result.check(
+            "cones: root mean square distance",
+            math.sqrt(float((kept.values**2).mean())),
+            unit="mm",
+            reference=expected,
+            source="the scanner's noise, and the sheet off the exact cones",
+            tolerance=0.03,
+            params=params,
+        )
+        result.check(
+            "cones: root mean square of the sheet off the cones",
+            math.sqrt(square),
+            unit="mm",
+            reference=0.0,
+            source="source 3.4.2: portions of cones; free ends are not",
+            tolerance=0.5 * NOISE,
+            params=params,
+        )
         _statistics(result, "cones", kept, "cloud to sheet", params)
         _statistics(result, "cones", found.sheet_to_cloud, "sheet to cloud", params)
         _statistics(result, "cones without noise", clean, "cloud to sheet", params)
@@ -233,7 +213,9 @@ def _statistics(
 ) -> None:
     for name in ("mean", "median", "standard_deviation", "max"):
         quantity = f"{what}: {name.replace('_', ' ')} of the distances"
-        _add(result, quantity, getattr(found, name), "mm", None, "source 3.4.3", None, way=way, **params)
+        result.check(
+            quantity, getattr(found, name), unit="mm", source="source 3.4.3", params={"way": way, **params}
+        )
 
 
 # ------------------------------------------------------------------------------------------------- patterns
@@ -255,8 +237,14 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
     paper = folded(sample.pattern, "consistent", PAPER_LSTAR, size)
     same = folded(sample.pattern, "bars-and-hinges", PAPER_LSTAR, size)
     for path, formulation in ((paper, "consistent"), (same, "bars-and-hinges")):
-        _add(result, "pattern folds with default settings", float(path.reached), "", 1.0,
-             "the last rest angle is reached", 0.0, pattern=name, formulation=formulation, size_mm=size)  # fmt: skip
+        result.check(
+            "pattern folds with default settings",
+            path.reached,
+            reference=1.0,
+            source="the last rest angle is reached",
+            tolerance=0.0,
+            params={"pattern": name, "formulation": formulation, "size_mm": size},
+        )
     _same_mesh(result, name, paper[-1], same[-1], size)
     cloud = sampled(paper[-1], 0.2 * DENSITY if context.quick else DENSITY, 1)
     Lstars = (PAPER_LSTAR,) if context.quick else LSTARS
@@ -272,30 +260,63 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
             except InputError as lost:  # this stiffness has no place beside the others, and says so
                 result.notes.append(f"{name}, {mesh}, L* = {Lstar:g} mm: no distance, {lost}.")
         if not tried:
-            _add(result, "pattern: lowest mean distance over L*", math.nan, "mm", 0.0, "no path was reached",
-                 sample.claim, pattern=name, mesh=mesh)  # fmt: skip
+            result.check(
+                "pattern: lowest mean distance over L*",
+                math.nan,
+                unit="mm",
+                reference=0.0,
+                source="no path was reached",
+                tolerance=sample.claim,
+                params={"pattern": name, "mesh": mesh},
+            )
             continue
         (there, back), Lstar = min(tried, key=lambda one: one[0][0].mean)
         params = {"pattern": name, "mesh": mesh, "formulation": "bars-and-hinges", "Lstar_mm": Lstar}
         # one row a panel lets bars and hinges bend along its node lines only, which soft springs cannot force: it needs
         # its own L*, and quick runs try one only
         judged = sample.claim if mesh == "gmsh" or not context.quick else None
-        _add(result, "pattern: lowest mean distance over L*", there.mean, "mm", 0.0,
-             f"source 3.4.3: below {sample.claim:g} mm (there to paper)", judged, **params)  # fmt: skip
+        result.check(
+            "pattern: lowest mean distance over L*",
+            there.mean,
+            unit="mm",
+            reference=0.0,
+            source=f"source 3.4.3: below {sample.claim:g} mm (there to paper)",
+            tolerance=judged,
+            params=params,
+        )
         _statistics(result, "pattern", back, "sheet to cloud", params)
         _statistics(result, "pattern", there, "cloud to sheet", params)
         for (to_sheet, _), other in tried:
-            _add(result, "pattern: mean distance by L*", to_sheet.mean, "mm", 0.0,
-                 f"consistent, L* = {PAPER_LSTAR:g} mm", None, **{**params, "Lstar_mm": other})  # fmt: skip
+            result.check(
+                "pattern: mean distance by L*",
+                to_sheet.mean,
+                unit="mm",
+                reference=0.0,
+                source=f"consistent, L* = {PAPER_LSTAR:g} mm",
+                params={**params, "Lstar_mm": other},
+            )
         series.append(line(mesh, [at for _, at in tried], [one.mean for (one, _), _ in tried]))
         if mesh == "gmsh" and not context.quick:
-            _picture(result, context, f"scan_{name.replace(' ', '_')}_distances", back,
-                     f"Distances, {name}", f"{name}: bars and hinges (L* = {Lstar:g} mm) against the consistent "
-                     "formulation (L* = 10 mm) in the place of paper.")  # fmt: skip
+            _picture(
+                result,
+                context,
+                f"scan_{name.replace(' ', '_')}_distances",
+                back,
+                f"Distances, {name}",
+                f"{name}: bars and hinges (L* = {Lstar:g} mm) against the consistent "
+                "formulation (L* = 10 mm) in the place of paper.",
+            )
     result.plots.append(
-        plot(f"scan-{name.replace(' ', '-')}", name.capitalize(), "L*, mm", "mean distance, mm", series,
-             "Bars and hinges with several L* against the consistent sheet with L* = 10 mm.", log="x")
-    )  # fmt: skip
+        plot(
+            f"scan-{name.replace(' ', '-')}",
+            name.capitalize(),
+            "L*, mm",
+            "mean distance, mm",
+            series,
+            "Bars and hinges with several L* against the consistent sheet with L* = 10 mm.",
+            log="x",
+        )
+    )
     if not context.quick:
         _folded_picture(result, context, name, paper[-1])
 
@@ -316,18 +337,35 @@ def _same_mesh(result: CaseResult, name: str, paper: bh.State, same: bh.State, s
     params = {"pattern": name, "size_mm": size, "Lstar_mm": PAPER_LSTAR}
     own, other = paper.energy.as_dict(), same.energy.as_dict()
     for kind in own:
-        _add(result, f"pattern: {kind} energy, bars and hinges over consistent", other[kind] / own[kind], "", 1.0,
-             SAME_MESH, None, **params)  # fmt: skip
+        result.check(
+            f"pattern: {kind} energy, bars and hinges over consistent",
+            other[kind] / own[kind],
+            reference=1.0,
+            source=SAME_MESH,
+            params=params,
+        )
     moved = scan.align(same.points, paper.points).apply(same.points)
     apart = np.linalg.norm(moved - paper.points, axis=1)
     for quantity, value in (("mean", apart.mean()), ("largest", apart.max())):
-        _add(result, f"pattern: {quantity} distance of the same nodes", value, "mm", 0.0,
-             SAME_MESH, None, **params)  # fmt: skip
+        result.check(
+            f"pattern: {quantity} distance of the same nodes",
+            value,
+            unit="mm",
+            reference=0.0,
+            source=SAME_MESH,
+            params=params,
+        )
     for crease in paper.mesh.creases:
         angle = math.degrees(float(np.abs(same.fold_angle(crease)).mean()))
         reference = math.degrees(float(np.abs(paper.fold_angle(crease)).mean()))
-        _add(result, "pattern: mean fold angle by bars and hinges", angle, "degrees", reference,
-             SAME_MESH, None, crease=crease, **params)  # fmt: skip
+        result.check(
+            "pattern: mean fold angle by bars and hinges",
+            angle,
+            unit="degrees",
+            reference=reference,
+            source=SAME_MESH,
+            params={"crease": crease, **params},
+        )
 
 
 # ------------------------------------------------------------------------------------------------- pictures and words

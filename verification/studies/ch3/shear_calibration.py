@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from bh.mechanics.bars_and_hinges.stiffness import diagonal_factor, shear_exact_factor
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 from verification.theory.shear import UnitTruss
 
 SOURCE = "source 3.3.1, Fig. 3.3 (e-f), Eq. 3.4"
@@ -27,41 +29,51 @@ def run(context: Context) -> CaseResult:
     }
     for alpha in alphas:
         value = UnitTruss(float(alpha), float(diagonal_factor(alpha))).tension()
-        result.checks.append(_check("tension", value, 1.0, 1e-9, {"alpha": float(alpha), "bars": "Eq. 3.4"}))
+        result.check(
+            "tension", value, reference=1.0, tolerance=1e-9, params={"alpha": float(alpha), "bars": "Eq. 3.4"}
+        )
     for name, ratios in settings.items():
         slope, offset, r2 = _regression(alphas, ratios)
         judged = name == "cantilever"
         params = {"setting": name, "alpha": "1, 2, ..., 20"}
-        result.checks.append(_check("regression a2", slope, 0.5, 0.01 if judged else None, params))
-        result.checks.append(_check("regression a0", offset, 1.25, 0.02 if judged else None, params))
-        result.checks.append(_check("regression R^2", r2, 1.0, 5e-4, params))
+        check = partial(result.check, params=params)
+        check("regression a2", slope, reference=0.5, tolerance=0.01 if judged else None)
+        check("regression a0", offset, reference=1.25, tolerance=0.02 if judged else None)
+        check("regression R^2", r2, reference=1.0, tolerance=5e-4)
     exact = np.array([shear_exact_factor(a) for a in alphas])
     worst = float(np.abs(settings["guided"] / exact - 1.0).max())
-    result.checks.append(_check("guided ratio over (alpha + 1/alpha)^2/2", 1.0 + worst, 1.0, 1e-9, {}))
+    result.check("guided ratio over (alpha + 1/alpha)^2/2", 1.0 + worst, reference=1.0, tolerance=1e-9)
     corrected = {
         name: np.array([getattr(UnitTruss(a, float(diagonal_factor(a))), f"shear_{name}")() for a in alphas])
         for name in settings
     }
     for name, ratios in corrected.items():
         off = float(np.abs(ratios[1:] - 1.0).max())
-        result.checks.append(
-            _check("largest deviation after Eq. 3.4, alpha >= 2", off, 0.01, None, {"setting": name})
+        result.check(
+            "largest deviation after Eq. 3.4, alpha >= 2", off, reference=0.01, params={"setting": name}
         )
     x = alphas.tolist()
     result.plots = [
         plot(
-            "shear-before", "All bars by Eq. 3.3", "aspect ratio alpha", "deflection truss / sheet",
+            "shear-before",
+            "All bars by Eq. 3.3",
+            "aspect ratio alpha",
+            "deflection truss / sheet",
             [line(name, x, r.tolist()) for name, r in settings.items()]
             + [line("alpha^2/2 + 5/4", x, (0.5 * alphas**2 + 1.25).tolist(), "reference")],
-            "Transverse deflection of the unit truss over that of the sheet (pure shear, nu = 0).", log="xy",
+            "Transverse deflection of the unit truss over that of the sheet (pure shear, nu = 0).",
+            log="xy",
         ),
         plot(
-            "shear-after", "Diagonals by Eq. 3.4", "aspect ratio alpha", "deflection truss / sheet",
+            "shear-after",
+            "Diagonals by Eq. 3.4",
+            "aspect ratio alpha",
+            "deflection truss / sheet",
             [line(name, x, r.tolist()) for name, r in corrected.items()]
             + [line("sheet", x, [1.0] * len(x), "reference")],
             "The same with the stiffened diagonal.",
         ),
-    ]  # fmt: skip
+    ]
     a2, a0, r2 = _regression(alphas, settings["cantilever"])
     g2, g0, _ = _regression(alphas, settings["guided"])
     result.notes.append(
@@ -87,7 +99,3 @@ def _regression(alphas: np.ndarray, ratios: np.ndarray) -> tuple[float, float, f
     rest = ratios - A @ fit
     r2 = 1.0 - float(rest @ rest) / float(np.sum((ratios - ratios.mean()) ** 2))
     return float(fit[0]), float(fit[1]), r2
-
-
-def _check(quantity: str, value: float, reference: float, tolerance: float | None, params: dict) -> Check:
-    return Check("shear_calibration", quantity, params, float(value), "", reference, SOURCE, tolerance)

@@ -14,7 +14,7 @@ from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
 from bh.solvers.linear import linear_response
 from meshes.structured import Kind
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.theory import strips as theory
 
 E, L, H, T, U = 1000.0, 10.0, 1.0, 0.1, 5e-4  # MPa, mm
@@ -132,20 +132,15 @@ def run(context: Context) -> CaseResult:
                 got = ratio(alpha, kind, load)
                 reference, tolerance, source = _expected(load, kind, alpha)
                 found.setdefault((load, kind), []).append(got.value)
-                result.checks.append(
-                    Check(
-                        case="strips",
-                        quantity=load,
-                        value=got.value,
-                        unit="U_BH / U_Th",
-                        reference=reference,
-                        params={"mesh": kind, "alpha": alpha, "formulation": "bars-and-hinges"},
-                        source=source,
-                        tolerance=tolerance,
-                        unknowns=got.unknowns,
-                        iterations=1,
-                        wall_time_s=got.wall_time_s,
-                    )
+                result.check(
+                    load,
+                    got.value,
+                    unit="U_BH / U_Th",
+                    reference=reference,
+                    source=source,
+                    tolerance=tolerance,
+                    params={"mesh": kind, "alpha": alpha, "formulation": "bars-and-hinges"},
+                    path=Cost(unknowns=got.unknowns, iterations=1, wall_time_s=got.wall_time_s),
                 )
     for load in LOADS:
         series = [line(kind, list(alphas), found[load, kind]) for kind in get_args(Kind)]

@@ -11,7 +11,7 @@ import meshes
 from bh import Model, Path, trace
 from bh.applications.corrugation.folding import LSTAR, POLYESTER
 from bh.formulations.observables import depth_of
-from verification.framework.checks import CaseResult, Check, cost_of
+from verification.framework.checks import CaseResult, Cost
 
 REST, LOAD = 1.0, 1.0  # rad; N
 SOURCE = "shell (fem) on its own mesh"
@@ -63,12 +63,19 @@ def against_shell(result: CaseResult, quick: bool) -> None:
         }
         judged = (formulation, along, rows) == finest
         outcome = judge.path.outcome if not judge.path.reached else found.path.outcome
+        took = Cost.of(found.path, outcome=outcome)
         for name, value, exact, unit in (
             ("depth, folded by rest angles of 1 rad", found.depth, judge.depth, "mm"),
             ("energy, folded by rest angles of 1 rad", found.energy, judge.energy, "N mm"),
             ("deflection under 1 N on the second mountain", found.deflection, judge.deflection, "mm"),
         ):
-            result.checks.append(
-                Check(result.name, name, params, value, unit, exact, SOURCE, 0.05 if judged else None,
-                      **cost_of(found.path), outcome=outcome)
-            )  # fmt: skip
+            result.check(
+                name,
+                value,
+                unit=unit,
+                reference=exact,
+                source=SOURCE,
+                tolerance=0.05 if judged else None,
+                params=params,
+                path=took,
+            )

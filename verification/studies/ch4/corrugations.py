@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from bh.applications.corrugation.folding import Folded, fold
+from bh.applications.corrugation.folded import Folded
+from bh.applications.corrugation.folding import fold
 from meshes.corrugations import KINDS
 
 DEPTH = 6.0  # mm

@@ -8,7 +8,7 @@ import meshes
 from meshes.corrugations import KINDS
 from meshes.curves import Array, sample
 from meshes.tapered import smallest_angles
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 
 SOURCE = "source 4.3, Tables 4.1-4.5"
 FIFTHS = ("20.0", "40.0", "60.0", "80.0", "100")
@@ -19,10 +19,12 @@ PRINTED: dict[str, dict[str, tuple[str, ...]]] = {  # as printed, curves 1 to 5
     "parabolic-edge": {"b": ("-0.040",) * 5, "c": FIFTHS, "r": ("22.4", "31.6", "38.7", "44.7", "50.0")},
     "elliptical-point": {"d": HALF, "e": FIFTHS, "f": ("0.00",) * 5, "r": HALF},
     "elliptical-edge": {
-        "d": HALF, "e": ("100",) * 5, "f": ("-80.0", "-60.0", "-40.0", "-20.0", "0.00"),
+        "d": HALF,
+        "e": ("100",) * 5,
+        "f": ("-80.0", "-60.0", "-40.0", "-20.0", "0.00"),
         "r": ("30.0", "40.0", "45.8", "49.0", "50.0"),
     },
-}  # fmt: skip
+}
 
 
 def run(context: Context) -> CaseResult:
@@ -40,19 +42,27 @@ def run(context: Context) -> CaseResult:
             worst = max(
                 _digits(value, text) for value, text in zip(table.columns[name], printed, strict=True)
             )
-            result.checks.append(
-                Check("tables4", f"column {name}: distance from print, in units of the last digit",
-                      {"kind": kind, "form": table.form}, worst, "", 0.0, SOURCE, 0.5)
-            )  # fmt: skip
+            result.check(
+                f"column {name}: distance from print, in units of the last digit",
+                worst,
+                reference=0.0,
+                tolerance=0.5,
+                params={"kind": kind, "form": table.form},
+            )
         pattern = meshes.corrugation(kind)
         off = max(
             float(np.abs(formula(kind, i, sample(rail)[:, 0]) - sample(rail)[:, 1]).max())
             for i, rail in enumerate(pattern.rails[1:])
         )
-        result.checks.append(
-            Check("tables4", "largest distance of the drawn curves from their equations", {"kind": kind}, off, "mm",
-                  0.0, "Eq. 4.7-4.16", 1e-9)
-        )  # fmt: skip
+        result.check(
+            "largest distance of the drawn curves from their equations",
+            off,
+            unit="mm",
+            reference=0.0,
+            source="Eq. 4.7-4.16",
+            tolerance=1e-9,
+            params={"kind": kind},
+        )
         result.plots.append(_drawing(kind, pattern))
         _mesh(result, kind, pattern)
     result.notes.append(
@@ -65,7 +75,7 @@ def run(context: Context) -> CaseResult:
 
 
 def formula(kind: str, i: int, x: Array) -> Array:
-    """y of curve i (from 0) by Eq. 4.7-4.16 at x, mm; zero beyond its ends."""
+    """Height y of curve i (from 0) by Eq. 4.7-4.16 at x, mm; zero beyond its ends."""
     c = {name: float(column[i]) for name, column in meshes.corrugation_table(kind).columns.items()}
     if "a" in c:
         return np.full_like(x, c["a"])
@@ -87,21 +97,9 @@ def _mesh(result: CaseResult, kind: str, pattern: meshes.CreasePattern) -> None:
         mesh = meshes.structured(pattern, along=along, rows=rows)
         angles = np.degrees(smallest_angles(mesh.points, mesh.triangles))
         params = {"kind": kind, "along": along, "rows": rows, "triangles": len(angles)}
-        result.checks.append(
-            Check("tables4", "smallest angle of the mesh", params, float(angles.min()), "deg", None, SOURCE)
-        )
+        result.check("smallest angle of the mesh", angles.min(), unit="deg", params=params)
         share = float(np.mean(angles < 10.0))
-        result.checks.append(
-            Check(
-                "tables4",
-                "share of triangles with an angle below 10 degrees",
-                params,
-                share,
-                "",
-                None,
-                SOURCE,
-            )
-        )
+        result.check("share of triangles with an angle below 10 degrees", share, params=params)
 
 
 def _drawing(kind: str, pattern: meshes.CreasePattern) -> dict[str, object]:

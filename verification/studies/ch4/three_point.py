@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 from bh.applications.corrugation import (
@@ -15,7 +16,7 @@ from bh.applications.corrugation import (
     top_down,
 )
 from bh.solvers.outcome import Outcome
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.studies.ch4.corrugation_shell import against_shell
 from verification.studies.ch4.corrugations import AZIMUTHS, EDGE, ORDER, POINT, RATIOS, folded, in_order
 
@@ -36,25 +37,19 @@ SPAN = 50.0
 def run(context: Context) -> CaseResult:
     """Fifteen curves on taped supports, six on free ones, and what the crease stiffness does to two of them."""
     result = CaseResult(
-        CASE, "Three-point bending of the five corrugations",
-        "Do simulated tests give the measured ratios k_x / k_y, and if not, what is the difference due to?", SOURCE,
-    )  # fmt: skip
+        CASE,
+        "Three-point bending of the five corrugations",
+        "Do simulated tests give the measured ratios k_x / k_y, and if not, what is the difference due to?",
+        SOURCE,
+    )
     formulation, along, rows = ("bars-and-hinges", 36, 1) if context.quick else ("consistent", 32, 2)
     params: dict[str, Any] = {"formulation": formulation, "along": along, "rows": rows}
     stiffness: dict[tuple[str, str, str], float] = {}
     for kind in ORDER:
         began = time.perf_counter()
         sheet = folded(kind, formulation, along, rows)
-        result.checks.append(
-            Check(
-                CASE,
-                "time to fold 6 mm deep",
-                {**params, "kind": kind},
-                time.perf_counter() - began,
-                "s",
-                None,
-                SOURCE,
-            )
+        result.check(
+            "time to fold 6 mm deep", time.perf_counter() - began, unit="s", params={**params, "kind": kind}
         )
         for support in (TAPED,) if context.quick or kind in POINT else (TAPED, FREE):
             curves = []
@@ -64,9 +59,15 @@ def run(context: Context) -> CaseResult:
                 stiffness[kind, support, name] = test.stiffness
                 curves.append(line(f"about {name}", test.displacement.tolist(), test.load.tolist()))
             result.plots.append(
-                plot(f"curves-{support}-{kind}", f"{kind}, {support}", "displacement of the bar (mm)", "load (N)",
-                     curves, f"Simulated three-point bending, {kind}, {support} (Fig. 4.8).")
-            )  # fmt: skip
+                plot(
+                    f"curves-{support}-{kind}",
+                    f"{kind}, {support}",
+                    "displacement of the bar (mm)",
+                    "load (N)",
+                    curves,
+                    f"Simulated three-point bending, {kind}, {support} (Fig. 4.8).",
+                )
+            )
         _beam(result, sheet, kind, stiffness, params)
     for support in (TAPED,) if context.quick else (TAPED, FREE):
         _claims(result, stiffness, support, params)
@@ -83,22 +84,16 @@ def _test(result: CaseResult, sheet: Folded, name: str, support: str, params: di
     test = three_point(sheet, AZIMUTHS[name], RIGS[support])
     wall = time.perf_counter() - began
     where = {**params, "supports": support, "about": name}
-    cost: dict[str, Any] = {
-        "unknowns": test.path.unknowns, "iterations": test.path.iterations, "wall_time_s": wall,
-        "outcome": Outcome.REACHED if test.converged else test.outcome,
-    }  # fmt: skip
+    took = Cost.of(test.path, wall_time_s=wall, outcome=Outcome.REACHED if test.converged else test.outcome)
     published = PUBLISHED.get((params["kind"], name))
-    result.checks.append(
-        Check(CASE, "stiffness, second stage", where, test.stiffness, "N/mm", published, SOURCE, None, **cost)
-    )
-    result.checks.append(Check(CASE, "R^2 of the regression", where, test.r2, "", 1.0, SOURCE, None, **cost))
-    result.checks.append(
-        Check(CASE, "first peak of the load", where, test.peak, "N", None, SOURCE, None, **cost)
-    )
+    check = partial(result.check, params=where, path=took)
+    check("stiffness, second stage", test.stiffness, unit="N/mm", reference=published)
+    check("R^2 of the regression", test.r2, reference=1.0)
+    check("first peak of the load", test.peak, unit="N")
     went = float(
         test.displacement[-1]
     )  # less than asked where the test stopped before; the stiffness then says so
-    result.checks.append(Check(CASE, "how far the bar went", where, went, "mm", None, SOURCE, None))
+    result.check("how far the bar went", went, unit="mm", params=where)
     return test
 
 
@@ -115,14 +110,21 @@ def _beam(
         kept = float(tangent_bending(sheet, [AZIMUTHS[name]], SPAN).stiffness[0])
         where = {**params, "kind": kind, "about": name}
         judged = kind == "straight" and name == "y" and params["formulation"] == "consistent"
-        result.checks.append(
-            Check(CASE, "tangent stiffness with kept sections over 48 E I / L^3", where, kept / beam, "", 1.0,
-                  "beam theory; shear and the ends make it softer", 0.2 if judged else None)
-        )  # fmt: skip
-        result.checks.append(
-            Check(CASE, "48 E I / L^3 over the simulated stiffness", where, beam / stiffness[kind, TAPED, name], "",
-                  3.5, "source 4.5.3: second moments overestimate by 3 to 4", None)
-        )  # fmt: skip
+        result.check(
+            "tangent stiffness with kept sections over 48 E I / L^3",
+            kept / beam,
+            reference=1.0,
+            source="beam theory; shear and the ends make it softer",
+            tolerance=0.2 if judged else None,
+            params=where,
+        )
+        result.check(
+            "48 E I / L^3 over the simulated stiffness",
+            beam / stiffness[kind, TAPED, name],
+            reference=3.5,
+            source="source 4.5.3: second moments overestimate by 3 to 4",
+            params=where,
+        )
 
 
 def _claims(
@@ -132,39 +134,33 @@ def _claims(
     kinds = [kind for kind in ORDER if (kind, support, "x") in stiffness]
     ratios = {kind: stiffness[kind, support, "x"] / stiffness[kind, support, "y"] for kind in kinds}
     for kind in kinds:
-        result.checks.append(
-            Check(CASE, "k_x / k_y", {**where, "kind": kind}, ratios[kind], "", RATIOS[kind], SOURCE)
-        )
+        result.check("k_x / k_y", ratios[kind], reference=RATIOS[kind], params={**where, "kind": kind})
     if len(kinds) < len(ORDER):
         return
     lowest = float(all(ratios["straight"] < ratios[kind] for kind in ORDER[1:]))
-    result.checks.append(Check(CASE, "straight is the least isotropic", where, lowest, "", 1.0, SOURCE))
+    check = partial(result.check, params=where)
+    check("straight is the least isotropic", lowest, reference=1.0)
     order = float(in_order(ratios))
-    result.checks.append(
-        Check(CASE, "pairs of ten in the order of the measured ratios", where, order, "", 10.0, SOURCE)
-    )
+    check("pairs of ten in the order of the measured ratios", order, reference=10.0)
     for name in ("x", "y"):
         firmest = min(stiffness[kind, support, name] for kind in EDGE) > max(
             stiffness[kind, support, name] for kind in POINT
         )
-        result.checks.append(
-            Check(
-                CASE,
-                f"edge patterns stiffer than point patterns about {name}",
-                where,
-                float(firmest),
-                "",
-                1.0,
-                SOURCE,
-            )
-        )
+        check(f"edge patterns stiffer than point patterns about {name}", firmest, reference=1.0)
     x = [float(k) for k in range(len(ORDER))]
     result.plots.append(
-        plot(f"ratios-{support}", f"k_x / k_y, {support}", ", ".join(f"{k}: {kind}" for k, kind in enumerate(ORDER)),
-             "k_x / k_y", [line("simulated", x, [ratios[kind] for kind in ORDER], "points"),
-                           line("measured", x, [RATIOS[kind] for kind in ORDER], "reference")],
-             "Ratios of bending stiffness beside the measured ones (4.5.2).")
-    )  # fmt: skip
+        plot(
+            f"ratios-{support}",
+            f"k_x / k_y, {support}",
+            ", ".join(f"{k}: {kind}" for k, kind in enumerate(ORDER)),
+            "k_x / k_y",
+            [
+                line("simulated", x, [ratios[kind] for kind in ORDER], "points"),
+                line("measured", x, [RATIOS[kind] for kind in ORDER], "reference"),
+            ],
+            "Ratios of bending stiffness beside the measured ones (4.5.2).",
+        )
+    )
 
 
 def _creases(result: CaseResult, context: Context, params: dict[str, Any]) -> None:

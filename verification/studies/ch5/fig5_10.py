@@ -11,8 +11,8 @@ from verification.studies.ch5.pinching import (
     SHEET,
     WAYS,
     Pinched,
+    Stiffness,
     Way,
-    add,
     angle_plots,
     pinched,
     reached,
@@ -39,7 +39,9 @@ def run(context: Context) -> CaseResult:
             for s in STIFFNESS:
                 for k in CURVATURES:
                     sheet = Sheet(E=SHEET.E, t=(s / SHEET.E) ** (1.0 / 3.0))
-                    found[way.name, mesh, s, k] = pinched(way, mesh, k, 3, sheet=sheet, left=NEARLY)
+                    found[way.name, mesh, s, k] = pinched(
+                        way, mesh, k, 3, stiffness=Stiffness(sheet), left=NEARLY
+                    )
     reached(result, list(found.values()))
     for way in WAYS:
         for mesh in way.taken(context.quick):
@@ -54,22 +56,23 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
     for name, read, printed in (("bending", "bend", 9.80), ("twist", "twist", 9.93)):
         values = {s: float(getattr(found[way.name, mesh, s, 0.01], read)) for s in STIFFNESS}
         soft = found[way.name, mesh, 500.0, 0.01]
-        add(result, soft, f"change of the {name} angle from E t^3 = 1000 to 500 N mm",
-            100.0 * (values[500.0] / values[1000.0] - 1.0), "%", printed, SOURCE, None, **params)  # fmt: skip
-        add(result, soft, f"change of the {name} angle, E t^3 = 250 over 4000 N mm", values[250.0] / values[4000.0],
-            "", None, SOURCE + ": a small effect", **params)  # fmt: skip
-        rising = sorted(values.values(), reverse=True) == list(values.values())
-        add(
-            result,
-            None,
-            f"softer sheets change their {name} angle more",
-            float(rising),
-            "",
-            1.0,
-            SOURCE,
-            None,
-            **params,
+        result.check(
+            f"change of the {name} angle from E t^3 = 1000 to 500 N mm",
+            100.0 * (values[500.0] / values[1000.0] - 1.0),
+            unit="%",
+            reference=printed,
+            params=params,
+            path=soft.path,
         )
+        result.check(
+            f"change of the {name} angle, E t^3 = 250 over 4000 N mm",
+            values[250.0] / values[4000.0],
+            source=SOURCE + ": a small effect",
+            params=params,
+            path=soft.path,
+        )
+        rising = sorted(values.values(), reverse=True) == list(values.values())
+        result.check(f"softer sheets change their {name} angle more", rising, reference=1.0, params=params)
 
 
 def _plots(result: CaseResult, found: Found) -> None:

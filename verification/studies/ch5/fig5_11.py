@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from verification.framework.checks import CaseResult, Context
@@ -14,7 +15,6 @@ from verification.studies.ch5.pinching import (
     WAYS,
     Pinched,
     Way,
-    add,
     angle_plots,
     pinched,
     proportion,
@@ -72,22 +72,36 @@ def _claims(result: CaseResult, way: Way, level: int, found: Found) -> None:
         for w, p in at.items():
             fine = found.get((way.name, 1, w, k)) if level == 0 else None
             for name, read in (("bending", "bend"), ("twist", "twist")):
-                add(result, p, f"change of the {name} angle", float(getattr(p, read)), "deg",
-                    None if fine is None else float(getattr(fine, read)), "the finer mesh of this formulation",
-                    spacing_mm=w, **params)  # fmt: skip
+                result.check(
+                    f"change of the {name} angle",
+                    getattr(p, read),
+                    unit="deg",
+                    reference=None if fine is None else float(getattr(fine, read)),
+                    source="the finer mesh of this formulation",
+                    params={"spacing_mm": w, **params},
+                    path=p.path,
+                )
         if k == 0.0:
             continue
         bend = proportion(SPACINGS, [at[w].bend for w in SPACINGS])
-        add(result, None, "bend against spacing, R^2 of proportionality", bend.r2, "", 1.0, SOURCE + ": proportional",
-            0.05 if way is SAME_CELLS else None, **params)  # fmt: skip
-        add(result, None, "bend over spacing", bend.slope, "deg/mm", None, SOURCE, **params)
+        check = partial(result.check, params=params)
+        check(
+            "bend against spacing, R^2 of proportionality",
+            bend.r2,
+            reference=1.0,
+            source=SOURCE + ": proportional",
+            tolerance=0.05 if way is SAME_CELLS else None,
+        )
+        check("bend over spacing", bend.slope, unit="deg/mm")
         rising = [at[w].bend for w in SPACINGS]
         judged = 0.0 if way is not CONVERGED and level == 0 else None
-        add(result, None, "bend grows with spacing", float(rising == sorted(rising)), "", 1.0, SOURCE, judged,
-            **params)  # fmt: skip
+        check("bend grows with spacing", rising == sorted(rising), reference=1.0, tolerance=judged)
         twist = [abs(at[w].twist) for w in SPACINGS]
-        add(result, None, "twist at 8 mm over that at 2 mm", twist[-1] / twist[0], "", None,
-            SOURCE + ": grows less than in proportion (4)", **params)  # fmt: skip
+        check(
+            "twist at 8 mm over that at 2 mm",
+            twist[-1] / twist[0],
+            source=SOURCE + ": grows less than in proportion (4)",
+        )
 
 
 def _plots(result: CaseResult, found: Found) -> None:

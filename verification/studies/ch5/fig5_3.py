@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from bh.analysis.creases import along
 from bh.analysis.isometric import folded_curvature
 from bh.plotting.pictures import picture
 from meshes.curves import arc_lengths, interpolated
-from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 
 Array = NDArray[np.float64]
 CASE = "fig5_3"
@@ -31,8 +32,32 @@ QUICK = {"bars-and-hinges": ((50, 1), (100, 1)), "consistent": ((20, 2), (40, 4)
 MODERATE = math.pi / 3  # isometry holds from here to flat
 TOLERANCE = 0.02
 FEW = (1.1, 2.0, 3.0, 4.0, 10.0, 20.0, 40.0, 80.0, 200.0)
-MANY = (1.1, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0, 20.0, 24.0, 28.0, 32.0, 36.0, 40.0, 45.0, 50.0,
-        60.0, 80.0, 100.0, 140.0, 200.0)  # fmt: skip
+MANY = (
+    1.1,
+    1.25,
+    1.5,
+    2.0,
+    2.5,
+    3.0,
+    4.0,
+    5.0,
+    7.0,
+    10.0,
+    14.0,
+    20.0,
+    24.0,
+    28.0,
+    32.0,
+    36.0,
+    40.0,
+    45.0,
+    50.0,
+    60.0,
+    80.0,
+    100.0,
+    140.0,
+    200.0,
+)
 SHOWN = (3.0, 10.0, 50.0, 200.0)
 
 
@@ -54,7 +79,7 @@ class Curve:
 
     @property
     def isometric(self) -> Array:
-        """kappa / kappa_0 of Eq. 5.3."""
+        """Ratio kappa / kappa_0 of Eq. 5.3."""
         return folded_curvature(1.0, self.phi)
 
     @property
@@ -159,56 +184,55 @@ def run(context: Context) -> CaseResult:
 
 
 def _judge(result: CaseResult, item: Curve, params: dict[str, object]) -> None:
-    path = item.path
-
-    def add(
-        quantity: str, value: float, unit: str, reference: float | None, source: str, tolerance: float | None
-    ) -> None:
-        result.checks.append(
-            Check(CASE, quantity, params, value, unit, reference, source, tolerance, path.unknowns, path.iterations,
-                  path.wall_time_s, path.outcome)
-        )  # fmt: skip
-
+    check = partial(result.check, params=params, path=item.path)
     one_row = params["formulation"] == "bars-and-hinges"
-    add("largest distance of kappa from Eq. 5.3, pi/3 to flat", item.departure(MODERATE), "", 0.0,
-        SOURCE + ": isometric", TOLERANCE)  # fmt: skip
+    check(
+        "largest distance of kappa from Eq. 5.3, pi/3 to flat",
+        item.departure(MODERATE),
+        reference=0.0,
+        source=SOURCE + ": isometric",
+        tolerance=TOLERANCE,
+    )
     for fraction in (4.0, 10.0, 20.0, 40.0) if params["c_s"] == 1.0 else ():
         at = int(np.argmin(np.abs(item.turned - math.pi / fraction)))
-        add(
+        check(
             f"kappa over that of Eq. 5.3, pi/{fraction:g}",
-            float(item.ratio[at] / item.isometric[at]),
-            "",
-            None,
-            SOURCE + ": departs",
-            None,
+            item.ratio[at] / item.isometric[at],
+            source=SOURCE + ": departs",
         )
-    add("kappa over kappa_0 at pi/200", float(item.ratio[-1]), "", None, SOURCE + ": goes to 0", None)
-    add("opening of the panels at pi/200, over the angle at the crease", float(item.opening[-1] / item.turned[-1]), "",
-        None, "1 if panels stay straight across the crease", None)  # fmt: skip
+    check("kappa over kappa_0 at pi/200", item.ratio[-1], source=SOURCE + ": goes to 0")
+    check(
+        "opening of the panels at pi/200, over the angle at the crease",
+        item.opening[-1] / item.turned[-1],
+        source="1 if panels stay straight across the crease",
+    )
     if len(item.phi) < len(MANY):
         return
     angle, height = item.peak()
     falls = float(item.ratio[-1] < 0.9 * item.ratio.max())
-    add("kappa falls from its peak when the crease is closed", falls, "", 1.0, SOURCE + ": flattens",
-        0.0 if one_row else None)  # fmt: skip
+    check(
+        "kappa falls from its peak when the crease is closed",
+        falls,
+        reference=1.0,
+        source=SOURCE + ": flattens",
+        tolerance=0.0 if one_row else None,
+    )
     if math.isfinite(angle):
-        add(
+        check(
             "dihedral angle at the peak of kappa",
             angle,
-            "rad",
-            math.pi / 50.0,
-            SOURCE + ": after about pi/50",
-            None,
+            unit="rad",
+            reference=math.pi / 50.0,
+            source=SOURCE + ": after about pi/50",
         )
-    add("largest kappa over kappa_0", height, "", None, SOURCE, None)
+    check("largest kappa over kappa_0", height)
     over = bool((item.stretching > item.bending).any() and item.bending[-1] < item.bending.max())
-    add(
+    check(
         "stretching overtakes bending, which falls",
-        float(over),
-        "",
-        1.0,
-        SOURCE + " (c)",
-        0.0 if one_row else None,
+        over,
+        reference=1.0,
+        source=SOURCE + " (c)",
+        tolerance=0.0 if one_row else None,
     )
 
 
@@ -222,14 +246,24 @@ def _valley(
     item = curve(formulation, cells, 1.0, fractions, valley=True)
     params = {"formulation": formulation, "along": cells[0], "rows": cells[1], "c_s": 1.0, "fold": "valley"}
     worst = float(np.abs(item.ratio / mountain.ratio - 1.0).max())
-    result.checks.append(
-        Check(CASE, "largest difference of kappa, valley and mountain", params, worst, "", 0.0, "mirror symmetry", 1e-5,
-              **cost_of(item.path), outcome=item.path.outcome)
-    )  # fmt: skip
-    result.checks.append(
-        Check(CASE, "largest distance of kappa from Eq. 5.3, flat to 5 pi/3", params, item.departure(MODERATE), "", 0.0,
-              SOURCE + ": isometric", TOLERANCE, **cost_of(item.path), outcome=item.path.outcome)
-    )  # fmt: skip
+    result.check(
+        "largest difference of kappa, valley and mountain",
+        worst,
+        reference=0.0,
+        source="mirror symmetry",
+        tolerance=1e-5,
+        params=params,
+        path=item.path,
+    )
+    result.check(
+        "largest distance of kappa from Eq. 5.3, flat to 5 pi/3",
+        item.departure(MODERATE),
+        reference=0.0,
+        source=SOURCE + ": isometric",
+        tolerance=TOLERANCE,
+        params=params,
+        path=item.path,
+    )
 
 
 def _densities(result: CaseResult, formulation: str, found: dict[tuple[str, int, float], Curve]) -> None:
@@ -238,24 +272,33 @@ def _densities(result: CaseResult, formulation: str, found: dict[tuple[str, int,
     for least, name in ((MODERATE, "pi/3 to flat"), (0.0, "all angles")):
         kept = fine.turned >= least - 1e-9
         worst = float(np.abs(coarse.ratio / fine.ratio - 1.0)[kept].max())
-        result.checks.append(
-            Check(CASE, f"largest change of kappa with the mesh, {name}", {"formulation": formulation}, worst, "", None,
-                  "coarse against fine", None, **cost_of(fine.path), outcome=fine.path.outcome)
-        )  # fmt: skip
+        result.check(
+            f"largest change of kappa with the mesh, {name}",
+            worst,
+            source="coarse against fine",
+            params={"formulation": formulation},
+            path=fine.path,
+        )
 
 
 def _stiffer(result: CaseResult, found: dict[tuple[str, int, float], Curve]) -> None:
     """Stiffer stretching: more curvature before it falls."""
     for formulation in ("bars-and-hinges", "consistent"):
         peaks = [found[formulation, 1, factor].peak()[1] for factor in FACTORS]
-        result.checks.append(
-            Check(CASE, "largest kappa rises with c_s", {"formulation": formulation},
-                  float(peaks == sorted(peaks)), "", 1.0, SOURCE + " (b)", 0.0)
-        )  # fmt: skip
-        result.checks.append(
-            Check(CASE, "largest kappa, c_s = 1.5 over 0.5", {"formulation": formulation}, peaks[-1] / peaks[0], "",
-                  None, SOURCE + " (b)", None)
-        )  # fmt: skip
+        result.check(
+            "largest kappa rises with c_s",
+            peaks == sorted(peaks),
+            reference=1.0,
+            source=SOURCE + " (b)",
+            tolerance=0.0,
+            params={"formulation": formulation},
+        )
+        result.check(
+            "largest kappa, c_s = 1.5 over 0.5",
+            peaks[-1] / peaks[0],
+            source=SOURCE + " (b)",
+            params={"formulation": formulation},
+        )
 
 
 def _plots(result: CaseResult, found: dict[tuple[str, int, float], Curve]) -> None:
@@ -277,13 +320,26 @@ def _plots(result: CaseResult, found: dict[tuple[str, int, float], Curve]) -> No
     open_.append(line("straight panels", [0.9, 180.0], [0.9, 180.0], "reference"))
     angle = "dihedral angle of the crease, degrees"
     result.plots += [
-        plot("fig5-3-curvature", "Curvature in the middle of the crease", angle, "kappa / kappa_0", series,
-             "Fig. 5.3 (a, b). One row of bars and hinges flattens, sheets that bend across the crease do not.",
-             log="xy"),
+        plot(
+            "fig5-3-curvature",
+            "Curvature in the middle of the crease",
+            angle,
+            "kappa / kappa_0",
+            series,
+            "Fig. 5.3 (a, b). One row of bars and hinges flattens, sheets that bend across the crease do not.",
+            log="xy",
+        ),
         plot("fig5-3-energy", "Energies", angle, "N mm", energy, "Fig. 5.3 (c), c_s = 1.", log="xy"),
-        plot("fig5-3-opening", "Angle between the panels, from the crease to their edges", angle, "degrees", open_,
-             "In the middle of the sheet. Panels that bend across the crease stay apart when it closes.", log="xy"),
-    ]  # fmt: skip
+        plot(
+            "fig5-3-opening",
+            "Angle between the panels, from the crease to their edges",
+            angle,
+            "degrees",
+            open_,
+            "In the middle of the sheet. Panels that bend across the crease stay apart when it closes.",
+            log="xy",
+        ),
+    ]
 
 
 def _pictures(result: CaseResult, context: Context, found: dict[tuple[str, int, float], Curve]) -> None:
@@ -295,9 +351,12 @@ def _pictures(result: CaseResult, context: Context, found: dict[tuple[str, int, 
             title = f"{formulation}, pi/{fraction:g}: kappa = {item.ratio[at]:.3g} kappa_0"
             picture(item.states[at], context.folder / file, "stretching", (900, 560), caption=title)
             result.pictures.append(
-                {"file": file, "alt": f"The annulus folded to pi/{fraction:g}, {formulation}",
-                 "caption": f"Fig. 5.3 (d), {title}. Coloured by stretching energy."}
-            )  # fmt: skip
+                {
+                    "file": file,
+                    "alt": f"The annulus folded to pi/{fraction:g}, {formulation}",
+                    "caption": f"Fig. 5.3 (d), {title}. Coloured by stretching energy.",
+                }
+            )
 
 
 def _notes(result: CaseResult, found: dict[tuple[str, int, float], Curve]) -> None:

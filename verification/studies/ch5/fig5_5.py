@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import bh
 from verification.framework.checks import CaseResult, Context, line, plot
@@ -17,7 +20,6 @@ from verification.studies.ch5.pinching import (
     WAYS,
     Pinched,
     Way,
-    add,
     pinched,
     proportion,
     reached,
@@ -26,8 +28,22 @@ from verification.studies.ch5.pinching import (
 CURVATURES = tuple(0.0025 * i for i in range(21))  # 1/mm: 0 to 0.05
 SHOWN = (0.0, 0.0025, 0.01, 0.02, 0.035, 0.05)
 REFINED = (0.01, 0.02)  # more curved creases overlap themselves, so that their bend means little
+Array = NDArray[Any]
 SOURCE = "source 5.4.1"
 MIDDLE, TOP = "curvature in the middle of the zone over kappa_0", "largest curvature in the zone over kappa_0"
+MEASURES: tuple[tuple[str, str, Callable[[Pinched], float]], ...] = (
+    ("total energy", "N mm", lambda p: p.path[-1].energy.total),
+    ("peak curvature beyond the pinch", "1/mm", lambda p: p.peak(p.crease.curvature)[0]),
+    ("peak torsion beyond the pinch", "1/mm", lambda p: p.peak(p.crease.torsion)[0]),
+    ("change of the bending angle", "deg", lambda p: p.bend),
+    ("change of the twist angle", "deg", lambda p: p.twist),
+)
+PROFILES: tuple[tuple[str, str, str, Callable[[Pinched], Array]], ...] = (
+    ("phi", "Dihedral angle (Fig. 5.5 a)", "phi, degrees", lambda p: np.degrees(p.crease.dihedral)),
+    ("rate", "Fold rate (Fig. 5.5 b)", "phi', rad/mm", lambda p: p.crease.fold_rate),
+    ("kappa", "Curvature (Fig. 5.6 a)", "kappa, 1/mm", lambda p: p.crease.curvature),
+    ("tau", "Torsion (Fig. 5.7 a)", "tau, 1/mm", lambda p: p.crease.torsion),
+)
 Found = dict[tuple[str, tuple[int, int], float], Pinched]
 
 
@@ -73,13 +89,31 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: dict[flo
     source = way is AS_SOURCE and mesh == way.meshes[0]
     for name, values, figure in (("curvature", kappa, "5.6 (b)"), ("torsion", tau, "5.7 (b)")):
         whole = proportion(ks, values)
-        add(result, None, f"peak {name} beyond the pinch against kappa_0, R^2", whole.r2, "", 1.0,
-            f"{SOURCE}, Fig. {figure}: proportional", 0.05 if source else None, **params)  # fmt: skip
-        add(result, None, f"peak {name} beyond the pinch over kappa_0", whole.slope, "", None,
-            f"{SOURCE}, Fig. {figure}: slope not printed", **params)  # fmt: skip
+        result.check(
+            f"peak {name} beyond the pinch against kappa_0, R^2",
+            whole.r2,
+            reference=1.0,
+            source=f"{SOURCE}, Fig. {figure}: proportional",
+            tolerance=0.05 if source else None,
+            params=params,
+        )
+        result.check(
+            f"peak {name} beyond the pinch over kappa_0",
+            whole.slope,
+            source=f"{SOURCE}, Fig. {figure}: slope not printed",
+            params=params,
+        )
     flat = found[0.0]
-    add(result, flat, "torsion of the straight crease beyond the pinch", tau[0], "1/mm", 0.0,
-        SOURCE + ": none for kappa_0 = 0", 1e-3, **params)  # fmt: skip
+    result.check(
+        "torsion of the straight crease beyond the pinch",
+        tau[0],
+        unit="1/mm",
+        reference=0.0,
+        source=SOURCE + ": none for kappa_0 = 0",
+        tolerance=1e-3,
+        params=params,
+        path=flat.path,
+    )
     for k in (0.01, 0.02, 0.05):
         if k not in found:
             continue
@@ -87,27 +121,47 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: dict[flo
         c = p.crease
         where = {**params, "kappa_0_per_mm": k}
         before = float(np.median(folded_curvature(p)))
-        add(result, p, "smallest dihedral angle", float(p.path[-1].dihedral("crease").min()), "rad", PINCHED,
-            "imposed (5.3.2)", 1e-9, **where)  # fmt: skip
-        add(result, p, "curvature of the folded crease over that of Eq. 5.3", before / (k * math.sqrt(2.0)), "", 1.0,
-            "isometric at 90 degrees", 0.1, **where)  # fmt: skip
-        add(result, p, "largest curvature beyond the pinch over the folded one", p.peak(c.curvature)[0] / before, "",
-            None, SOURCE + ": increases drastically", **where)  # fmt: skip
+        check = partial(result.check, params=where, path=p.path)
+        check(
+            "smallest dihedral angle",
+            p.path[-1].dihedral("crease").min(),
+            unit="rad",
+            reference=PINCHED,
+            source="imposed (5.3.2)",
+            tolerance=1e-9,
+        )
+        check(
+            "curvature of the folded crease over that of Eq. 5.3",
+            before / (k * math.sqrt(2.0)),
+            reference=1.0,
+            source="isometric at 90 degrees",
+            tolerance=0.1,
+        )
+        check(
+            "largest curvature beyond the pinch over the folded one",
+            p.peak(c.curvature)[0] / before,
+            source=SOURCE + ": increases drastically",
+        )
         inside = p.inside(c.curvature)
-        add(result, p, "curvature in the middle of the pinch over its largest on the crease",
-            float(inside[len(inside) // 2] / max(c.curvature[_off_ends(p)].max(), 1e-300)), "", None,
-            SOURCE + ": reduced inside the pinched zone", **where)  # fmt: skip
-        add(result, p, "distance beyond the zone over which the change of the dihedral angle falls to 1 / e",
-        reach(p), "mm", None,
-            SOURCE + ", Fig. 5.5 (a)", **where)  # fmt: skip
+        check(
+            "curvature in the middle of the pinch over its largest on the crease",
+            inside[len(inside) // 2] / max(c.curvature[_off_ends(p)].max(), 1e-300),
+            source=SOURCE + ": reduced inside the pinched zone",
+        )
+        check(
+            "distance beyond the zone over which the change of the dihedral angle falls to 1 / e",
+            reach(p),
+            unit="mm",
+            source=SOURCE + ", Fig. 5.5 (a)",
+        )
 
 
-def _off_ends(p: Pinched) -> np.ndarray:
+def _off_ends(p: Pinched) -> Array:
     u = p.crease.u
     return np.asarray((u > 8.0) & (u < u[-1] - 8.0))
 
 
-def folded_curvature(p: Pinched) -> np.ndarray:
+def folded_curvature(p: Pinched) -> Array:
     """Curvature of the folded crease before the pinch, off its ends, 1/mm."""
     c = bh.creases.along(p.folded, "crease")
     return np.asarray(c.curvature[(c.u > 8.0) & (c.u < c.u[-1] - 8.0)])
@@ -131,11 +185,24 @@ def _valley(result: CaseResult) -> None:
             pinched(way, way.meshes[0], 0.01, folds=[fold]) for fold in ("mountain", "valley")
         )
         params: dict[str, Any] = {"way": way.name, "kappa_0_per_mm": 0.01}
-        add(result, valley, "twist of a pinched valley over that of the mountain", valley.twist / mountain.twist,
-        "", -1.0,
-            SOURCE + ": the other way", 1e-6, **params)  # fmt: skip
-        add(result, valley, "bend of a pinched valley over that of the mountain", valley.bend / mountain.bend, "", 1.0,
-            SOURCE + ": both towards the centre of curvature", 1e-6, **params)  # fmt: skip
+        result.check(
+            "twist of a pinched valley over that of the mountain",
+            valley.twist / mountain.twist,
+            reference=-1.0,
+            source=SOURCE + ": the other way",
+            tolerance=1e-6,
+            params=params,
+            path=valley.path,
+        )
+        result.check(
+            "bend of a pinched valley over that of the mountain",
+            valley.bend / mountain.bend,
+            reference=1.0,
+            source=SOURCE + ": both towards the centre of curvature",
+            tolerance=1e-6,
+            params=params,
+            path=valley.path,
+        )
 
 
 def _errors(result: CaseResult, context: Context, found: Found) -> None:
@@ -154,19 +221,19 @@ def _errors(result: CaseResult, context: Context, found: Found) -> None:
             "along": finest[0],
             "rows": finest[1],
         }
-        for name, unit, read in (
-            ("total energy", "N mm", lambda p: p.path[-1].energy.total),
-            ("peak curvature beyond the pinch", "1/mm", lambda p: p.peak(p.crease.curvature)[0]),
-            ("peak torsion beyond the pinch", "1/mm", lambda p: p.peak(p.crease.torsion)[0]),
-            ("change of the bending angle", "deg", lambda p: p.bend),
-            ("change of the twist angle", "deg", lambda p: p.twist),
-        ):
+        for name, unit, read in MEASURES:
             values = [read(p) for p in levels]
             to = limit(values)
-            add(result, best, name, values[-1], unit, None, "finest mesh", **params)
-            add(result, best, f"{name}: error bar over its value", to.bar / max(abs(values[-1]), 1e-300), "", 0.0,
-                f"meshes {', '.join(f'{v:.4g}' for v in values)}; rate {to.rate:.2g}",
-                0.1 if name == "total energy" and not context.quick else None, **params)  # fmt: skip
+            result.check(name, values[-1], unit=unit, source="finest mesh", params=params, path=best.path)
+            result.check(
+                f"{name}: error bar over its value",
+                to.bar / max(abs(values[-1]), 1e-300),
+                reference=0.0,
+                source=f"meshes {', '.join(f'{v:.4g}' for v in values)}; rate {to.rate:.2g}",
+                tolerance=0.1 if name == "total energy" and not context.quick else None,
+                params=params,
+                path=best.path,
+            )
 
 
 def _grip(result: CaseResult) -> None:
@@ -184,18 +251,16 @@ def _grip(result: CaseResult) -> None:
         alpha = mesh[0] / mesh[1] / 20.0
         excess = (alpha + 1.0 / alpha) ** 2
         note = f"consistent with the same grip, 100 x 2; strips in torsion: {excess:.0f} times too stiff"
-        add(
-            result,
-            p,
+        check = partial(result.check, params=params, path=p.path)
+        check(
             "total energy",
             p.path[-1].energy.total,
-            "N mm",
-            exact.path[-1].energy.total,
-            note,
-            **params,
+            unit="N mm",
+            reference=exact.path[-1].energy.total,
+            source=note,
         )
-        add(result, p, "reach of the pinch along the crease", reach(p), "mm", None, note, **params)
-        add(result, p, "change of the bending angle", p.bend, "deg", exact.bend, note, **params)
+        check("reach of the pinch along the crease", reach(p), unit="mm", source=note)
+        check("change of the bending angle", p.bend, unit="deg", reference=exact.bend, source=note)
 
 
 def _couples(result: CaseResult) -> None:
@@ -217,23 +282,19 @@ def _couples(result: CaseResult) -> None:
                 "kappa_0_per_mm": 0.01,
             }
             smallest = float(p.path[-1].dihedral("crease").min())
-            add(
-                result,
-                p,
+            check = partial(result.check, params=params, path=p.path)
+            check(
                 "smallest dihedral angle",
                 smallest,
-                "rad",
-                PINCHED,
-                "reached by couples",
-                1e-3,
-                **params,
+                unit="rad",
+                reference=PINCHED,
+                source="reached by couples",
+                tolerance=1e-3,
             )
-            add(result, p, "total energy", p.path[-1].energy.total, "N mm", None, "by couples", **params)
-            add(
-                result, p, "reach of the pinch along the crease", reach(p), "mm", None, "by couples", **params
-            )
-            add(result, p, "change of the bending angle", p.bend, "deg", None, "by couples", **params)
-            add(result, p, "change of the twist angle", p.twist, "deg", None, "by couples", **params)
+            check("total energy", p.path[-1].energy.total, unit="N mm", source="by couples")
+            check("reach of the pinch along the crease", reach(p), unit="mm", source="by couples")
+            check("change of the bending angle", p.bend, unit="deg", source="by couples")
+            check("change of the twist angle", p.twist, unit="deg", source="by couples")
 
 
 def _flattening(result: CaseResult) -> None:
@@ -251,22 +312,28 @@ def _flattening(result: CaseResult) -> None:
                 "rows": mesh[1],
                 "kappa_0_per_mm": 0.01,
             }
-            add(result, p, MIDDLE, float(inside[len(inside) // 2]), "", None,
-                SOURCE + ": significantly reduced", **params)  # fmt: skip
-            add(result, p, TOP, float(inside.max()), "",
-                1.0 / math.sin(0.5 * PINCHED), "Eq. 5.3 at the pinched angle", **params)  # fmt: skip
+            result.check(
+                MIDDLE,
+                inside[len(inside) // 2],
+                source=SOURCE + ": significantly reduced",
+                params=params,
+                path=p.path,
+            )
+            result.check(
+                TOP,
+                inside.max(),
+                reference=1.0 / math.sin(0.5 * PINCHED),
+                source="Eq. 5.3 at the pinched angle",
+                params=params,
+                path=p.path,
+            )
 
 
 def _plots(result: CaseResult, found: Found) -> None:
     for way in WAYS:
         mesh = way.meshes[-1] if way is CONVERGED else way.meshes[0]
         shown = {k: found[way.name, mesh, k] for k in SHOWN if (way.name, mesh, k) in found}
-        for key, title, unit, read in (
-            ("phi", "Dihedral angle (Fig. 5.5 a)", "phi, degrees", lambda p: np.degrees(p.crease.dihedral)),
-            ("rate", "Fold rate (Fig. 5.5 b)", "phi', rad/mm", lambda p: p.crease.fold_rate),
-            ("kappa", "Curvature (Fig. 5.6 a)", "kappa, 1/mm", lambda p: p.crease.curvature),
-            ("tau", "Torsion (Fig. 5.7 a)", "tau, 1/mm", lambda p: p.crease.torsion),
-        ):
+        for key, title, unit, profile in PROFILES:
             series = []
             for k, p in shown.items():
                 keep = _off_ends(p) & (
@@ -278,13 +345,19 @@ def _plots(result: CaseResult, found: Found) -> None:
                     line(
                         f"kappa_0 = {k:g} /mm",
                         (p.crease.u / p.crease.u[-1])[keep].tolist(),
-                        read(p)[keep].tolist(),
+                        profile(p)[keep].tolist(),
                     )
                 )
             result.plots.append(
-                plot(f"fig5-5-{key}-{way.formulation}", f"{title}, {way.name}", "u / L", unit, series,
-                     f"{way.formulation}, {way.profile} of {way.zone:g} mm, {mesh[0]} x {mesh[1]} cells.")
-            )  # fmt: skip
+                plot(
+                    f"fig5-5-{key}-{way.formulation}",
+                    f"{title}, {way.name}",
+                    "u / L",
+                    unit,
+                    series,
+                    f"{way.formulation}, {way.profile} of {way.zone:g} mm, {mesh[0]} x {mesh[1]} cells.",
+                )
+            )
     for key, title, name in (
         ("kappa", "Peak curvature (Fig. 5.6 b)", "curvature"),
         ("tau", "Peak torsion (Fig. 5.7 b)", "torsion"),
@@ -298,9 +371,15 @@ def _plots(result: CaseResult, found: Found) -> None:
                 ]
                 series.append(line(f"{way.name}, {mesh[0]} x {mesh[1]}", ks, peaks))
         result.plots.append(
-            plot(f"fig5-5-peak-{key}", title, "kappa_0, 1/mm", f"largest {name} beyond the pinch, 1/mm", series,
-                 "Read from 4 mm beyond the pinched zone, where finite differences do not reach into it.")
-        )  # fmt: skip
+            plot(
+                f"fig5-5-peak-{key}",
+                title,
+                "kappa_0, 1/mm",
+                f"largest {name} beyond the pinch, 1/mm",
+                series,
+                "Read from 4 mm beyond the pinched zone, where finite differences do not reach into it.",
+            )
+        )
 
 
 def _notes(result: CaseResult, found: Found) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from verification.framework.checks import CaseResult, Context
@@ -12,7 +13,6 @@ from verification.studies.ch5.pinching import (
     WAYS,
     Pinched,
     Way,
-    add,
     angle_plots,
     pinched,
     reached,
@@ -57,13 +57,25 @@ def _angles(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
             p = found[way.name, mesh, n, k]
             fine = found.get((way.name, finest, n, k)) if mesh != finest else None
             params: dict[str, Any] = {
-                "way": way.name, "along": mesh[0], "rows": mesh[1], "creases": n, "kappa_0_per_mm": k,
-            }  # fmt: skip
+                "way": way.name,
+                "along": mesh[0],
+                "rows": mesh[1],
+                "creases": n,
+                "kappa_0_per_mm": k,
+            }
             for name, value, other in (
                 ("change of the bending angle", p.bend, None if fine is None else fine.bend),
                 ("change of the twist angle", p.twist, None if fine is None else fine.twist),
             ):
-                add(result, p, name, value, "deg", other, "the finer mesh of this formulation", **params)
+                result.check(
+                    name,
+                    value,
+                    unit="deg",
+                    reference=other,
+                    source="the finer mesh of this formulation",
+                    params=params,
+                    path=p.path,
+                )
 
 
 def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -> None:
@@ -73,20 +85,33 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
     odd, even = NUMBERS[::2], NUMBERS[1::2]
     judged = 0.0 if mesh == way.judged else None
 
+    check = partial(result.check, params=params)
+
     def claim(quantity: str, holds: bool, of_both: bool = True) -> None:
         """Those that hold with the source's model only are reported of the other one."""
         tolerance = judged if of_both or way is AS_SOURCE else None
-        add(result, None, quantity, float(holds), "", 1.0, SOURCE, tolerance, **params)
+        check(quantity, holds, reference=1.0, tolerance=tolerance)
 
     for most in (4, 7):
-        claim(f"odd and even numbers up to {most} twist to opposite sides (kappa_0 > 0)",
-              all(get[n, k].twist > 0.0 for n in odd for k in CURVATURES[1:] if n <= most)
-              and all(get[n, k].twist < 0.0 for n in even for k in CURVATURES if n <= most), most == 4)  # fmt: skip
-    claim("every even number twists more than its odd neighbours (kappa_0 = 0.005 /mm)",
-          all(abs(get[n, 0.005].twist) > abs(get[m, 0.005].twist) for n in even for m in (n - 1, n + 1)))  # fmt: skip
+        claim(
+            f"odd and even numbers up to {most} twist to opposite sides (kappa_0 > 0)",
+            all(get[n, k].twist > 0.0 for n in odd for k in CURVATURES[1:] if n <= most)
+            and all(get[n, k].twist < 0.0 for n in even for k in CURVATURES if n <= most),
+            most == 4,
+        )
+    claim(
+        "every even number twists more than its odd neighbours (kappa_0 = 0.005 /mm)",
+        all(abs(get[n, 0.005].twist) > abs(get[m, 0.005].twist) for n in even for m in (n - 1, n + 1)),
+    )
     flat = max(abs(get[n, 0.0].twist) for n in odd)
-    add(result, None, "largest twist of an odd number of straight creases", flat, "deg", 0.0, SOURCE + ": none",
-        0.05 if judged is not None else None, **params)  # fmt: skip
+    check(
+        "largest twist of an odd number of straight creases",
+        flat,
+        unit="deg",
+        reference=0.0,
+        source=SOURCE + ": none",
+        tolerance=0.05 if judged is not None else None,
+    )
     for name, numbers in (("odd", odd[1:]), ("even", even)):
         sizes = [abs(get[n, 0.01].twist) for n in numbers]
         claim(
@@ -95,18 +120,19 @@ def _claims(result: CaseResult, way: Way, mesh: tuple[int, int], found: Found) -
         )
     for k in CURVATURES[1:]:
         bends = [get[n, k].bend for n in NUMBERS]
-        add(result, None, "largest bend of any number of creases over the smallest", max(bends) / min(bends), "", 1.0,
-            SOURCE + ": not strongly related", kappa_0_per_mm=k, **params)  # fmt: skip
+        result.check(
+            "largest bend of any number of creases over the smallest",
+            max(bends) / min(bends),
+            reference=1.0,
+            source=SOURCE + ": not strongly related",
+            params={"kappa_0_per_mm": k, **params},
+        )
     ratio = sum(get[n, 0.01].bend / get[n, 0.005].bend for n in NUMBERS) / len(NUMBERS)
-    add(
-        result,
-        None,
+    check(
         "bend at 0.01 /mm over that at 0.005 /mm, mean",
         ratio,
-        "",
-        2.0,
-        "proportional to kappa_0",
-        **params,
+        reference=2.0,
+        source="proportional to kappa_0",
     )
 
 
@@ -115,8 +141,15 @@ def _plots(result: CaseResult, found: Found) -> None:
         mesh = way.judged if (way.name, way.judged, 1, 0.0) in found else way.meshes[0]
         curves = {f"kappa_0 = {k:g} /mm": [found[way.name, mesh, n, k] for n in NUMBERS] for k in CURVATURES}
         caption = f"{way.formulation}, {mesh[0]} x {mesh[1]} cells a panel (Fig. 5.9)."
-        angle_plots(result, "fig5-9", f", {way.name}", ("number of creases", NUMBERS), curves, caption,
-                    f"-{way.formulation}")  # fmt: skip
+        angle_plots(
+            result,
+            "fig5-9",
+            f", {way.name}",
+            ("number of creases", NUMBERS),
+            curves,
+            caption,
+            f"-{way.formulation}",
+        )
 
 
 def _pictures(result: CaseResult, context: Context, found: Found) -> None:
@@ -134,10 +167,13 @@ def _pictures(result: CaseResult, context: Context, found: Found) -> None:
             caption=f"{n} straight creases, pinched",
         )
         result.pictures.append(
-            {"file": file, "alt": f"Sheet with {n} straight creases, pinched in the middle",
-             "caption": f"{n} straight creases: the change of the twist angle is {p.twist:.1f} degrees (Fig. "
-             "5.9 c, d)."}
-        )  # fmt: skip
+            {
+                "file": file,
+                "alt": f"Sheet with {n} straight creases, pinched in the middle",
+                "caption": f"{n} straight creases: the change of the twist angle is {p.twist:.1f} degrees (Fig. "
+                "5.9 c, d).",
+            }
+        )
 
 
 def _notes(result: CaseResult, found: Found) -> None:

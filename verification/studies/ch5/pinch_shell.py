@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,14 @@ from bh.applications.inverse.transforms import frame
 from meshes.curves import arc_lengths
 from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Context, line, plot
-from verification.studies.ch5.pinching import AS_SOURCE, CONVERGED, Pinched, Way, add, pinched
+from verification.studies.ch5.pinching import AS_SOURCE, CONVERGED, Pinched, Stiffness, Way, pinched
 
 Array = NDArray[np.float64]
 SHEETS = ((1, 0.005), (1, 0.01), (1, 0.02), (2, 0.01))  # creases, kappa_0 in 1/mm
 SHELL = Way("shell", "shell", "cosine", CONVERGED.zone, ((50, 1), (50, 2), (100, 2)))
 BARS = Way("bars and hinges", "bars-and-hinges", "cosine", CONVERGED.zone, ((100, 1), (200, 2)))
 CONSISTENT = Way("consistent", "consistent", "cosine", CONVERGED.zone, ((50, 1), (100, 2), (200, 4)))
-SEGMENTS, THIN = (0.005, 0.015), bh.Sheet(E=4000.0, t=0.1)
+SEGMENTS, THIN = (0.005, 0.015), Stiffness(bh.Sheet(E=4000.0, t=0.1), Lstar=0.5)
 SMALL = 1.0  # degrees of twist that is left where bend and torsion turn the end to opposite sides
 OFF = 8.0  # mm at either end where finite differences are not to be used
 
@@ -45,9 +46,19 @@ def run(context: Context) -> CaseResult:
             for mesh in way.meshes[:2] if context.quick else way.meshes:
                 found = pinched(way, mesh, k, creases)
                 judged = way is CONSISTENT and mesh == way.meshes[-1] and not context.quick
-                _compare(result, found, judges[-1], judged,
-                         {"formulation": way.name, "along": mesh[0], "rows": mesh[1], "creases": creases,
-                          "kappa_0_per_mm": k})  # fmt: skip
+                _compare(
+                    result,
+                    found,
+                    judges[-1],
+                    judged,
+                    {
+                        "formulation": way.name,
+                        "along": mesh[0],
+                        "rows": mesh[1],
+                        "creases": creases,
+                        "kappa_0_per_mm": k,
+                    },
+                )
                 shown[f"{way.name}, {mesh[0]} x {mesh[1]}"] = found
         _plots(result, shown, creases, k)
     for k in SEGMENTS[:1] if context.quick else SEGMENTS:
@@ -59,30 +70,40 @@ def run(context: Context) -> CaseResult:
 
 def _segment(result: CaseResult, k: float, finest: tuple[int, int]) -> None:
     """Where the end of a segment of 100 mm goes, in the frame at its start (source 6.2.4: t = 0.1, L* = 0.5 mm)."""
-    judge = pinched(SHELL, finest, k, sheet=THIN, Lstar=0.5)
+    judge = pinched(SHELL, finest, k, stiffness=THIN)
     last = (100, 2) if finest == (50, 1) else (200, 4)
     for way, mesh in ((BARS, (100, 1)), (AS_SOURCE, (100, 1)), (CONSISTENT, (100, 1)), (CONSISTENT, last)):
-        found = pinched(way, mesh, k, sheet=THIN, Lstar=0.5)
+        found = pinched(way, mesh, k, stiffness=THIN)
         params: dict[str, Any] = {
-            "formulation": way.name, "along": mesh[0], "rows": mesh[1], "kappa_0_per_mm": k, "t_mm": THIN.t,
-        }  # fmt: skip
+            "formulation": way.name,
+            "along": mesh[0],
+            "rows": mesh[1],
+            "kappa_0_per_mm": k,
+            "t_mm": THIN.sheet.t,
+        }
         apart = tip(found) - tip(judge)
         source = "shell of the same pinch" if way is not AS_SOURCE else "shell pinched by the raised cosine"
         judged = 1.5 if way is CONSISTENT and mesh == last else None
         away = float(np.linalg.norm(apart))
-        add(
-            result,
-            found,
+        result.check(
             "segment: distance of its end from the shell's",
             away,
-            "mm",
-            0.0,
-            source,
-            judged,
-            **params,
+            unit="mm",
+            reference=0.0,
+            source=source,
+            tolerance=judged,
+            params=params,
+            path=found.path,
         )
-        add(result, found, "segment: height of its end over the plane at its start", float(tip(found)[2]), "mm",
-            float(tip(judge)[2]), source, **params)  # fmt: skip
+        result.check(
+            "segment: height of its end over the plane at its start",
+            tip(found)[2],
+            unit="mm",
+            reference=float(tip(judge)[2]),
+            source=source,
+            params=params,
+            path=found.path,
+        )
 
 
 def tip(p: Pinched) -> Array:
@@ -90,7 +111,8 @@ def tip(p: Pinched) -> Array:
     state = p.path[-1]
     places = ("crease:crease", "edge:outer", "edge:inner")
     point, left, right = (state.points[state.mesh.nodes(place)[0]] for place in places)
-    return frame(point, left, right).T @ (state.crease_points("crease")[-1] - point)
+    end: Array = frame(point, left, right).T @ (state.crease_points("crease")[-1] - point)
+    return end
 
 
 def _own_error(result: CaseResult, judges: list[Pinched], creases: int, k: float) -> None:
@@ -103,7 +125,16 @@ def _own_error(result: CaseResult, judges: list[Pinched], creases: int, k: float
         ("change of the twist angle", "deg", last.twist, before.twist),
     ):
         small = unit == "deg" and abs(a) < SMALL
-        add(result, last, name, a, unit, b, "coarser mesh of the shell", None if small else 0.1, **params)
+        result.check(
+            name,
+            a,
+            unit=unit,
+            reference=b,
+            source="coarser mesh of the shell",
+            tolerance=None if small else 0.1,
+            params=params,
+            path=last.path,
+        )
 
 
 def _compare(
@@ -111,46 +142,58 @@ def _compare(
 ) -> None:
     source = "shell, finest mesh of this case"
     mine, its = found.path[-1].energy, judge.path[-1].energy
+    check = partial(result.check, params=params, path=found.path)
     for name in ("total", "bending", "stretching", "folding"):
-        add(result, found, f"{name} energy", getattr(mine, name), "N mm", getattr(its, name), source,
-            0.1 if judged and name in ("total", "bending") else None, **params)  # fmt: skip
-    add(
-        result,
-        found,
+        check(
+            f"{name} energy",
+            getattr(mine, name),
+            unit="N mm",
+            reference=getattr(its, name),
+            source=source,
+            tolerance=0.1 if judged and name in ("total", "bending") else None,
+        )
+    check(
         "change of the bending angle",
         found.bend,
-        "deg",
-        judge.bend,
-        source,
-        0.03 if judged else None,
-        **params,
+        unit="deg",
+        reference=judge.bend,
+        source=source,
+        tolerance=0.03 if judged else None,
     )
-    add(
-        result,
-        found,
+    check(
         "change of the twist angle",
         found.twist,
-        "deg",
-        judge.twist,
-        source,
-        0.1 if judged and abs(judge.twist) > SMALL else None,
-        **params,
+        unit="deg",
+        reference=judge.twist,
+        source=source,
+        tolerance=0.1 if judged and abs(judge.twist) > SMALL else None,
     )
     for name in ("curvature", "torsion"):
         a, b = (_profile(p, name) for p in (found, judge))
         apart = float(np.sqrt(np.mean((a - b) ** 2)) / np.abs(b).max())
-        add(result, found, f"{name} along the crease, root mean square difference over the largest", apart, "", 0.0,
-            source, {"curvature": 0.03}.get(name) if judged else None, **params)  # fmt: skip
+        check(
+            f"{name} along the crease, root mean square difference over the largest",
+            apart,
+            reference=0.0,
+            source=source,
+            tolerance={"curvature": 0.03}.get(name) if judged else None,
+        )
     apart = end_distance(found, judge)
-    add(result, found, "distance of the ends of the creases over their length", apart, "", 0.0, source,
-        0.01 if judged else None, **params)  # fmt: skip
+    check(
+        "distance of the ends of the creases over their length",
+        apart,
+        reference=0.0,
+        source=source,
+        tolerance=0.01 if judged else None,
+    )
 
 
 def _profile(p: Pinched, name: str) -> Array:
     """Curvature or torsion at every millimetre off the ends."""
     c = bh.creases.along(p.path[-1], p.path.model.mesh.creases[0])
     share = c.u / c.u[-1]
-    return np.interp(np.arange(OFF, 100.0 - OFF + 0.5) / 100.0, share, getattr(c.curve, name))
+    values: Array = np.interp(np.arange(OFF, 100.0 - OFF + 0.5) / 100.0, share, getattr(c.curve, name))
+    return values
 
 
 def end_distance(found: Pinched, judge: Pinched) -> float:
@@ -180,17 +223,26 @@ def _plots(result: CaseResult, shown: dict[str, Pinched], creases: int, k: float
                 values = np.clip(values, -0.2, 0.2)
             series.append(line(label, u, values.tolist(), "reference" if label == "shell" else "line"))
         result.plots.append(
-            plot(f"pinch-shell-{name}-{creases}-{k:g}", f"{name.capitalize()}, {which}", "u / L", unit, series,
-                 "First crease; pinched to pi / 14 by a raised cosine of 20 mm.")
-        )  # fmt: skip
+            plot(
+                f"pinch-shell-{name}-{creases}-{k:g}",
+                f"{name.capitalize()}, {which}",
+                "u / L",
+                unit,
+                series,
+                "First crease; pinched to pi / 14 by a raised cosine of 20 mm.",
+            )
+        )
 
 
 def _notes(result: CaseResult) -> None:
     ratios = {
-        name: [c.value / c.reference for c in result.checks
-               if c.quantity == "total energy" and c.reference and c.params["formulation"] == name]
+        name: [
+            c.value / c.reference
+            for c in result.checks
+            if c.quantity == "total energy" and c.reference and c.params["formulation"] == name
+        ]
         for name in (BARS.name, CONSISTENT.name)
-    }  # fmt: skip
+    }
 
     def span(name: str, figures: int) -> str:
         return f"{min(ratios[name]):.{figures}f} to {max(ratios[name]):.{figures}f}"

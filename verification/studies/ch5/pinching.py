@@ -15,7 +15,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ import bh
 import meshes
 from bh import Model, Path, Sheet, State, trace
 from bh.analysis.midplane import MidPlane, midplane
-from verification.framework.checks import CaseResult, Check, line, plot
+from verification.framework.checks import CaseResult, line, plot
 
 Array = NDArray[np.float64]
 LENGTH, SPACING, LSTAR = 100.0, 5.0, 2.0  # mm (5.3.2)
@@ -48,9 +47,8 @@ class Way:
     zone: float
     meshes: tuple[tuple[int, int], ...]
     judged: tuple[int, int] = (100, 1)  # the source's own mesh, or the finer one of a way that converges
-    couple: float | None = (
-        None  # N mm / mm, more than is needed, where couples close the crease and nothing is held
-    )
+    # N mm / mm, more than is needed, where couples close the crease and nothing is held
+    couple: float | None = None
 
     def taken(self, quick: bool) -> tuple[tuple[int, int], ...]:
         """Meshes of a run."""
@@ -71,6 +69,7 @@ class Pinched:
 
     @property
     def reached(self) -> bool:
+        """Whether it was folded and pinched to the end."""
         return self.path.reached
 
     @cached_property
@@ -105,7 +104,7 @@ class Pinched:
     def beyond(self) -> NDArray[np.bool_]:
         """(k,) nodes of the right half, beyond the pinched zone and off the end."""
         s = self.crease.u - 0.5 * self.crease.u[-1]
-        return (s > 0.5 * self.zone + CLEAR) & (s < 0.5 * self.crease.u[-1] - END)
+        return np.asarray((s > 0.5 * self.zone + CLEAR) & (s < 0.5 * self.crease.u[-1] - END))
 
     def peak(self, values: Array) -> tuple[float, float]:
         """Value of largest size beyond the zone, and its distance from the middle, mm."""
@@ -118,26 +117,45 @@ class Pinched:
         return np.asarray(values[np.abs(self.crease.u - 0.5 * self.crease.u[-1]) <= 0.5 * self.zone])
 
 
+@dataclass(frozen=True)
+class Stiffness:
+    """What a sheet is made of, and the length scale of its creases, mm."""
+
+    sheet: Sheet = SHEET
+    Lstar: float = LSTAR
+
+
+OF_5_3 = Stiffness()
+
+
 def pinched(
     way: Way,
     mesh: tuple[int, int],
     curvature: float,
     creases: int = 1,
     spacing: float = SPACING,
-    sheet: Sheet = SHEET,
+    stiffness: Stiffness = OF_5_3,
     left: float = PINCHED,
     folds: Sequence[str] | None = None,
-    Lstar: float = LSTAR,
 ) -> Pinched:
     """Fold all creases to 90 degrees by the rest angle of their springs, then pinch their middles.
 
     Args:
+        way: formulation, and how the pinch is modelled.
+        mesh: cells along the creases, and rows a panel.
+        curvature: of the flat creases, 1/mm.
+        creases: how many.
+        spacing: of the creases, mm.
+        stiffness: of the sheet and its creases.
         left: dihedral angle that is left until closed, rad.
+        folds: "mountain" or "valley" of every crease; None alternates.
     """
     along, rows = mesh
     pattern = meshes.parallel_creases(curvature, LENGTH, spacing, creases, folds)  # type: ignore[arg-type]
-    model = Model(meshes.structured(pattern, along=along, rows=rows), sheet, formulation=way.formulation)
-    model = model.fold("all", by=FOLDED, Lstar=Lstar)
+    model = Model(
+        meshes.structured(pattern, along=along, rows=rows), stiffness.sheet, formulation=way.formulation
+    )
+    model = model.fold("all", by=FOLDED, Lstar=stiffness.Lstar)
     how = "imposed" if way.couple is None else "couple"
     path = trace(
         model.pinch(
@@ -149,10 +167,21 @@ def pinched(
 
 def reached(result: CaseResult, every: Sequence[Pinched]) -> None:
     """How many of all simulations ended early, and what they took."""
-    add(result, None, "simulations that did not reach their end", float(sum(not p.reached for p in every)), "", 0.0,
-        "none unconverged with default settings", 0.0, simulations=len(every))  # fmt: skip
-    add(result, None, "time of all of them, one thread", sum(p.path.wall_time_s for p in every), "s", None,
-        "target: all of Chapter 5 in 180 s on two cores", simulations=len(every))  # fmt: skip
+    result.check(
+        "simulations that did not reach their end",
+        sum(not p.reached for p in every),
+        reference=0.0,
+        source="none unconverged with default settings",
+        tolerance=0.0,
+        params={"simulations": len(every)},
+    )
+    result.check(
+        "time of all of them, one thread",
+        sum(p.path.wall_time_s for p in every),
+        unit="s",
+        source="target: all of Chapter 5 in 180 s on two cores",
+        params={"simulations": len(every)},
+    )
 
 
 @dataclass(frozen=True)
@@ -164,35 +193,11 @@ class Proportion:
 
 
 def proportion(x: Sequence[float], y: Sequence[float]) -> Proportion:
-    """y = slope x; R^2 is one less the squares that are left over those about the mean."""
+    """Fit y = slope x; R^2 is one less the squares that are left over those about the mean."""
     a, b = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     slope = float(a @ b / (a @ a))
     spread = float(((b - b.mean()) ** 2).sum())
     return Proportion(slope, 1.0 - float(((b - slope * a) ** 2).sum()) / max(spread, 1e-300))
-
-
-def add(
-    result: CaseResult,
-    found: Pinched | None,
-    quantity: str,
-    value: float,
-    unit: str,
-    reference: float | None,
-    source: str,
-    tolerance: float | None = None,
-    **params: Any,
-) -> None:
-    """One check; what it took and whether it was reached are those of `found`."""
-    cost: dict[str, Any] = {}
-    if found is not None:
-        path = found.path
-        cost = {
-            "unknowns": path.unknowns, "iterations": path.iterations, "wall_time_s": path.wall_time_s,
-            "outcome": path.outcome,
-        }  # fmt: skip
-    result.checks.append(
-        Check(result.name, quantity, params, value, unit, reference, source, tolerance, **cost)
-    )
 
 
 def angle_plots(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from bh.applications.inverse.simulate import SegmentTask, simulate
 from bh.applications.inverse.surrogate import SHIPPED, Surrogate, shipped
 from bh.applications.inverse.transforms import angles, matrix
 from bh.sweep import load
-from verification.framework.checks import CaseResult, Check, Context
+from verification.framework.checks import CaseResult, Context
 
 Array = NDArray[np.float64]
 SOURCE = "source 6.2"
@@ -60,20 +61,13 @@ def run(context: Context) -> CaseResult:
     return result
 
 
-def _add(
-    result: CaseResult, quantity: str, value: float, unit: str, reference: float | None, tolerance: float | None,
-    source: str = SOURCE, **params: Any,
-) -> None:  # fmt: skip
-    result.checks.append(Check("forward", quantity, params, float(value), unit, reference, source, tolerance))
-
-
 def _rotations(result: CaseResult) -> None:
     r = Rotation.random(2000, random_state=1)
     off = np.abs(angles(r.as_matrix()) - r.as_euler("xyz")).max()
-    _add(result, "Eq. 6.14 to 6.16 against scipy's Rotation", off, "rad", 0.0, 1e-11)
+    result.check("Eq. 6.14 to 6.16 against scipy's Rotation", off, unit="rad", reference=0.0, tolerance=1e-11)
     uvw = np.array([[u, v, 0.0] for u in (-2.0, 0.3, 1.0) for v in (-0.5 * math.pi, 0.5 * math.pi)])
     back = np.abs(matrix(angles(matrix(uvw))) - matrix(uvw)).max()
-    _add(result, "the same where the tangent is vertical (gimbal lock)", back, "", 0.0, 1e-14)
+    result.check("the same where the tangent is vertical (gimbal lock)", back, reference=0.0, tolerance=1e-14)
 
 
 def _data(result: CaseResult, data: Any) -> None:
@@ -84,27 +78,39 @@ def _data(result: CaseResult, data: Any) -> None:
         for k, s, v in zip(data["k0"].values, data["length"].values, values, strict=True)
     }
     wanted = [(round(k * 1e4), round(s)) for k, s in zip(k0, length, strict=True)]
-    _add(result, "segments of the grid in the data set", sum(key in rows for key in wanted), "", 2487.0, 0.0,
-         "source 6.2.4: 4,131 less those beyond half a turn")  # fmt: skip
+    result.check(
+        "segments of the grid in the data set",
+        sum(key in rows for key in wanted),
+        reference=2487.0,
+        source="source 6.2.4: 4,131 less those beyond half a turn",
+        tolerance=0.0,
+    )
     mirror = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     worst = max(np.abs(rows[k, s] - mirror * rows[-k, s]).max() for k, s in wanted)
-    _add(result, "symmetry in k0", worst, "mm, rad", 0.0, 1e-6, "mirror images")
+    result.check(
+        "symmetry in k0", worst, unit="mm, rad", reference=0.0, source="mirror images", tolerance=1e-6
+    )
     ends = np.abs(data["end_dihedral"].values - 0.5 * math.pi).max()
-    _add(result, "dihedral angle of the ends off 90 degrees", math.degrees(ends), "deg", 0.0, 1.0)
+    result.check(
+        "dihedral angle of the ends off 90 degrees",
+        math.degrees(ends),
+        unit="deg",
+        reference=0.0,
+        tolerance=1.0,
+    )
     jump = 0.0
     for k, s in wanted:  # an outlier is off the cubic through its neighbours
         near = [rows.get((k, s + 4 * i)) for i in (-2, -1, 1, 2)]
         a, b, c, d = near
         if a is not None and b is not None and c is not None and d is not None:
             jump = max(jump, float(np.abs(rows[k, s] - (-a + 4.0 * b + 4.0 * c - d) / 6.0)[:3].max()))
-    _add(
-        result,
+    result.check(
         "largest distance from the cubic through four neighbours of one k0",
         jump,
-        "mm",
-        0.0,
-        0.05,
-        "no outliers",
+        unit="mm",
+        reference=0.0,
+        source="no outliers",
+        tolerance=0.05,
     )
 
 
@@ -126,28 +132,18 @@ def _interpolation(result: CaseResult, count: int) -> None:
             )
         )
     seconds = (time.perf_counter() - began) / count
+    check = partial(result.check, params={"segments": count})
     for name, values, unit in (("position", off, "mm"), ("orientation", turned, "deg")):
-        _add(result, f"interpolated {name} off the grid, 95th percentile", float(np.percentile(values, 95)), unit,
-             0.0, 0.3, "simulation of the segment", segments=count)  # fmt: skip
-        _add(
-            result,
-            f"interpolated {name} off the grid, largest",
-            max(values),
-            unit,
-            None,
-            None,
-            segments=count,
+        check(
+            f"interpolated {name} off the grid, 95th percentile",
+            np.percentile(values, 95),
+            unit=unit,
+            reference=0.0,
+            source="simulation of the segment",
+            tolerance=0.3,
         )
-    _add(
-        result,
-        "one simulated segment",
-        seconds,
-        "s",
-        None,
-        None,
-        "source: 4,131 in a couple of hours",
-        segments=count,
-    )
+        check(f"interpolated {name} off the grid, largest", max(values), unit=unit)
+    check("one simulated segment", seconds, unit="s", source="source: 4,131 in a couple of hours")
 
 
 def _strips(result: CaseResult, count: int) -> None:
@@ -163,10 +159,17 @@ def _strips(result: CaseResult, count: int) -> None:
             on = np.full(n, pinched)
             strip = simulate(k0.tolist(), length.tolist(), on.tolist())
             off.append(float(np.linalg.norm(strip.t - surrogate.forward(k0, length, on)[0][-1])))
-        _add(result, "end of whole strips against the chain of segments, largest", max(off), "mm", 0.0, 1.0,
-             "simulation of the strip", pinched=pinched, strips=count)  # fmt: skip
-        _add(
-            result, "the same, median", float(np.median(off)), "mm", None, None, pinched=pinched, strips=count
+        result.check(
+            "end of whole strips against the chain of segments, largest",
+            max(off),
+            unit="mm",
+            reference=0.0,
+            source="simulation of the strip",
+            tolerance=1.0,
+            params={"pinched": pinched, "strips": count},
+        )
+        result.check(
+            "the same, median", np.median(off), unit="mm", params={"pinched": pinched, "strips": count}
         )
 
 
@@ -181,8 +184,8 @@ def _speed(result: CaseResult) -> None:
         began = time.perf_counter()
         surrogate.forward(k0, length, on)
         seconds.append(time.perf_counter() - began)
-    _add(
-        result, "forward process of 100,000 designs of 4 segments", min(seconds), "s", None, None, "aim: 1 s"
+    result.check(
+        "forward process of 100,000 designs of 4 segments", min(seconds), unit="s", source="aim: 1 s"
     )
 
 
@@ -191,28 +194,45 @@ def _claims(result: CaseResult, data: Any) -> None:
     k0, length, t = data["k0"].values, data["length"].values, data["t"].values
     inside = shipped().domain.holds(k0, length)
     short = inside & (length <= 150.0)
-    _add(result, "pinched segments up to 150 mm that go down, share", float((t[short, 2] < 0.0).mean()), "", None, None,
-         "source 6.4.3: most shorter creases")  # fmt: skip
-    _add(
-        result,
+    result.check(
+        "pinched segments up to 150 mm that go down, share",
+        (t[short, 2] < 0.0).mean(),
+        source="source 6.4.3: most shorter creases",
+    )
+    result.check(
         "some pinched segments go up",
-        float((t[inside, 2] > 0.0).any()),
-        "",
-        1.0,
-        0.0,
-        "source 6.4.3",
+        (t[inside, 2] > 0.0).any(),
+        reference=1.0,
+        source="source 6.4.3",
+        tolerance=0.0,
     )
     straight = inside & (k0 == 0.0)
     twist = float(np.abs(data["uvw"].values[straight][:, 0]).max())
-    _add(result, "twist of straight pinched creases", twist, "rad", 0.0, 1e-9, "source 6.4.3")
+    result.check(
+        "twist of straight pinched creases",
+        twist,
+        unit="rad",
+        reference=0.0,
+        source="source 6.4.3",
+        tolerance=1e-9,
+    )
     down = float(-t[straight & (length == 100.0), 2][0])
-    _add(result, "a straight pinched crease of 100 mm goes down by", down, "mm", None, None,
-         "source 6.4.3: not significant")  # fmt: skip
+    result.check(
+        "a straight pinched crease of 100 mm goes down by",
+        down,
+        unit="mm",
+        source="source 6.4.3: not significant",
+    )
     before, _ = folded(k0[inside], length[inside])
     moved = np.linalg.norm(t[inside] - before, axis=1)
     top = int(np.argmax(moved))
-    _add(result, "largest movement of the tip of one segment", moved[top], "mm", None, None, "Fig. 6.11",
-         k0=float(k0[inside][top]), length=float(length[inside][top]))  # fmt: skip
+    result.check(
+        "largest movement of the tip of one segment",
+        moved[top],
+        unit="mm",
+        source="Fig. 6.11",
+        params={"k0": float(k0[inside][top]), "length": float(length[inside][top])},
+    )
 
 
 def table(surrogate: Surrogate, pinched: bool | None) -> tuple[Array, Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from bh.applications.inverse.fit import arc_length, curvature, fit_curve, move_t
 from bh.applications.inverse.optimisers import Genetic, Polished
 from bh.applications.inverse.problems import CURVES
 from bh.applications.inverse.simulate import simulate
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 
 CURVES_IN = "source 6.4.1, Fig. 6.15"
 TIP = "source 6.4.2, Fig. 6.17"
@@ -30,48 +31,76 @@ def run(context: Context) -> CaseResult:
     best: dict[str, Any] = {}
     for name, target in CURVES.items():
         context.tell(f"problem_a: {name}")
-        _add(
-            result,
-            "problem_a",
+        check = partial(result.check, params={"curve": name})
+        check(
             "arc length",
             arc_length(target),
-            "mm",
-            300.0,
-            3e-4,
-            "Eq. 6.17 to 6.19",
-            curve=name,
+            unit="mm",
+            reference=300.0,
+            source="Eq. 6.17 to 6.19",
+            tolerance=3e-4,
         )
         began = time.perf_counter()
         found = fit_curve(target, most, Polished(Genetic(60, 20)))
         errors[name] = [float(f.value) for _, f in found]
         best[name] = found
         for n, value in enumerate(errors[name], 1):
-            _add(result, "problem_a", "mean distance over the length of the curve", value, "", None, None, CURVES_IN,
-                 curve=name, n=n)  # fmt: skip
+            result.check(
+                "mean distance over the length of the curve",
+                value,
+                source=CURVES_IN,
+                params={"curve": name, "n": n},
+            )
         falls = float((np.diff(errors[name]) <= 0.0).all())
-        _add(result, "problem_a", "errors do not grow with n", falls, "", 1.0, 0.0, CURVES_IN, curve=name)
-        _add(result, "problem_a", "two segments over one, error", errors[name][1] / errors[name][0], "", None, None,
-             CURVES_IN + ": one is much worse", curve=name, seconds=time.perf_counter() - began)  # fmt: skip
-        _add(result, "problem_a", "two segments have less than a quarter of the error of one",
-             float(errors[name][1] < 0.25 * errors[name][0]), "", 1.0, 0.0, CURVES_IN, curve=name)  # fmt: skip
+        check("errors do not grow with n", falls, reference=1.0, source=CURVES_IN, tolerance=0.0)
+        result.check(
+            "two segments over one, error",
+            errors[name][1] / errors[name][0],
+            source=CURVES_IN + ": one is much worse",
+            params={"curve": name, "seconds": time.perf_counter() - began},
+        )
+        check(
+            "two segments have less than a quarter of the error of one",
+            errors[name][1] < 0.25 * errors[name][0],
+            reference=1.0,
+            source=CURVES_IN,
+            tolerance=0.0,
+        )
     worse = all(s > c for s, c in zip(errors["spiral"][:3], errors["cosine"][:3], strict=True))
-    _add(result, "problem_a", "the spiral is fitted worse than the cosine (n = 1 to 3)", float(worse), "", 1.0, 0.0,
-         CURVES_IN + ": its curvature has the larger slope")  # fmt: skip
+    result.check(
+        "the spiral is fitted worse than the cosine (n = 1 to 3)",
+        worse,
+        reference=1.0,
+        source=CURVES_IN + ": its curvature has the larger slope",
+        tolerance=0.0,
+    )
     counts = [float(i) for i in range(1, most + 1)]
     result.plots.append(
-        plot("problem-a-errors", "Error of the fit", "segments", "mean distance / length",
-             [line(name, counts, values, "points") for name, values in errors.items()],
-             "Fig. 6.15: errors fall with the number of segments, most of all from one to two.", log="y")
-    )  # fmt: skip
+        plot(
+            "problem-a-errors",
+            "Error of the fit",
+            "segments",
+            "mean distance / length",
+            [line(name, counts, values, "points") for name, values in errors.items()],
+            "Fig. 6.15: errors fall with the number of segments, most of all from one to two.",
+            log="y",
+        )
+    )
     series = []
     for name, target in CURVES.items():
         s, k = curvature(target)
         keep = slice(50, None, 200)
         series.append(line(name, s[keep].tolist(), np.clip(k[keep], -0.1, 0.1).tolist()))
     result.plots.append(
-        plot("problem-a-curvature", "Curvature of the targets", "arc length, mm", "curvature, 1/mm", series,
-             "Fig. 6.16, cut off at 0.1 /mm. Segments fit those best whose curvature changes least.")
-    )  # fmt: skip
+        plot(
+            "problem-a-curvature",
+            "Curvature of the targets",
+            "arc length, mm",
+            "curvature, 1/mm",
+            series,
+            "Fig. 6.16, cut off at 0.1 /mm. Segments fit those best whose curvature changes least.",
+        )
+    )
     for name, found in best.items():
         target = CURVES[name][::100]
         shapes = [line("target", target[:, 0].tolist(), target[:, 1].tolist(), "reference")]
@@ -106,57 +135,48 @@ def run_b(context: Context) -> CaseResult:
     moved = [-float(f.value) for _, f in found]
     for n, (problem, top) in enumerate(found, 1):
         design = problem.design(top.x, top.on)
-        _add(result, "problem_b", "largest movement of the tip", moved[n - 1], "mm", None, None, TIP, n=n,
-             k0=[round(float(k), 5) for k in design.k0], length=[round(float(s), 1) for s in design.length],
-             pinched=[int(f) for f in design.pinched])  # fmt: skip
-        _add(result, "problem_b", "the rules allow it", float(top.allowed), "", 1.0, 0.0, "Eq. 6.21", n=n)
+        result.check(
+            "largest movement of the tip",
+            moved[n - 1],
+            unit="mm",
+            source=TIP,
+            params={
+                "n": n,
+                "k0": [round(float(k), 5) for k in design.k0],
+                "length": [round(float(s), 1) for s in design.length],
+                "pinched": [int(f) for f in design.pinched],
+            },
+        )
+        check = partial(result.check, params={"n": n})
+        check("the rules allow it", top.allowed, reference=1.0, source="Eq. 6.21", tolerance=0.0)
         after, before = (
             simulate(*design.lists()),
             simulate(design.k0.tolist(), design.length.tolist(), [False] * n),
         )
         whole = float(np.linalg.norm(after.t - before.t))
-        _add(
-            result,
-            "problem_b",
+        check(
             "the same of the whole simulated strip",
             whole,
-            "mm",
-            moved[n - 1],
-            0.02,
-            TIP,
-            n=n,
+            unit="mm",
+            reference=moved[n - 1],
+            source=TIP,
+            tolerance=0.02,
         )
-        _add(
-            result,
-            "problem_b",
-            "the first segment is pinched",
-            float(design.pinched[0]),
-            "",
-            1.0,
-            None,
-            TIP,
-            n=n,
+        check("the first segment is pinched", design.pinched[0], reference=1.0, source=TIP)
+        check(
+            "sector angle of the first segment over half a turn",
+            abs(problem.surrogate.domain.curvature(design.k0[0])) * design.length[0] / np.pi,
+            source=TIP + ": moderately curved, long",
         )
-        _add(result, "problem_b", "sector angle of the first segment over half a turn", float(
-            abs(problem.surrogate.domain.curvature(design.k0[0])) * design.length[0] / np.pi
-        ), "", None, None, TIP + ": moderately curved, long", n=n)  # fmt: skip
     steps = np.diff([0.0, *moved])
-    _add(
-        result,
-        "problem_b",
-        "movement grows with every segment",
-        float((steps > 0.0).all()),
-        "",
-        1.0,
-        0.0,
-        TIP,
+    result.check(
+        "movement grows with every segment", (steps > 0.0).all(), reference=1.0, source=TIP, tolerance=0.0
     )
     n_all = [float(i) for i in range(1, most + 1)]
     if most > 2:
         fit = np.polyfit(n_all, moved, 1)
         rest = np.abs(np.polyval(fit, n_all) - moved).max() / moved[-1]
-        _add(result, "problem_b", "largest distance from a line in n, over the last", float(rest), "", None, None,
-             TIP + ": nearly linear")  # fmt: skip
+        result.check("largest distance from a line in n, over the last", rest, source=TIP + ": nearly linear")
     result.plots.append(
         plot(
             "problem-b-tip",
@@ -168,10 +188,3 @@ def run_b(context: Context) -> CaseResult:
         )
     )
     return result
-
-
-def _add(
-    result: CaseResult, case: str, quantity: str, value: float, unit: str, reference: float | None,
-    tolerance: float | None, source: str, **params: Any,
-) -> None:  # fmt: skip
-    result.checks.append(Check(case, quantity, params, float(value), unit, reference, source, tolerance))

@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from bh.applications.inverse.reach import Reach
 from bh.applications.inverse.simulate import SETTING, simulate
 from bh.applications.inverse.surrogate import shipped
 from bh.solvers.outcome import Outcome
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 
 X = Y = tuple(float(v) for v in range(-100, 101, 20))
 Z = (-10.0, -5.0, 0.0, 5.0, 10.0)
@@ -39,6 +40,7 @@ class ReachTask:
         return f"reach {self.reach!r} {SETTING.identity}"
 
     def __call__(self, point: Mapping[str, Any]) -> dict[str, Any]:
+        """What was found for the target {"x", "y", "z"} (mm), as values of the data set."""
         target = np.array([point["x"], point["y"], point["z"]], dtype=float)
         found = self.reach(target)
         design, pad = found.design, MOST - found.design.n
@@ -61,6 +63,7 @@ class ReachTask:
 
 
 def cores() -> int:
+    """Of this machine."""
     return os.cpu_count() or 1
 
 
@@ -99,51 +102,52 @@ def run(context: Context) -> CaseResult:
 
 
 def _claims(result: CaseResult, data: Any, seconds: float, quick: bool) -> None:
-    def add(quantity: str, value: float, unit: str, reference: float | None, tolerance: float | None) -> None:
-        result.checks.append(
-            Check(
-                "problem_c",
-                quantity,
-                {"targets": int(data.sizes["point"])},
-                value,
-                unit,
-                reference,
-                SOURCE,
-                tolerance,
-            )
-        )
-
+    check = partial(result.check, params={"targets": int(data.sizes["point"])})
     reached = data["outcome"].values == Outcome.REACHED
     mirror = data["y"].values > 0.0
     points = int(reached.sum() + (reached & mirror).sum())
     whole = int(len(reached) + mirror.sum())
-    add("points with a design, mirror images included", points, "", float(whole), 0.0)
+    check("points with a design, mirror images included", points, reference=float(whole), tolerance=0.0)
     far = np.nan_to_num(np.stack([data["missed_simulated"].values, data["missed_mirrored"].values]))
-    add("largest distance of a whole simulated strip from its point", float(far.max()), "mm", 0.0, 1.0)
-    add("median of these distances", float(np.median(far[far > 0.0])), "mm", None, None)
-    add("largest distance by the surrogate", float(np.nanmax(data["missed"].values)), "mm", 0.0, 1.0)
-    add("mirrored designs: largest difference of the distances", float(
-        np.nanmax(np.abs(data["missed_mirrored"].values - data["missed_simulated"].values))
-    ), "mm", 0.0, 1e-6)  # fmt: skip
+    check(
+        "largest distance of a whole simulated strip from its point",
+        far.max(),
+        unit="mm",
+        reference=0.0,
+        tolerance=1.0,
+    )
+    check("median of these distances", np.median(far[far > 0.0]), unit="mm")
+    check(
+        "largest distance by the surrogate",
+        np.nanmax(data["missed"].values),
+        unit="mm",
+        reference=0.0,
+        tolerance=1.0,
+    )
+    check(
+        "mirrored designs: largest difference of the distances",
+        np.nanmax(np.abs(data["missed_mirrored"].values - data["missed_simulated"].values)),
+        unit="mm",
+        reference=0.0,
+        tolerance=1e-6,
+    )
     flat = data["z"].values == 0.0
     pinched = np.nan_to_num(data["pinched"].values).sum(axis=-1)
-    add(
+    check(
         "points off the plane z = 0: every design is pinched",
-        float((pinched[~flat & reached] > 0).all()),
-        "",
-        1.0,
-        0.0,
+        (pinched[~flat & reached] > 0).all(),
+        reference=1.0,
+        tolerance=0.0,
     )
-    add("points in the plane: share of designs without a pinch", float((pinched[flat & reached] == 0).mean()), "",
-        None, None)  # fmt: skip
-    add(
-        "strips that clear themselves in space, share",
-        float(np.nanmean(data["clear"].values)),
-        "",
-        None,
-        None,
+    check("points in the plane: share of designs without a pinch", (pinched[flat & reached] == 0).mean())
+    check("strips that clear themselves in space, share", np.nanmean(data["clear"].values))
+    check(
+        "time of all targets on all cores",
+        seconds,
+        unit="s",
+        reference=None if quick else 0.0,
+        tolerance=None if quick else 600.0,
     )
-    add("time of all targets on all cores", seconds, "s", None if quick else 0.0, None if quick else 600.0)
 
 
 def _maps(result: CaseResult, context: Context, data: Any) -> None:
@@ -171,9 +175,12 @@ def _maps(result: CaseResult, context: Context, data: Any) -> None:
         file = f"problem_c_{name}.png"
         figure.savefig(context.folder / file, dpi=100)
         result.pictures.append(
-            {"file": file, "alt": f"{label} of the designs for all targets",
-             "caption": f"{label.capitalize()} of the designs, each cell a target."}
-        )  # fmt: skip
+            {
+                "file": file,
+                "alt": f"{label} of the designs for all targets",
+                "caption": f"{label.capitalize()} of the designs, each cell a target.",
+            }
+        )
 
 
 def _optimisers(result: CaseResult, context: Context) -> None:
@@ -196,11 +203,13 @@ def _optimisers(result: CaseResult, context: Context) -> None:
                 if best <= 1.0:
                     break
             missed.append(best)
-        result.checks.append(
-            Check("problem_c", "targets within 1 mm by the surrogate, of some", {"optimiser": name},
-                  float(sum(m <= 1.0 for m in missed)), "", float(len(missed)), SOURCE, None,
-                  wall_time_s=time.perf_counter() - began)
-        )  # fmt: skip
+        result.check(
+            "targets within 1 mm by the surrogate, of some",
+            sum(m <= 1.0 for m in missed),
+            reference=float(len(missed)),
+            params={"optimiser": name},
+            path=Cost(wall_time_s=time.perf_counter() - began),
+        )
 
 
 def _notes(result: CaseResult, data: Any, seconds: float) -> None:
@@ -220,7 +229,12 @@ def _notes(result: CaseResult, data: Any, seconds: float) -> None:
     )
     lengths = np.sort(data["total"].values)
     result.plots.append(
-        plot("problem-c-lengths", "Length of the creases", "share of the targets", "total length, mm",
-             [line("all", np.linspace(0.0, 1.0, len(lengths)).tolist(), lengths.tolist())],
-             "Sorted. As in the source nothing asks for short creases; segments are added until a point is reached.")
-    )  # fmt: skip
+        plot(
+            "problem-c-lengths",
+            "Length of the creases",
+            "share of the targets",
+            "total length, mm",
+            [line("all", np.linspace(0.0, 1.0, len(lengths)).tolist(), lengths.tolist())],
+            "Sorted. As in the source nothing asks for short creases; segments are added until a point is reached.",
+        )
+    )

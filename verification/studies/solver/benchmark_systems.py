@@ -20,16 +20,24 @@ class Silent:
     """The answers of a system that has nothing to say of its states."""
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """No step is too long."""
+        del q, lam, q_new, lam_new
         return ""
 
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Nothing crosses."""
+        del q, lam, q_new, lam_new
         return ""
 
     def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
+        """Nothing is in the way."""
+        del q, lam
         return None
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
-        return "the toy moves"
+        """What moves, in words."""
+        del q, lam, motion
+        return "the truss moves"
 
 
 @dataclass(frozen=True)
@@ -52,10 +60,12 @@ class VonMisesTruss(Silent):
 
     @property
     def size(self) -> int:
+        """Number of unknowns."""
         return 1 if self.spring is None else 2
 
     @property
     def primal(self) -> int:
+        """Number of displacements among the unknowns: all of them."""
         return self.size
 
     def load(self, w: Array | float) -> Array:
@@ -72,6 +82,7 @@ class VonMisesTruss(Silent):
         return float(self.load(self.rise - math.sqrt(length**2 - self.span**2)))
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
+        """Energy, residual and its size over the force, at deflections q (size,) in mm."""
         w = float(q[0])
         length, rest = math.hypot(self.rise - w, self.span), math.hypot(self.rise, self.span)
         energy = self.stiffness * (length - rest) ** 2
@@ -86,6 +97,8 @@ class VonMisesTruss(Silent):
         return Evaluation(energy, residual, float(np.abs(residual).max()) / self.force, np.zeros(0))
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        """Stiffness (size, size) at q, N/mm."""
+        del lam, forces
         height = self.rise - float(q[0])
         length, rest = math.hypot(height, self.span), math.hypot(self.rise, self.span)
         along = (height / length) ** 2
@@ -95,9 +108,13 @@ class VonMisesTruss(Silent):
         return Tangent(SparseMatrix.of(sp.csc_array(K)))
 
     def control_rate(self, q: Array, lam: float) -> Array:
+        """Derivative of the residual with respect to lambda, (size,), N."""
+        del q, lam
         rate = np.zeros(self.size)
         rate[-1] = -self.force
         return rate
 
     def power(self, q: Array, lam: float) -> float:
+        """Derivative of the energy with respect to lambda, N mm."""
+        del lam
         return -self.force * float(q[-1])

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path as FilePath
 from typing import Any
@@ -22,7 +23,7 @@ import numpy as np
 import meshes
 from bh import Automatic, LoadControl, Model, Path, Sheet, trace
 from bh.solvers.outcome import Outcome
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, line, plot
 from verification.framework.environment import environment
 
 SEED = 2026
@@ -131,8 +132,8 @@ def play(scene: Scene, compare: bool = True) -> Result:
 
 
 def _excess(path: Path, fine: Path) -> float:
-    scale = max(fine[-1].energy.total, 1e-15 * path.system(0).energy_scale)
-    return (path[-1].energy.total - fine[-1].energy.total) / scale
+    scale = max(fine[-1].energy.total, 1e-15 * path.solved(0)[0].energy_scale)
+    return float((path[-1].energy.total - fine[-1].energy.total) / scale)
 
 
 def _played(job: tuple[int, Scene]) -> dict[str, Any]:
@@ -209,44 +210,42 @@ def judged(found: Sequence[Result]) -> CaseResult:
     higher = [r for r in reached if r.excess > 0.02]
     unknown = [r for r in reached if math.isnan(r.excess)]
     params = {"scenes": len(found), "seed": SEED}
-
-    def add(
-        what: str, value: float, reference: float | None, tolerance: float | None, unit: str = ""
-    ) -> None:
-        source = SOURCE if tolerance is not None else "measured"
-        result.checks.append(Check("campaign", what, params, value, unit, reference, source, tolerance))
-
-    add("share that fails to reach its target", 1.0 - len(reached) / len(found), 0.0, 0.01)
-    add("states on a higher branch (over 2 %)", float(len(higher)), 0.0, 0.0)
-    add("states that fine increments did not reach, so not compared", float(len(unknown)), None, None)
-    add("end states that are not stable", float(sum(r.stable is False for r in reached)), None, None)
+    check = partial(result.check, params=params)
+    check(
+        "share that fails to reach its target", 1.0 - len(reached) / len(found), reference=0.0, tolerance=0.01
+    )
+    check("states on a higher branch (over 2 %)", len(higher), reference=0.0, tolerance=0.0)
+    check("states that fine increments did not reach, so not compared", len(unknown), source="measured")
+    check("end states that are not stable", sum(r.stable is False for r in reached), source="measured")
     for q in (50, 95, 100):
-        add(
+        check(
             f"iterations, {q}th percentile",
-            float(np.percentile([r.iterations for r in reached], q)),
-            None,
-            None,
+            np.percentile([r.iterations for r in reached], q),
+            source="measured",
         )
     for q in (50, 95, 100):
-        add(
+        check(
             f"wall time, {q}th percentile",
-            float(np.percentile([r.wall_time_s for r in reached], q)),
-            None,
-            None,
-            "s",
+            np.percentile([r.wall_time_s for r in reached], q),
+            unit="s",
+            source="measured",
         )
-    groups = {
-        "reached": reached,
-        "not reached": [r for r in found if r.outcome != Outcome.REACHED],
-    }
+    groups = {"reached": reached, "not reached": [r for r in found if r.outcome != Outcome.REACHED]}
     series = [
         line(name, [r.unknowns for r in group], [r.wall_time_s for r in group], "points")
         for name, group in groups.items()
     ]
     result.plots.append(
-        plot("campaign-time", "Run time over size", "unknowns", "wall time, s", series,
-             "Every scene from flat to its target, default settings, one thread each, all cores busy.", log="xy")
-    )  # fmt: skip
+        plot(
+            "campaign-time",
+            "Run time over size",
+            "unknowns",
+            "wall time, s",
+            series,
+            "Every scene from flat to its target, default settings, one thread each, all cores busy.",
+            log="xy",
+        )
+    )
     for r in found:
         if r.outcome != Outcome.REACHED:
             result.notes.append(f"Not reached: {r.scene}: {r.outcome}, {r.reason}.")

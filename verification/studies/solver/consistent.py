@@ -6,7 +6,7 @@ from typing import get_args
 
 from bh import Sheet
 from meshes.structured import Kind
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.studies.solver import plates
 from verification.studies.solver.patch_tests import (
     CURVATURES,
@@ -47,11 +47,15 @@ def _patch_tests(result: CaseResult, context: Context) -> None:
             found = {name: stretching_error(mesh, sheet, F) for name, F in STRETCHES.items()}  # type: ignore[arg-type]
             found |= {name: bending_error(mesh, sheet, kappa) for name, kappa in CURVATURES.items()}  # type: ignore[arg-type]
             for state, error in found.items():
-                result.checks.append(
-                    Check("consistent", "patch test, largest relative error",
-                          {"state": state, "mesh": kind, "nu": nu, "distorted": True}, max(error.energy, error.inside),
-                          "", 0.0, "exact state", 1e-10, error.unknowns, 1)
-                )  # fmt: skip
+                result.check(
+                    "patch test, largest relative error",
+                    max(error.energy, error.inside),
+                    reference=0.0,
+                    source="exact state",
+                    tolerance=1e-10,
+                    params={"state": state, "mesh": kind, "nu": nu, "distorted": True},
+                    path=Cost(unknowns=error.unknowns, iterations=1),
+                )
 
 
 def _square_plates(result: CaseResult, context: Context) -> None:
@@ -65,22 +69,37 @@ def _square_plates(result: CaseResult, context: Context) -> None:
                 found = [plates.square_plate(n, kind, nu, edge == "clamped") for n in cells]
                 params = {"edge": edge, "mesh": kind, "nu": nu, "cells": cells[-1]}
                 quantity = "deflection of a square plate, D w / (q a^4)"
-                result.checks.append(
-                    Check("consistent", quantity, params, found[-1].value, "", reference,
-                          "Timoshenko and Woinowsky-Krieger 1959", 0.035 if cells[-1] >= 32 else 0.13,
-                          found[-1].unknowns, 1)
-                )  # fmt: skip
+                result.check(
+                    quantity,
+                    found[-1].value,
+                    reference=reference,
+                    source="Timoshenko and Woinowsky-Krieger 1959",
+                    tolerance=0.035 if cells[-1] >= 32 else 0.13,
+                    params=params,
+                    path=Cost(unknowns=found[-1].unknowns, iterations=1),
+                )
                 errors = [answer.value / reference - 1.0 for answer in found]
-                result.checks.append(
-                    Check("consistent", "order of convergence of a square plate", params, plates.rates(errors)[-1], "",
-                          2.0, MORLEY, 0.05)
-                )  # fmt: skip
+                result.check(
+                    "order of convergence of a square plate",
+                    plates.rates(errors)[-1],
+                    reference=2.0,
+                    source=MORLEY,
+                    tolerance=0.05,
+                    params=params,
+                )
                 if nu == 0.3:
                     series.append(line(kind, [float(n) for n in cells], [abs(e) for e in errors]))
         result.plots.append(
-            plot(f"plate-{edge.replace(' ', '-')}", f"Square plate, {edge}, nu = 0.3", "cells a side", "relative error",
-                 series, "Error of the deflection of the centre under a uniform load.", log="xy")
-        )  # fmt: skip
+            plot(
+                f"plate-{edge.replace(' ', '-')}",
+                f"Square plate, {edge}, nu = 0.3",
+                "cells a side",
+                "relative error",
+                series,
+                "Error of the deflection of the centre under a uniform load.",
+                log="xy",
+            )
+        )
 
 
 def _cook(result: CaseResult, context: Context) -> None:
@@ -91,14 +110,24 @@ def _cook(result: CaseResult, context: Context) -> None:
         found = [plates.cooks_panel(n, kind) for n in cells]
         errors = [answer.value / theory.COOK - 1.0 for answer in found]
         params = {"mesh": kind, "cells": cells[-1]}
-        result.checks.append(
-            Check("consistent", "Cook's panel, tip deflection", params, found[-1].value, "mm", theory.COOK, "Cook 1974",
-                  0.01 if cells[-1] >= 64 else 0.035, found[-1].unknowns, 1)
-        )  # fmt: skip
-        result.checks.append(
-            Check("consistent", "Cook's panel, order of convergence", params, plates.rates(errors)[-1], "", 2.0,
-                  "second order less the singular corner: constant-strain triangles", 0.15)
-        )  # fmt: skip
+        result.check(
+            "Cook's panel, tip deflection",
+            found[-1].value,
+            unit="mm",
+            reference=theory.COOK,
+            source="Cook 1974",
+            tolerance=0.01 if cells[-1] >= 64 else 0.035,
+            params=params,
+            path=Cost(unknowns=found[-1].unknowns, iterations=1),
+        )
+        result.check(
+            "Cook's panel, order of convergence",
+            plates.rates(errors)[-1],
+            reference=2.0,
+            source="second order less the singular corner: constant-strain triangles",
+            tolerance=0.15,
+            params=params,
+        )
         series.append(line(kind, [float(n) for n in cells], [abs(e) for e in errors]))
     result.plots.append(
         plot(
@@ -124,13 +153,26 @@ def _strips(result: CaseResult, context: Context) -> None:
                 tolerance = 0.01 if load in ("tension", "torsion") or n >= 4 else None
                 if load == "bending_in_plane":  # constant strain: second order in the rows, from far
                     tolerance = 0.08 if n >= 8 else None
-                result.checks.append(
-                    Check("consistent", f"strip, {load.replace('_', ' ')}", {"mesh": kind, "rows": n, "alpha": 1.0},
-                          answer.value, "U / U_Th", 1.0, STRIPS, tolerance, answer.unknowns, 1)
-                )  # fmt: skip
+                result.check(
+                    f"strip, {load.replace('_', ' ')}",
+                    answer.value,
+                    unit="U / U_Th",
+                    reference=1.0,
+                    source=STRIPS,
+                    tolerance=tolerance,
+                    params={"mesh": kind, "rows": n, "alpha": 1.0},
+                    path=Cost(unknowns=answer.unknowns, iterations=1),
+                )
             series.append(line(kind, [float(n) for n in rows], [answer.value for answer in found]))
         series.append(line("theory", [float(n) for n in rows], [1.0] * len(rows), "reference"))
         result.plots.append(
-            plot(f"consistent-strip-{load}", load.replace("_", " "), "rows of cells", "U / U_Th", series,
-                 "Energy of the strip over theory at equal displacement, cells of aspect ratio 1.", log="x")
-        )  # fmt: skip
+            plot(
+                f"consistent-strip-{load}",
+                load.replace("_", " "),
+                "rows of cells",
+                "U / U_Th",
+                series,
+                "Energy of the strip over theory at equal displacement, cells of aspect ratio 1.",
+                log="x",
+            )
+        )

@@ -13,13 +13,13 @@ import meshes
 from bh import Model, Path, Sheet, trace
 from meshes import SheetMesh
 from meshes.structured import Kind
-from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot, reached_energy
+from verification.framework.checks import CaseResult, Context, Cost, line, plot, reached_energy
 from verification.studies.app_b import appendix_b
 
 KINDS: tuple[str, ...] = (*get_args(Kind), "gmsh")
 # cells along the crease and rows a side: halved again and again
 LEVELS = ((16, 2), (32, 4), (64, 8), (128, 16))
-DESIGN = ((32, 4, 0.03), (64, 12, 0.005))  # what DESIGN.md says of two meshes
+DESIGN = ((32, 4, 0.03), (64, 12, 0.005))  # tolerances of the two meshes
 BOTH = ("bars-and-hinges", "consistent")
 RING = math.radians(150.0)  # dihedral angle of the full annulus
 
@@ -75,44 +75,55 @@ def _sector(result: CaseResult, context: Context, actuation: str, nu: float) -> 
     along, rows = levels[-1]
     for kind in KINDS:
         params = {**here, "mesh": kind, "along": along, "rows": rows}
-        result.checks.append(
-            Check("convergence", "total energy against the limit of all meshes", params, totals[kind][-1], "N mm",
-                  converged, "extrapolated, median of the mesh patterns", 0.005, outcome=paths[kind].outcome,
-                  **cost_of(paths[kind]))
-        )  # fmt: skip
-        result.checks.append(
-            Check(
-                "convergence",
-                "order of convergence",
-                params,
-                order(totals[kind]),
-                "",
-                None,
-                "last three levels",
-            )
+        result.check(
+            "total energy against the limit of all meshes",
+            totals[kind][-1],
+            unit="N mm",
+            reference=converged,
+            source="extrapolated, median of the mesh patterns",
+            tolerance=0.005,
+            params=params,
+            path=paths[kind],
         )
+        result.check("order of convergence", order(totals[kind]), source="last three levels", params=params)
     for along, rows, tolerance in DESIGN[: 1 if context.quick else 2]:
         for kind in KINDS:
             context.tell(f"convergence: ({actuation}), nu = {nu}, {kind}, {along} x {rows}")
             path = folded(sector(along, rows, kind), actuation, nu)
-            result.checks.append(
-                Check("convergence", f"total energy at {along} x {rows}",
-                      {**here, "mesh": kind, "along": along, "rows": rows}, path[-1].energy.total, "N mm", converged,
-                      "extrapolated, median of the mesh patterns", tolerance, outcome=path.outcome, **cost_of(path))
-            )  # fmt: skip
+            result.check(
+                f"total energy at {along} x {rows}",
+                path[-1].energy.total,
+                unit="N mm",
+                reference=converged,
+                source="extrapolated, median of the mesh patterns",
+                tolerance=tolerance,
+                params={**here, "mesh": kind, "along": along, "rows": rows},
+                path=path,
+            )
     if nu > 0.0:
         table = appendix_b.TABLE_B1[actuation][2]
-        result.checks.append(
-            Check("convergence", "limit of the total energy against the table", here, converged, "N mm", table,
-                  appendix_b.SOURCE)
-        )  # fmt: skip
+        result.check(
+            "limit of the total energy against the table",
+            converged,
+            unit="N mm",
+            reference=table,
+            source=appendix_b.SOURCE,
+            params=here,
+        )
     x = [float(along) for along, _ in levels]
     series = [line(kind, x, totals[kind]) for kind in KINDS]
     series.append(line("limit", x, [converged] * len(x), "reference"))
     result.plots.append(
-        plot(f"convergence-{actuation}-{nu}", f"Total energy, ({actuation}), nu = {nu}", "cells along the crease",
-             "energy, N mm", series, "Eight cells along the crease to a row on each side.", log="x")
-    )  # fmt: skip
+        plot(
+            f"convergence-{actuation}-{nu}",
+            f"Total energy, ({actuation}), nu = {nu}",
+            "cells along the crease",
+            "energy, N mm",
+            series,
+            "Eight cells along the crease to a row on each side.",
+            log="x",
+        )
+    )
 
 
 def extrapolated(values: list[float]) -> float:
@@ -133,11 +144,14 @@ def _bars(result: CaseResult, context: Context) -> None:
             context.tell(f"convergence: bars and hinges, {kind}, {along} x {rows}")
             path = folded(sector(along, rows, kind), "a", 0.0, "bars-and-hinges")
             params = {"actuation": "a", "nu": 0.0, "mesh": kind, "along": along, "rows": rows}
-            result.checks.append(
-                Check("convergence", "total energy", {**params, "formulation": "bars-and-hinges"},
-                      path[-1].energy.total, "N mm", None, "reported: no limit to compare with",
-                      outcome=path.outcome, **cost_of(path))
-            )  # fmt: skip
+            result.check(
+                "total energy",
+                path[-1].energy.total,
+                unit="N mm",
+                source="reported: no limit to compare with",
+                params={**params, "formulation": "bars-and-hinges"},
+                path=path,
+            )
 
 
 def _ring(result: CaseResult, context: Context) -> None:
@@ -151,18 +165,33 @@ def _ring(result: CaseResult, context: Context) -> None:
             energy = reached_energy(path)
             found.setdefault(name, []).append(energy)
             judged = name == "consistent" and along > counts[0]
-            result.checks.append(
-                Check("convergence", "energy of the full annulus, against the mesh before",
-                      {"along": along, "rows": 1, "alpha": path.model.mesh.aspect_ratio, "formulation": name,
-                       "dihedral_deg": math.degrees(RING)}, energy, "N mm",
-                      found[name][-2] if along > counts[0] else None, "one row of cells a side",
-                      0.005 if judged else None, outcome=path.outcome, **cost_of(path))
-            )  # fmt: skip
+            result.check(
+                "energy of the full annulus, against the mesh before",
+                energy,
+                unit="N mm",
+                reference=found[name][-2] if along > counts[0] else None,
+                source="one row of cells a side",
+                tolerance=0.005 if judged else None,
+                params={
+                    "along": along,
+                    "rows": 1,
+                    "alpha": path.model.mesh.aspect_ratio,
+                    "formulation": name,
+                    "dihedral_deg": math.degrees(RING),
+                },
+                path=path,
+            )
     result.plots.append(
-        plot("convergence-ring", "Full annulus folded by 30 degrees", "cells round the crease", "energy, N mm",
-             [line(name, [float(n) for n in counts], values) for name, values in found.items()],
-             "Energy of the saddle; with bars and hinges the twist of long cells locks.", log="xy")
-    )  # fmt: skip
+        plot(
+            "convergence-ring",
+            "Full annulus folded by 30 degrees",
+            "cells round the crease",
+            "energy, N mm",
+            [line(name, [float(n) for n in counts], values) for name, values in found.items()],
+            "Energy of the saddle; with bars and hinges the twist of long cells locks.",
+            log="xy",
+        )
+    )
 
 
 def _cost(result: CaseResult, context: Context) -> None:
@@ -176,8 +205,10 @@ def _cost(result: CaseResult, context: Context) -> None:
                 path = folded(sector(along, rows, "staggered"), "a", 0.38, name)
                 best[name] = min(best[name], time.perf_counter() - began)
         params = {"actuation": "a", "mesh": "staggered", "along": along, "rows": rows}
-        result.checks.append(
-            Check("convergence", "time of a fold over that of bars and hinges", params,
-                  best["consistent"] / best["bars-and-hinges"], "", None, "least of some runs, at most 3 is asked",
-                  unknowns=path.unknowns, iterations=path.iterations, wall_time_s=best["consistent"])
-        )  # fmt: skip
+        result.check(
+            "time of a fold over that of bars and hinges",
+            best["consistent"] / best["bars-and-hinges"],
+            source="least of some runs, at most 3 is asked",
+            params=params,
+            path=Cost(unknowns=path.unknowns, iterations=path.iterations, wall_time_s=best["consistent"]),
+        )

@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +25,21 @@ Ints = NDArray[np.int64]
 Law = Literal["quadratic", "published"]
 
 
-def _cross(a: NDArray, b: NDArray) -> NDArray:
-    return np.stack([a[..., (i + 1) % 3] * b[..., (i + 2) % 3] - a[..., (i + 2) % 3] * b[..., (i + 1) % 3]
-                     for i in range(3)], axis=-1)  # fmt: skip
+def _cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    return np.stack(
+        [
+            a[..., (i + 1) % 3] * b[..., (i + 2) % 3] - a[..., (i + 2) % 3] * b[..., (i + 1) % 3]
+            for i in range(3)
+        ],
+        axis=-1,
+    )
 
 
-def _dot(a: NDArray, b: NDArray) -> NDArray:
-    return np.sum(a * b, axis=-1, keepdims=True)
+def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    return np.asarray(np.sum(a * b, axis=-1, keepdims=True))
 
 
-def hinge_gradients(x: NDArray) -> NDArray:
+def hinge_gradients(x: NDArray[Any]) -> NDArray[Any]:
     """(m, 4, 3) gradients of dihedral angles; corners (m, 4, 3) are edge, edge, wing, wing, and may be complex."""
     j, k, a, b = (x[:, i] for i in range(4))
     e = k - j

@@ -28,7 +28,7 @@ from bh.applications.inverse.simulate import SETTING, model, simulate
 from bh.applications.inverse.surrogate import shipped
 from bh.applications.polish import Polished, polish
 from meshes import SheetMesh
-from verification.framework.checks import CaseResult, Check, Context, cost_of, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 
 Array = NDArray[np.float64]
 CASE = "gradients"
@@ -120,15 +120,22 @@ def _derivatives(result: CaseResult, formulation: str) -> None:
                 "itself",
             ),
         ):
-            result.checks.append(
-                Check(CASE, quantity, params, value, "", 0.0, source, tolerance, path.unknowns, path.iterations, spent,
-                      path.outcome)
-            )  # fmt: skip
-    result.checks.append(
-        Check(CASE, "time of all derivatives over that of a solve", {"formulation": formulation},
-              spent / path.wall_time_s, "", None, "five parameters, six observables", None, **cost_of(path),
-              outcome=path.outcome)
-    )  # fmt: skip
+            result.check(
+                quantity,
+                value,
+                reference=0.0,
+                source=source,
+                tolerance=tolerance,
+                params=params,
+                path=Cost.of(path, wall_time_s=spent),
+            )
+    result.check(
+        "time of all derivatives over that of a solve",
+        spent / path.wall_time_s,
+        source="five parameters, six observables",
+        params={"formulation": formulation},
+        path=path,
+    )
 
 
 # ---------------------------------------------------------------------------------------------- problem C
@@ -223,17 +230,31 @@ def _targets(result: CaseResult, context: Context, count: int) -> None:
         ("distance after polishing, median", float(np.median(after)), "mm", None, None),
         (f"distance on meshes of their own, worst of {checked}", max(again), "mm", None, None),
     ):
-        result.checks.append(
-            Check(CASE, quantity, params, value, unit, reference, SOURCE, tolerance, wall_time_s=spent)
+        result.check(
+            quantity,
+            value,
+            unit=unit,
+            reference=reference,
+            tolerance=tolerance,
+            params=params,
+            path=Cost(wall_time_s=spent),
         )
     x = [float(i + 1) for i in range(count)]
     result.plots.append(
-        plot("gradients-targets", "Distance of the tip from its target", "target, worst first", "mm",
-             [line("surrogate, largest component", x, sorted(before, reverse=True), "points"),
-              line("polished", x, sorted(after, reverse=True), "points"),
-              line("asked for", [1.0, float(count)], [NEAR, NEAR], "reference")],
-             "Problem C with two segments, one or both pinched, on the bar-and-hinge model.", log="y")
-    )  # fmt: skip
+        plot(
+            "gradients-targets",
+            "Distance of the tip from its target",
+            "target, worst first",
+            "mm",
+            [
+                line("surrogate, largest component", x, sorted(before, reverse=True), "points"),
+                line("polished", x, sorted(after, reverse=True), "points"),
+                line("asked for", [1.0, float(count)], [NEAR, NEAR], "reference"),
+            ],
+            "Problem C with two segments, one or both pinched, on the bar-and-hinge model.",
+            log="y",
+        )
+    )
     result.notes.append(
         "Random designs of two segments; the target is where the surrogate has its tip, so that the design is its "
         f"exact answer. {np.mean(solves):.1f} solves on average bring the solved model there. The mesh keeps its "
@@ -252,10 +273,9 @@ def _segment(result: CaseResult, context: Context) -> None:
         found = simulate([k0], [length], [True], setting)
         params = {"formulation": formulation, "rows": rows, "edge": edge, "k0": k0, "length": length}
         for axis, value in zip("xyz", found.t.tolist(), strict=True):
-            result.checks.append(
-                Check(CASE, f"end of a pinched segment, {axis}", params, value, "mm", None, SOURCE, None,
-                      **cost_of(found.path), outcome=found.path.outcome)
-            )  # fmt: skip
+            result.check(
+                f"end of a pinched segment, {axis}", value, unit="mm", params=params, path=found.path
+            )
         ends[formulation] = found.t[2]
     bars, consistent, shell = ends.values()
     result.notes.append(

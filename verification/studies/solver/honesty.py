@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from bh.paths.estimate import Accuracy
 from bh.solvers.outcome import Outcome
 from bh.solving.accuracy import reading
 from meshes.pattern import FoldKind
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 
 CASE, SHELL = "honesty", "the shell on a fine mesh"
 SCENES, ENOUGH, ALLOWED = 40, 38, 1.5
@@ -146,30 +147,60 @@ def run(context: Context) -> CaseResult:
     reached = [f for f in found if f.outcome == Outcome.REACHED]
     params = {"scenes": count, "allowed": ALLOWED}
     misses = 1 if context.quick else SCENES - ENOUGH
-    result.checks += [
-        Check(CASE, "scenes whose error is at most 1.5 times the estimate", params, float(honest), "scenes",
-              float(count), "asked: 38 of 40", misses / count),
-        Check(CASE, "scenes whose estimate is within what was asked", params, float(met), "scenes", float(count),
-              "the others say so"),
-        Check(CASE, "scenes whose error is within what was asked", params,
-              float(sum(f.error <= f.item.goal.within for f in reached)), "scenes", float(count), SHELL),
-        Check(CASE, "error over estimate, median", params,
-              float(np.median([f.error / f.accuracy.estimate for f in reached])), "1", None, SHELL),
-    ]  # fmt: skip
+    check = partial(result.check, params=params)
+    check(
+        "scenes whose error is at most 1.5 times the estimate",
+        honest,
+        unit="scenes",
+        reference=float(count),
+        source="asked: 38 of 40",
+        tolerance=misses / count,
+    )
+    check(
+        "scenes whose estimate is within what was asked",
+        met,
+        unit="scenes",
+        reference=float(count),
+        source="the others say so",
+    )
+    check(
+        "scenes whose error is within what was asked",
+        sum(f.error <= f.item.goal.within for f in reached),
+        unit="scenes",
+        reference=float(count),
+        source=SHELL,
+    )
+    check(
+        "error over estimate, median",
+        np.median([f.error / f.accuracy.estimate for f in reached]),
+        unit="1",
+        source=SHELL,
+    )
     series = [
-        line(what, [100.0 * f.accuracy.estimate for f in reached if f.item.goal.of == what],
-             [100.0 * f.error for f in reached if f.item.goal.of == what], "points")
+        line(
+            what,
+            [100.0 * f.accuracy.estimate for f in reached if f.item.goal.of == what],
+            [100.0 * f.error for f in reached if f.item.goal.of == what],
+            "points",
+        )
         for what in ("energy", "tip", "stiffness")
-    ]  # fmt: skip
+    ]
     ends = [100.0 * f.accuracy.estimate for f in reached]
     for factor, words in ((1.0, "as told"), (ALLOWED, "1.5 times as told")):
         series.append(
             line(words, [min(ends), max(ends)], [factor * min(ends), factor * max(ends)], "reference")
         )
     result.plots.append(
-        plot("honesty", "Error made over error told", "estimate, %", "error, %", series,
-             "Below the upper line an estimate is honest. Errors are those against the shell on a fine mesh.", log="xy")
-    )  # fmt: skip
+        plot(
+            "honesty",
+            "Error made over error told",
+            "estimate, %",
+            "error, %",
+            series,
+            "Below the upper line an estimate is honest. Errors are those against the shell on a fine mesh.",
+            log="xy",
+        )
+    )
     chosen = Counter(f.accuracy.formulation for f in found)
     result.notes.append(
         f"Chosen: {', '.join(f'{name} {n}' for name, n in sorted(chosen.items()))}. Asked were "
@@ -183,11 +214,28 @@ def _record(result: CaseResult, number: int, found: Found) -> None:
     goal, told = found.item.goal, found.accuracy
     last = told.trials[-1]
     params = {
-        "scene": number, "words": found.item.words, "of": goal.of, "asked": goal.within, "estimate": told.estimate,
-        "met": told.met, "formulation": told.formulation, "meshes": len(told.trials), "honest": found.honest,
+        "scene": number,
+        "words": found.item.words,
+        "of": goal.of,
+        "asked": goal.within,
+        "estimate": told.estimate,
+        "met": told.met,
+        "formulation": told.formulation,
+        "meshes": len(told.trials),
+        "honest": found.honest,
         "bar": found.bar,
-    }  # fmt: skip
-    result.checks.append(
-        Check(CASE, "relative error", params, found.error, "1", 0.0, SHELL, unknowns=last.unknowns,
-              iterations=sum(t.iterations for t in told.trials), wall_time_s=told.wall_time_s, outcome=found.outcome)
-    )  # fmt: skip
+    }
+    result.check(
+        "relative error",
+        found.error,
+        unit="1",
+        reference=0.0,
+        source=SHELL,
+        params=params,
+        path=Cost(
+            unknowns=last.unknowns,
+            iterations=sum(t.iterations for t in told.trials),
+            wall_time_s=told.wall_time_s,
+            outcome=found.outcome,
+        ),
+    )

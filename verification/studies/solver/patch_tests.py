@@ -19,10 +19,17 @@ from meshes.structured import Kind
 
 Array = NDArray[np.float64]
 EDGES = ("inner", "outer", "start", "end")
-STRETCHES = {"stretch": ((1.02, 0.0), (0.0, 1.0)), "shear": ((1.0, 0.03), (0.0, 1.0)),
-             "both": ((1.01, 0.02), (-0.01, 0.98))}  # fmt: skip
-CURVATURES = {"bending": (0.3, 0.0, 0.0), "bending across": (0.0, -0.2, 0.0), "twist": (0.0, 0.0, 0.4),
-              "all": (0.3, -0.2, 0.15)}  # fmt: skip
+STRETCHES = {
+    "stretch": ((1.02, 0.0), (0.0, 1.0)),
+    "shear": ((1.0, 0.03), (0.0, 1.0)),
+    "both": ((1.01, 0.02), (-0.01, 0.98)),
+}
+CURVATURES = {
+    "bending": (0.3, 0.0, 0.0),
+    "bending across": (0.0, -0.2, 0.0),
+    "twist": (0.0, 0.0, 0.4),
+    "all": (0.3, -0.2, 0.15),
+}
 
 
 @dataclass(frozen=True)

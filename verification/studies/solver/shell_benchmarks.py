@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import numpy as np
 import skfem
@@ -14,7 +13,7 @@ from fem.kirchhoff_love import follow
 from fem.loads import EdgeMoments
 from fem.plate import Plate, hhj, morley
 from fem.state import ShellState
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.theory import shell_benchmarks as sze
 
 PAPER = "Sze, Liu and Lo (2004)"
@@ -43,19 +42,19 @@ def run(context: Context) -> CaseResult:
     return result
 
 
-def _solve(model: Model, moments: list[EdgeMoments] | None = None) -> tuple[list[ShellState], dict[str, Any]]:
+def _solve(model: Model, moments: list[EdgeMoments] | None = None) -> tuple[list[ShellState], Cost]:
     began = time.perf_counter()
     states, increments = follow(model, moments or ())
     return states, _cost(increments, time.perf_counter() - began)
 
 
-def _cost(increments: list[Increment], seconds: float) -> dict[str, Any]:
-    return {
-        "unknowns": len(increments[-1].point.q),
-        "iterations": sum(increment.iterations for increment in increments),
-        "wall_time_s": seconds,
-        "outcome": increments[-1].outcome,
-    }
+def _cost(increments: list[Increment], seconds: float) -> Cost:
+    return Cost(
+        unknowns=len(increments[-1].point.q),
+        iterations=sum(increment.iterations for increment in increments),
+        wall_time_s=seconds,
+        outcome=increments[-1].outcome,
+    )
 
 
 def _rolled_strip(result: CaseResult, context: Context) -> None:
@@ -68,26 +67,50 @@ def _rolled_strip(result: CaseResult, context: Context) -> None:
         tip = states[-1].points[model.mesh.nodes("edge:end")].mean(axis=0)
         params = {"benchmark": "rolled strip", "along": along}
         fine = along >= 24
-        result.checks.append(
-            Check("shell_benchmarks", "energy", params, states[-1].energy.total, "N mm", energy,
-                  "closed form (see notes)", 5e-4 if fine else None, **cost)
-        )  # fmt: skip
+        result.check(
+            "energy",
+            states[-1].energy.total,
+            unit="N mm",
+            reference=energy,
+            source="closed form (see notes)",
+            tolerance=5e-4 if fine else None,
+            params=params,
+            path=cost,
+        )
         off = float(np.hypot(tip[0] - x, tip[2] - z))
-        result.checks.append(
-            Check("shell_benchmarks", "distance of the tip from its place", params, off / sze.STRIP_LENGTH, "length",
-                  0.0, "closed form (see notes)", 5e-4 if fine else None, **cost)
-        )  # fmt: skip
+        result.check(
+            "distance of the tip from its place",
+            off / sze.STRIP_LENGTH,
+            unit="length",
+            reference=0.0,
+            source="closed form (see notes)",
+            tolerance=5e-4 if fine else None,
+            params=params,
+            path=cost,
+        )
         sizes.append(sze.STRIP_LENGTH / along)
         errors.append(abs(states[-1].energy.total / energy - 1.0))
     rate = float(np.log(errors[-2] / errors[-1]) / np.log(sizes[-2] / sizes[-1]))
-    result.checks.append(
-        Check("shell_benchmarks", "order of convergence of the energy", {"benchmark": "rolled strip"}, rate, "1", 4.0,
-              "quadratic positions, linear moments", 0.15)
-    )  # fmt: skip
+    result.check(
+        "order of convergence of the energy",
+        rate,
+        unit="1",
+        reference=4.0,
+        source="quadratic positions, linear moments",
+        tolerance=0.15,
+        params={"benchmark": "rolled strip"},
+    )
     result.plots.append(
-        plot("shell-rolled-strip", "Strip rolled to a circle", "mesh size", "error of the energy",
-             [line("shell", sizes, errors, "points")], "Relative error against the closed form.", log="xy")
-    )  # fmt: skip
+        plot(
+            "shell-rolled-strip",
+            "Strip rolled to a circle",
+            "mesh size",
+            "error of the energy",
+            [line("shell", sizes, errors, "points")],
+            "Relative error against the closed form.",
+            log="xy",
+        )
+    )
 
 
 def _sheared_strip(result: CaseResult, context: Context) -> None:
@@ -97,8 +120,15 @@ def _sheared_strip(result: CaseResult, context: Context) -> None:
     tip = states[-1].displacement("edge:end").mean(axis=0)
     (u, w), params = sze.SHEAR[4.0], {"benchmark": "sheared strip", "along": 16, "P": 4.0}
     for quantity, value, published in (("tip -u", -tip[0], u), ("tip w", tip[2], w)):
-        result.checks.append(
-            Check("shell_benchmarks", quantity, params, float(value), "mm", published, PAPER, 2e-3, **cost)
+        result.check(
+            quantity,
+            value,
+            unit="mm",
+            reference=published,
+            source=PAPER,
+            tolerance=2e-3,
+            params=params,
+            path=cost,
         )
 
 
@@ -111,10 +141,15 @@ def _ring(result: CaseResult, context: Context) -> None:
         for end, value in zip(("low", "high"), published, strict=True):
             w = np.nan if state is None else float(state.displacement(f"corner:{end}-end")[0, 2])
             params = {"benchmark": "slit ring", "along": along, "across": across, "load": share, "lip": end}
-            result.checks.append(
-                Check(
-                    "shell_benchmarks", "deflection of the lip", params, w, "mm", value, PAPER, 0.015, **cost
-                )
+            result.check(
+                "deflection of the lip",
+                w,
+                unit="mm",
+                reference=value,
+                source=PAPER,
+                tolerance=0.015,
+                params=params,
+                path=cost,
             )
 
 
@@ -135,7 +170,13 @@ def _plates(result: CaseResult, context: Context) -> None:
                 "cells": cells,
                 "clamped": clamped,
             }
-            result.checks.append(
-                Check("shell_benchmarks", "deflection of the middle", params, w, "q a^4 / D", reference, PLATE_SOURCE,
-                      0.03 if element is morley else 1e-4, wall_time_s=spent)
-            )  # fmt: skip
+            result.check(
+                "deflection of the middle",
+                w,
+                unit="q a^4 / D",
+                reference=reference,
+                source=PLATE_SOURCE,
+                tolerance=0.03 if element is morley else 1e-4,
+                params=params,
+                path=Cost(wall_time_s=spent),
+            )

@@ -21,7 +21,7 @@ from bh import Path, trace
 from bh.solvers.outcome import Outcome
 from meshes.structured import Kind
 from verification.framework.alignment import aligned
-from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.framework.environment import environment
 from verification.framework.measuring import REPEATS, measure
 from verification.framework.pareto import Trial, cheapest, front, rate
@@ -40,7 +40,7 @@ SOURCE = "the shell, extrapolated"
 class Member:
     """A model in the race. `levels` refine the sheet: n times a scene's cells along the crease, in n rows a side.
 
-    `rows` fixes the number of rows instead: bars and hinges lock where cells are not long (DESIGN.md, section 5).
+    `rows` fixes the number of rows instead: bars and hinges lock where cells are not long (docs/formulation.md).
     """
 
     formulation: str
@@ -50,6 +50,7 @@ class Member:
 
     @property
     def name(self) -> str:
+        """As in the legends."""
         return f"{self.formulation}, {self.kind}"
 
 
@@ -100,6 +101,7 @@ class Store:
 
     @classmethod
     def open(cls, folder: FilePath, quick: bool) -> Store:
+        """The store in a folder; empty where what is there was made by other versions."""
         file = folder / RUNS
         made_by = {"versions": environment(), "quick": quick}
         try:
@@ -110,6 +112,7 @@ class Store:
         return cls(file, found if same else {"made_by": made_by})
 
     def keep(self, key: str, value: Any) -> None:
+        """Add one run (JSON data) and write the file anew."""
         self.runs[key] = value
         draft = self.file.with_suffix(".part")
         draft.write_text(json.dumps(self.runs), encoding="utf-8")
@@ -136,9 +139,16 @@ def solve(problem: Problem, member: Member, level: float, *, timed: bool, quick:
         times = (path.wall_time_s, 0, math.nan)
     reached = path.reached
     run = Run(
-        path.outcome, path[-1].energy.total, problem.stiffness(path) if reached else math.nan,
-        path[-1].crease_points("crease").tolist(), along, rows, path.unknowns, path.iterations, *times,
-    )  # fmt: skip
+        path.outcome,
+        path[-1].energy.total,
+        problem.stiffness(path) if reached else math.nan,
+        path[-1].crease_points("crease").tolist(),
+        along,
+        rows,
+        path.unknowns,
+        path.iterations,
+        *times,
+    )
     return run, path
 
 
@@ -257,27 +267,41 @@ def _judge_truth(result: CaseResult, problem: Problem, truth: Truth) -> None:
         value, bar, order = getattr(truth, name)
         params = {"scene": problem.name, "error_bar": bar, "order": order, "formulation": JUDGE.formulation}
         words = QUANTITIES[name] if name == "energy" else problem.what
-        result.checks.append(Check(CASE, f"truth: {words}", params, value, unit, None, SOURCE))
-        result.checks.append(
-            Check(CASE, f"error bar of the truth over its value, {QUANTITIES[name]}", params, bar / abs(value), "1",
-                  0.0, "fit of the finest shells", 0.01)
-        )  # fmt: skip
+        result.check(f"truth: {words}", value, unit=unit, source=SOURCE, params=params)
+        result.check(
+            f"error bar of the truth over its value, {QUANTITIES[name]}",
+            bar / abs(value),
+            unit="1",
+            reference=0.0,
+            source="fit of the finest shells",
+            tolerance=0.01,
+            params=params,
+        )
     params = {"scene": problem.name, "length_mm": problem.length, "formulation": JUDGE.formulation}
-    result.checks.append(
-        Check(CASE, "error bar of the crease curve", params, truth.bar, "mm", 0.0, "last refinement of the shell",
-              2e-3 * problem.length)
-    )  # fmt: skip
+    result.check(
+        "error bar of the crease curve",
+        truth.bar,
+        unit="mm",
+        reference=0.0,
+        source="last refinement of the shell",
+        tolerance=2e-3 * problem.length,
+        params=params,
+    )
 
 
 def _cheapest(
-    result: CaseResult, problem: Problem, found: dict[Member, list[Run]], best: Trial | None, quantity: str,
+    result: CaseResult,
+    problem: Problem,
+    found: dict[Member, list[Run]],
+    best: Trial | None,
+    quantity: str,
     allowed: float,
-) -> None:  # fmt: skip
+) -> None:
     params: dict[str, Any] = {"scene": problem.name, "within": allowed}
     words = f"cheapest model, {QUANTITIES[quantity]} within {100 * allowed:g} %"
     if best is None:
         params["model"] = "none of those that were run"
-        result.checks.append(Check(CASE, words, params, math.nan, "s", None, "wall time, median"))
+        result.check(words, math.nan, unit="s", source="wall time, median", params=params)
         return
     run = next(
         r
@@ -287,16 +311,23 @@ def _cheapest(
     )
     params |= {"model": best.model, "along": run.along, "rows": run.rows, "relative_error": best.error}
     params |= {"memory_mb": run.memory_mb, "repeats": run.repeats}
-    result.checks.append(
-        Check(CASE, words, params, run.wall_time_s, "s", None, "wall time, median", unknowns=run.unknowns,
-              iterations=run.iterations, wall_time_s=run.wall_time_s)
-    )  # fmt: skip
+    result.check(
+        words,
+        run.wall_time_s,
+        unit="s",
+        source="wall time, median",
+        params=params,
+        path=Cost(unknowns=run.unknowns, iterations=run.iterations, wall_time_s=run.wall_time_s),
+    )
 
 
 def _rates(
-    result: CaseResult, problem: Problem, found: dict[Member, list[Run]],
-    errs: dict[Member, list[dict[str, tuple[float, float]]]], quantity: str,
-) -> None:  # fmt: skip
+    result: CaseResult,
+    problem: Problem,
+    found: dict[Member, list[Run]],
+    errs: dict[Member, list[dict[str, tuple[float, float]]]],
+    quantity: str,
+) -> None:
     """Order in the size of a cell of the errors above the bar, and the finest density's error, of every member."""
     for member, runs in found.items():
         above = [
@@ -318,20 +349,31 @@ def _rates(
             params["mm"] = last[0] * problem.length
         judged = member.formulation == "consistent" and quantity == "energy"
         asked = problem.asked + last[1] if judged else None
-        result.checks.append(
-            Check(CASE, f"relative error of the finest mesh, {QUANTITIES[quantity]}", params, last[0], "1", 0.0,
-                  SOURCE, asked, unknowns=cost.unknowns, iterations=cost.iterations, wall_time_s=cost.wall_time_s,
-                  outcome=cost.outcome)
-        )  # fmt: skip
+        result.check(
+            f"relative error of the finest mesh, {QUANTITIES[quantity]}",
+            last[0],
+            unit="1",
+            reference=0.0,
+            source=SOURCE,
+            tolerance=asked,
+            params=params,
+            path=cost,
+        )
 
 
 # --- plots and words ------------------------------------------------------------------------------------------
 
 
 def _plots(
-    result: CaseResult, problem: Problem, found: dict[Member, list[Run]], trials: dict[tuple[str, str], Trial],
-    best: list[Trial], quantity: str, words: str, bar: float,
-) -> None:  # fmt: skip
+    result: CaseResult,
+    problem: Problem,
+    found: dict[Member, list[Run]],
+    trials: dict[tuple[str, str], Trial],
+    best: list[Trial],
+    quantity: str,
+    words: str,
+    bar: float,
+) -> None:
     against_time, against_size = [], []
     for member, runs in found.items():
         here = [trials[member.name, f"{r.along} x {r.rows}"] for r in runs]
@@ -362,9 +404,16 @@ def _plots(
                 line("error bar of the truth", [min(ends), max(ends)], [100.0 * bar] * 2, "reference"),
             ]
         result.plots.append(
-            plot(f"speed-error-{problem.name}-{quantity}-{name}", f"{problem.title}: {words}", x, f"error, {unit}",
-                 series, caption + " Errors below the error bar of the truth are drawn on it.", log="xy")
-        )  # fmt: skip
+            plot(
+                f"speed-error-{problem.name}-{quantity}-{name}",
+                f"{problem.title}: {words}",
+                x,
+                f"error, {unit}",
+                series,
+                caption + " Errors below the error bar of the truth are drawn on it.",
+                log="xy",
+            )
+        )
 
 
 def _notes(result: CaseResult) -> list[str]:

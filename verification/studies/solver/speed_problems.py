@@ -64,6 +64,7 @@ class Problem:
 
 
 def is_shell(name: str) -> bool:
+    """Whether a formulation of this name is one of the shells."""
     return name.endswith("shell")
 
 
@@ -170,16 +171,65 @@ _STRIP = meshes.strip(LENGTH, HEIGHT, [0.5 * HEIGHT], "flat")
 _MOMENT = ("moment of the crease a length over its fold angle", "N")
 
 PROBLEMS = (
-    Problem("a", "App. B (a): edges in the plane, 90 degrees", _sector(math.pi / 4), 8,
-            lambda mesh, name: _appendix_b("a", mesh, name), _fold_stiffness, *_MOMENT),
-    Problem("d", "App. B (d): held at its corners, 90 degrees", _sector(math.pi / 4), 8,
-            lambda mesh, name: _appendix_b("d", mesh, name), _fold_stiffness, *_MOMENT),
-    Problem("free", "Free annulus, spring crease, rest angle 90 degrees", _sector(math.pi / 2), 16, _free,
-            _fold_stiffness, *_MOMENT),
-    Problem("torsion", "Strip of 3.4.1 twisted by 17 degrees", _STRIP, 20, _twisted, _torque,
-            "couple over angle", "N mm / rad", turning=False),
-    Problem("bending", "Strip of 3.4.1 under a line load", _STRIP, 20, _bent, _sag,
-            "line load over deflection of the middle", "N / mm^2", turning=False),
-    Problem("lifted", "Cantilevered annulus, tip lifted by 10 mm", _sector(math.pi / 4), 8, _lifted, _lift_force,
-            "force over rise", "N/mm", turning=False, asked=0.04),
-)  # fmt: skip
+    Problem(
+        "a",
+        "App. B (a): edges in the plane, 90 degrees",
+        _sector(math.pi / 4),
+        8,
+        lambda mesh, name: _appendix_b("a", mesh, name),
+        _fold_stiffness,
+        *_MOMENT,
+    ),
+    Problem(
+        "d",
+        "App. B (d): held at its corners, 90 degrees",
+        _sector(math.pi / 4),
+        8,
+        lambda mesh, name: _appendix_b("d", mesh, name),
+        _fold_stiffness,
+        *_MOMENT,
+    ),
+    Problem(
+        "free",
+        "Free annulus, spring crease, rest angle 90 degrees",
+        _sector(math.pi / 2),
+        16,
+        _free,
+        _fold_stiffness,
+        *_MOMENT,
+    ),
+    Problem(
+        "torsion",
+        "Strip of 3.4.1 twisted by 17 degrees",
+        _STRIP,
+        20,
+        _twisted,
+        _torque,
+        "couple over angle",
+        "N mm / rad",
+        turning=False,
+    ),
+    Problem(
+        "bending",
+        "Strip of 3.4.1 under a line load",
+        _STRIP,
+        20,
+        _bent,
+        _sag,
+        "line load over deflection of the middle",
+        "N / mm^2",
+        turning=False,
+    ),
+    Problem(
+        "lifted",
+        "Cantilevered annulus, tip lifted by 10 mm",
+        _sector(math.pi / 4),
+        8,
+        _lifted,
+        _lift_force,
+        "force over rise",
+        "N/mm",
+        turning=False,
+        asked=0.04,
+    ),
+)

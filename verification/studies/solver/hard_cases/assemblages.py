@@ -18,7 +18,7 @@ from bh.solvers.outcome import Critical
 from meshes import SheetMesh
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.dense_origami import DenseOrigami, Law
-from verification.studies.solver.hard_cases.common import Found, check, located
+from verification.studies.solver.hard_cases.common import located
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -62,6 +62,7 @@ class Assemblage:
         return topology.hinges[:, [1, 2, 0, 3]], stiffness, topology.edges
 
     def referee(self, law: Law) -> DenseOrigami:
+        """The same for the independent solver, with its own or the published laws."""
         hinges, stiffness, edges = self._hinges()
         return DenseOrigami(
             self.points, edges, self.EA, hinges, stiffness, self.held, self.load, law, self.linear
@@ -155,7 +156,7 @@ def _published(given: Assemblage, node: int, first: float, upto: float) -> tuple
     return np.array(states).T[0], np.array(states).T[1]
 
 
-def _refereed(given: Assemblage, path: Path, factor: float, name: str) -> Found:
+def _refereed(result: CaseResult, given: Assemblage, path: Path, factor: float, name: str) -> None:
     """Equilibrium, number of negative eigenvalues and limit points of `bh`, told by the referee."""
     referee, free = given.referee("quadratic"), ~given.held
 
@@ -169,25 +170,36 @@ def _refereed(given: Assemblage, path: Path, factor: float, name: str) -> Found:
         worst = max(worst, float(np.abs(unbalanced[free]).max()))
         wrong += (lowest(state.points) > 0.0) is not record.stable
     source = "independent dense implementation (Liu and Paulino 2017), laws of bh"
-    yield check(
-        f"{name}: largest residual of the referee over the load", worst / factor, "", 0.0, source, 1e-6, path
+    result.check(
+        f"{name}: largest residual of the referee over the load",
+        worst / factor,
+        reference=0.0,
+        source=source,
+        tolerance=1e-6,
+        path=path,
     )
-    yield check(
+    result.check(
         f"{name}: states whose stability the referee tells otherwise",
-        float(wrong),
-        "",
-        0.0,
-        source,
-        0.0,
-        path,
+        wrong,
+        reference=0.0,
+        source=source,
+        tolerance=0.0,
+        path=path,
     )
     begin = lowest(given.points)
     for number, (_, points) in enumerate(located(path, Critical.LIMIT), 1):
-        yield check(f"{name}: lowest eigenvalue at a limit point, over that of the start", lowest(points) / begin, "",
-                    0.0, source, 1e-3, path, number=number)  # fmt: skip
+        result.check(
+            f"{name}: lowest eigenvalue at a limit point, over that of the start",
+            lowest(points) / begin,
+            reference=0.0,
+            source=source,
+            tolerance=1e-3,
+            params={"number": number},
+            path=path,
+        )
 
 
-def assemblages(result: CaseResult) -> Found:
+def assemblages(result: CaseResult) -> None:
     """The bistable Miura fold through both its limit points, and the eggbox, whose load only rises."""
     published = (
         "data of Liu and Paulino 2017 (Miura_Bistable), their Ogden bars and hinges, by an independent dense "
@@ -196,7 +208,7 @@ def assemblages(result: CaseResult) -> Found:
     factor, node = 2.7, 60
     miura = miura_bistable()
     path = trace(miura.model(factor))
-    yield from _refereed(miura, path, factor, "bistable Miura")
+    _refereed(result, miura, path, factor, "bistable Miura")
     load = factor * path.lambdas
     fall = np.array([miura.points[node, 2] - state.points[node, 2] for state in path])
     their_load, their_fall = _published(miura, node, 0.1, factor)
@@ -204,27 +216,68 @@ def assemblages(result: CaseResult) -> Found:
         (factor * lam, float(miura.points[node, 2] - x[node, 2])) for lam, x in located(path, Critical.LIMIT)
     ]
     theirs = extremes(their_load, their_fall)
-    yield check(
-        "bistable Miura: limit points", float(len(ours)), "", float(len(theirs)), published, 0.0, path
+    result.check(
+        "bistable Miura: limit points",
+        len(ours),
+        reference=float(len(theirs)),
+        source=published,
+        tolerance=0.0,
+        path=path,
     )
     for which, (mine, other) in enumerate(zip(ours, theirs, strict=False), 1):
-        yield check("bistable Miura: load factor at a limit point", mine[0], "", other[0], published, 0.01, path,
-                    number=which)  # fmt: skip
-        yield check("bistable Miura: fall of the node at a limit point", mine[1], "mm", other[1], published, 0.02, path,
-                    number=which)  # fmt: skip
+        result.check(
+            "bistable Miura: load factor at a limit point",
+            mine[0],
+            reference=other[0],
+            source=published,
+            tolerance=0.01,
+            params={"number": which},
+            path=path,
+        )
+        result.check(
+            "bistable Miura: fall of the node at a limit point",
+            mine[1],
+            unit="mm",
+            reference=other[1],
+            source=published,
+            tolerance=0.02,
+            params={"number": which},
+            path=path,
+        )
     result.plots.append(
-        plot("hard-miura", "Bistable Miura fold", "fall of the middle node, mm", "load factor",
-             [line("bh.trace", fall.tolist(), load.tolist(), "points"),
-              line("published laws", their_fall.tolist(), their_load.tolist(), "reference")],
-             "5 x 5 cells pressed at the middle node: snap-through and snap-back (Liu and Paulino 2017).")
-    )  # fmt: skip
+        plot(
+            "hard-miura",
+            "Bistable Miura fold",
+            "fall of the middle node, mm",
+            "load factor",
+            [
+                line("bh.trace", fall.tolist(), load.tolist(), "points"),
+                line("published laws", their_fall.tolist(), their_load.tolist(), "reference"),
+            ],
+            "5 x 5 cells pressed at the middle node: snap-through and snap-back (Liu and Paulino 2017).",
+        )
+    )
     eggbox, factor, node = eggbox_bending(), 2.6, 5
     path = trace(eggbox.model(factor))
-    yield from _refereed(eggbox, path, factor, "eggbox")
+    _refereed(result, eggbox, path, factor, "eggbox")
     their_load, their_fall = _published(eggbox, node, 0.25, factor)
     source = published.replace("Miura_Bistable", "Eggbox_Bending")
-    yield check("eggbox: limit points", float(len(located(path, Critical.LIMIT))), "",
-                float(len(extremes(their_load, their_fall))), source, 0.0, path)  # fmt: skip
+    result.check(
+        "eggbox: limit points",
+        len(located(path, Critical.LIMIT)),
+        reference=float(len(extremes(their_load, their_fall))),
+        source=source,
+        tolerance=0.0,
+        path=path,
+    )
     fall_at_end = float(eggbox.points[node, 2] - path[-1].points[node, 2])
-    yield check("eggbox: fall of the loaded node", fall_at_end, "mm", float(np.interp(factor, their_load, their_fall)),
-                source, 0.01, path, factor=factor)  # fmt: skip
+    result.check(
+        "eggbox: fall of the loaded node",
+        fall_at_end,
+        unit="mm",
+        reference=float(np.interp(factor, their_load, their_fall)),
+        source=source,
+        tolerance=0.01,
+        params={"factor": factor},
+        path=path,
+    )

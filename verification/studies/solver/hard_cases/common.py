@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,29 +10,15 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Model, Path, Sheet
-from bh.solvers.outcome import Critical, Outcome
-from verification.framework.checks import Check, cost_of
 
-Found = Iterator[Check]
 Array = NDArray[np.float64]
 
 
-def check(
-    quantity: str, value: float, unit: str, reference: float | None, source: str, tolerance: float | None,
-    path: Path | None = None, **params: Any,
-) -> Check:  # fmt: skip
-    """A record of this case, with what the path cost that the value was read from."""
-    cost = {} if path is None else cost_of(path)
-    outcome = Outcome.REACHED if path is None else path.outcome
-    return Check(
-        "hard_cases", quantity, params, value, unit, reference, source, tolerance, outcome=outcome, **cost
-    )
-
-
-def located(path: Path, kind: Critical) -> list[tuple[float, Array]]:
-    """Lambda and node positions (n, 3), mm, of every limit or bifurcation point that the path has passed."""
+def located(path: Path, kind: str) -> list[tuple[float, Array]]:
+    """Lambda and node positions (n, 3), mm, of every "limit" or "bifurcation" point that the path has passed."""
+    systems = {record.step: path.solved(index)[0] for index, record in enumerate(path.records)}
     return [
-        (at.lam, path.system(step).positions(at.q, at.lam))
+        (at.lam, systems[step].positions(at.q, at.lam))
         for step, at in path.critical_points
         if at.kind == kind
     ]

@@ -14,7 +14,7 @@ from bh.model.sheet import ElementStiffness
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.ch3.cone import circle_radius
 from verification.studies.solver.campaign import FINE
-from verification.studies.solver.hard_cases.common import Found, annulus, check
+from verification.studies.solver.hard_cases.common import annulus
 
 KAPPA_0 = 0.005
 
@@ -30,7 +30,7 @@ def deep_model(stretching: float) -> Model:
     return replace(model, stiffness=ElementStiffness(stretching * bare.bar_stiffness, hinges))
 
 
-def deep_folding(result: CaseResult) -> Found:
+def deep_folding(result: CaseResult) -> None:
     """From flat to 1 degree: the isometric curvature first, then a peak, then flattening."""
     series = []
     peaks = {}
@@ -48,23 +48,54 @@ def deep_folding(result: CaseResult) -> Found:
         source = "Fuchs and Tabachnikov 1999: 1 / sin(phi / 2)"
         for angle, ratio in zip(angles, ratios, strict=True):
             if angle >= math.pi / 3:
-                yield check("deep folding: kappa / kappa_0", ratio, "", 1.0 / math.sin(angle / 2), source, 0.02,
-                             path, dihedral_deg=round(math.degrees(angle), 3))  # fmt: skip
-        yield check("deep folding: kappa / kappa_0 at 1 degree over the peak", ratios[-1] / max(ratios), "", None,
-                     "source Fig. 5.3 (b): falls after about 3.6 degrees", None, path)  # fmt: skip
+                result.check(
+                    "deep folding: kappa / kappa_0",
+                    ratio,
+                    reference=1.0 / math.sin(angle / 2),
+                    source=source,
+                    tolerance=0.02,
+                    params={"dihedral_deg": round(math.degrees(angle), 3)},
+                    path=path,
+                )
+        result.check(
+            "deep folding: kappa / kappa_0 at 1 degree over the peak",
+            ratios[-1] / max(ratios),
+            source="source Fig. 5.3 (b): falls after about 3.6 degrees",
+            path=path,
+        )
         usual = trace(deep_model(1.0).fold("crease", to=math.radians(1.0)))
-        yield check("deep folding: total energy at 1 degree", usual[-1].energy.total, "N mm",
-                     path[-1].energy.total, "four times finer increments", 1e-6, usual)  # fmt: skip
+        result.check(
+            "deep folding: total energy at 1 degree",
+            usual[-1].energy.total,
+            unit="N mm",
+            reference=path[-1].energy.total,
+            source="four times finer increments",
+            tolerance=1e-6,
+            path=usual,
+        )
     for stretching, (ratio, degrees) in peaks.items():
-        yield check("deep folding: peak of kappa / kappa_0", ratio, "", None, "source Fig. 5.3 (b)", None,
-                     c_s=stretching, at_deg=round(degrees, 2))  # fmt: skip
+        result.check(
+            "deep folding: peak of kappa / kappa_0",
+            ratio,
+            source="source Fig. 5.3 (b)",
+            params={"c_s": stretching, "at_deg": round(degrees, 2)},
+        )
     order = peaks[0.5][0] < peaks[1.0][0] < peaks[1.5][0]
-    yield check("deep folding: stiffer sheets peak higher", float(order), "", 1.0, "source 5.3", 0.0)
+    result.check(
+        "deep folding: stiffer sheets peak higher", order, reference=1.0, source="source 5.3", tolerance=0.0
+    )
     exact = np.linspace(6.0, 170.0, 83)
     series.append(
         line("isometric", exact.tolist(), (1.0 / np.sin(np.radians(exact) / 2)).tolist(), "reference")
     )
     result.plots.append(
-        plot("hard-deep", "Deep folding", "dihedral angle, degrees", "kappa / kappa_0", series,
-             "Curvature of the crease from flat to 1 degree; bars c_s times as stiff (Fig. 5.3).", log="xy")
-    )  # fmt: skip
+        plot(
+            "hard-deep",
+            "Deep folding",
+            "dihedral angle, degrees",
+            "kappa / kappa_0",
+            series,
+            "Curvature of the crease from flat to 1 degree; bars c_s times as stiff (Fig. 5.3).",
+            log="xy",
+        )
+    )

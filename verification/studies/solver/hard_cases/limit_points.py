@@ -17,41 +17,61 @@ from bh.solvers.linear import linear_response
 from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.benchmark_systems import VonMisesTruss
-from verification.studies.solver.hard_cases.common import Found, check
 
 
-def trusses(result: CaseResult) -> Found:
+def trusses(result: CaseResult) -> None:
     """Von Mises truss through snap-through and snap-back by arc length, against the exact curve."""
     series = []
     for spring in (None, 0.5, 0.05):
-        toy = VonMisesTruss(spring=spring)
-        start = point(toy, np.zeros(toy.size), 0.0)
+        truss = VonMisesTruss(spring=spring)
+        start = point(truss, np.zeros(truss.size), 0.0)
         for generalised in (False, True):
             control = Generalised() if generalised else Cylindrical()
-            found = list(ArcLength(control=control).follow(toy, [start]))
+            found = list(ArcLength(control=control).follow(truss, [start]))
             lam = np.array([item.point.lam for item in found])
             w = np.array([item.point.q[0] for item in found])
-            off = float(np.abs(toy.load(w) - lam).max()) if found[-1].outcome == Outcome.REACHED else math.nan
+            off = (
+                float(np.abs(truss.load(w) - lam).max()) if found[-1].outcome == Outcome.REACHED else math.nan
+            )
             params: dict[str, Any] = {
                 "spring": "none" if spring is None else spring,
                 "control": "MGDCM" if generalised else "arc",
             }
-            yield check("truss: distance from the exact path", off, "", 0.0, "closed form", 1e-7, **params)
-            unstable = {item.negative for item in found if toy.limit() < 1.0}
-            yield check("truss: unstable states counted", float(unstable == {0, 1}), "", 1.0, "one negative mode",
-                         0.0, **params)  # fmt: skip
+            result.check(
+                "truss: distance from the exact path",
+                off,
+                reference=0.0,
+                source="closed form",
+                tolerance=1e-7,
+                params=params,
+            )
+            unstable = {item.negative for item in found if truss.limit() < 1.0}
+            result.check(
+                "truss: unstable states counted",
+                unstable == {0, 1},
+                reference=1.0,
+                source="one negative mode",
+                tolerance=0.0,
+                params=params,
+            )
             if not generalised:
                 top = np.array([item.point.q[-1] for item in found])
                 series.append(line(f"spring {params['spring']}", top.tolist(), lam.tolist()))
     w = np.linspace(0.0, 2.7, 200)
     series.append(line("exact, no spring", w.tolist(), VonMisesTruss().load(w).tolist(), "reference"))
     result.plots.append(
-        plot("hard-truss", "Von Mises truss", "displacement of the load, mm", "lambda", series,
-             "Through limit points and snap-back by arc length.")
-    )  # fmt: skip
+        plot(
+            "hard-truss",
+            "Von Mises truss",
+            "displacement of the load, mm",
+            "lambda",
+            series,
+            "Through limit points and snap-back by arc length.",
+        )
+    )
 
 
-def euler_buckling(result: CaseResult) -> Found:
+def euler_buckling(result: CaseResult) -> None:
     """Critical load of a simply supported strip, from the inertia of the flat state by bisection."""
     length, width, t, E = 100.0, 10.0, 0.5, 4000.0
     exact = math.pi**2 * E * width * t**3 / 12.0 / length**2
@@ -72,5 +92,12 @@ def euler_buckling(result: CaseResult) -> Found:
             state = form.observe(model, system, q, lam)
             force = -float(state.reaction("edge:end")[0])
             low, high = (lam, high) if negative == 0 else (low, lam)
-        yield check("Euler buckling: critical load", force, "N", exact, "pi^2 E I / L^2",
-                     0.02 if alpha >= 8.0 else None, alpha=alpha, mesh="staggered")  # fmt: skip
+        result.check(
+            "Euler buckling: critical load",
+            force,
+            unit="N",
+            reference=exact,
+            source="pi^2 E I / L^2",
+            tolerance=0.02 if alpha >= 8.0 else None,
+            params={"alpha": alpha, "mesh": "staggered"},
+        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +18,6 @@ from bh.solvers.linear import linear_response
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.ch3.cone import circle_radius
 from verification.studies.solver.campaign import FINE
-from verification.studies.solver.hard_cases.common import Found, check
 
 Array = NDArray[np.float64]
 PINCHED = math.pi / 14.0
@@ -56,7 +56,7 @@ def crease_curvature(points: Array, reach: int = REACH) -> Array:
     )
 
 
-def pinch(result: CaseResult) -> Found:
+def pinch(result: CaseResult) -> None:
     """kappa_0 from 0 to 0.05 /mm; long and thin sheets too."""
     peaks = []
     series = []
@@ -67,14 +67,38 @@ def pinch(result: CaseResult) -> Found:
         last = path[-1]
         params = {"kappa_0_per_mm": kappa_0, "L_mm": length, "t_mm": t}
         phi = last.dihedral("crease")
-        yield check("pinch: total energy", last.energy.total, "N mm", fine[-1].energy.total,
-                    "four times finer increments", 1e-7, path, **params)  # fmt: skip
-        yield check("pinch: smallest dihedral angle", float(phi.min()), "rad", PINCHED, "imposed (5.3.2)", 1e-9, path,
-                    **params)  # fmt: skip
-        yield check("pinch: largest difference between both halves", float(np.abs(phi - phi[::-1]).max()), "rad", 0.0,
-                    "mirror symmetry", 1e-7, path, **params)  # fmt: skip
-        yield check("pinch: at most 60 iterations", float(path.iterations <= 60), "", 1.0,
-                    "target", 0.0, path, **params)  # fmt: skip
+        check = partial(result.check, params=params, path=path)
+        check(
+            "pinch: total energy",
+            last.energy.total,
+            unit="N mm",
+            reference=fine[-1].energy.total,
+            source="four times finer increments",
+            tolerance=1e-7,
+        )
+        check(
+            "pinch: smallest dihedral angle",
+            phi.min(),
+            unit="rad",
+            reference=PINCHED,
+            source="imposed (5.3.2)",
+            tolerance=1e-9,
+        )
+        check(
+            "pinch: largest difference between both halves",
+            np.abs(phi - phi[::-1]).max(),
+            unit="rad",
+            reference=0.0,
+            source="mirror symmetry",
+            tolerance=1e-7,
+        )
+        check(
+            "pinch: at most 60 iterations",
+            path.iterations <= 60,
+            reference=1.0,
+            source="target",
+            tolerance=0.0,
+        )
         if t == 0.5 and kappa_0 > 0.0:
             curvature = crease_curvature(last.crease_points("crease"))
             # the source's peak lies just outside the pinched zone; inside, a held angle keeps a crest of its own
@@ -83,15 +107,30 @@ def pinch(result: CaseResult) -> Found:
             peaks.append((kappa_0, float(curvature[np.abs(u - 0.5) > 0.5 * ZONE / length].max())))
             series.append(line(f"kappa_0 = {kappa_0:g} /mm", u.tolist(), curvature.tolist()))
     for kappa_0, peak in peaks:
-        yield check("pinch: peak curvature outside the pinched zone over kappa_0", peak / kappa_0, "", None,
-                    "source Fig. 5.6 (b): proportional to kappa_0", None, kappa_0_per_mm=kappa_0)  # fmt: skip
+        result.check(
+            "pinch: peak curvature outside the pinched zone over kappa_0",
+            peak / kappa_0,
+            source="source Fig. 5.6 (b): proportional to kappa_0",
+            params={"kappa_0_per_mm": kappa_0},
+        )
     slopes = [math.log(b[1] / a[1]) / math.log(b[0] / a[0]) for a, b in pairwise(peaks[:4])]
-    yield check("pinch: exponent of the peak curvature in kappa_0 up to 0.02 /mm", float(np.mean(slopes)), "", 1.0,
-                "source Fig. 5.6 (b): proportional", 0.1)  # fmt: skip
+    result.check(
+        "pinch: exponent of the peak curvature in kappa_0 up to 0.02 /mm",
+        np.mean(slopes),
+        reference=1.0,
+        source="source Fig. 5.6 (b): proportional",
+        tolerance=0.1,
+    )
     result.plots.append(
-        plot("hard-pinch", "Pinched single crease", "u / L", "curvature of the crease, 1/mm", series,
-             "Folded to 90 degrees, then its middle 10 mm closed to pi / 14 (Fig. 5.6 a).")
-    )  # fmt: skip
+        plot(
+            "hard-pinch",
+            "Pinched single crease",
+            "u / L",
+            "curvature of the crease, 1/mm",
+            series,
+            "Folded to 90 degrees, then its middle 10 mm closed to pi / 14 (Fig. 5.6 a).",
+        )
+    )
 
 
 # ------------------------------------------------------------------------------------ a pleated fan (3.5.3)
@@ -116,6 +155,7 @@ class Fan:
         radius: float = RADIUS,
         rows: int = 2,
     ) -> None:
+        """A fan of `along` cells and `rows` a pleat; sector angle in rad, thickness and inner radius in mm."""
         radii = [radius + PLEAT * i for i in range(PLEATS)]
         folds = ["mountain" if i % 2 == 0 else "valley" for i in range(PLEATS)]
         pattern = meshes.annulus_sector(radii, PLEAT, angle, folds)  # type: ignore[arg-type]
@@ -156,29 +196,51 @@ class Fan:
         return found[0], found[1]
 
 
-def fan(result: CaseResult) -> Found:
+def fan(result: CaseResult) -> None:
     """Folded to 90 degrees and pinched to a tenth of its width; axial against rotational stiffness on the way."""
     it = Fan()
     folded = trace(it.folded)
     for number, name in enumerate(it.mesh.creases):
         angle = float(folded[-1].fold_angle(name).mean())
-        yield check("fan: mean fold angle", angle, "rad", (-1.0) ** number * 0.5 * math.pi, "rest angle, L* = 2 mm",
-                    0.02, folded, crease=name)  # fmt: skip
+        result.check(
+            "fan: mean fold angle",
+            angle,
+            unit="rad",
+            reference=(-1.0) ** number * 0.5 * math.pi,
+            source="rest angle, L* = 2 mm",
+            tolerance=0.02,
+            params={"crease": name},
+            path=folded,
+        )
     for share in (0.5, 0.7, 0.9):
         path = trace(it.pinched(folded[-1], share))
         fine = trace(it.pinched(folded[-1], share), strategy=FINE)
         buckled = share > 0.8  # then there are many states with nearly the same energy
         how = "that of finer increments; 2 % is another branch" if buckled else "four times finer increments"
-        yield check("fan: total energy of the pinched fan", path[-1].energy.total, "N mm", fine[-1].energy.total, how,
-                    0.02 if buckled else 1e-6, path, share=share)  # fmt: skip
+        result.check(
+            "fan: total energy of the pinched fan",
+            path[-1].energy.total,
+            unit="N mm",
+            reference=fine[-1].energy.total,
+            source=how,
+            tolerance=0.02 if buckled else 1e-6,
+            params={"share": share},
+            path=path,
+        )
     pull = [float(s.reaction(f"node:{it.line[-1]}") @ it.er) for s in path if s.step == 1]
     falls = bool((np.diff(np.abs(pull)) < 0.0).any())
-    yield check("fan: pleats buckle, the pull falls on the way", float(falls), "", 1.0,
-                "source 3.5.3: sequential folds buckle together", 0.0, path)  # fmt: skip
-    yield from _anisotropy(result, it, path)
+    result.check(
+        "fan: pleats buckle, the pull falls on the way",
+        falls,
+        reference=1.0,
+        source="source 3.5.3: sequential folds buckle together",
+        tolerance=0.0,
+        path=path,
+    )
+    _anisotropy(result, it, path)
 
 
-def _anisotropy(result: CaseResult, it: Fan, path: Path) -> Found:
+def _anisotropy(result: CaseResult, it: Fan, path: Path) -> None:
     """Along the pinch: energy against the work of the pull, and the two stiffnesses of Fig. 3.11 (e, f)."""
     pinch = [(record, state) for record, state in zip(path.records, path, strict=True) if record.step == 1]
     ratios, shares = [], []
@@ -188,13 +250,34 @@ def _anisotropy(result: CaseResult, it: Fan, path: Path) -> Found:
         axial, turning = it.stiffness(path.model, state)
         ratios.append(turning / axial)
         shares.append(record.lam)
-    yield check("fan: largest rotational over axial stiffness", max(ratios), "", None,
-                "source 3.5.3: axial is always greater", None, path)  # fmt: skip
-    yield check("fan: axial stiffness is greater at every state", float(max(ratios) < 1.0), "", 1.0, "source 3.5.3",
-                0.0, path)  # fmt: skip
-    yield check("fan: rotational over axial stiffness, pinched over first", ratios[-1] / ratios[0], "", None,
-                "source Fig. 3.11 (f): falls, to 0.2 % at its end", None, path)  # fmt: skip
+    result.check(
+        "fan: largest rotational over axial stiffness",
+        max(ratios),
+        source="source 3.5.3: axial is always greater",
+        path=path,
+    )
+    result.check(
+        "fan: axial stiffness is greater at every state",
+        max(ratios) < 1.0,
+        reference=1.0,
+        source="source 3.5.3",
+        tolerance=0.0,
+        path=path,
+    )
+    result.check(
+        "fan: rotational over axial stiffness, pinched over first",
+        ratios[-1] / ratios[0],
+        source="source Fig. 3.11 (f): falls, to 0.2 % at its end",
+        path=path,
+    )
     result.plots.append(
-        plot("hard-fan", "Pinched fan", "share of the pinch", "rotational over axial stiffness",
-             [line("end of the middle crease", shares, ratios)], "As the fan is pinched (Fig. 3.11 f).", log="y")
-    )  # fmt: skip
+        plot(
+            "hard-fan",
+            "Pinched fan",
+            "share of the pinch",
+            "rotational over axial stiffness",
+            [line("end of the middle crease", shares, ratios)],
+            "As the fan is pinched (Fig. 3.11 f).",
+            log="y",
+        )
+    )

@@ -13,7 +13,6 @@ from bh import Model, Sheet, trace
 from meshes import SheetMesh
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.campaign import FINE
-from verification.studies.solver.hard_cases.common import Found, check
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -41,10 +40,12 @@ def random_mesh(seed: int, slender: float, angle: float = math.pi / 4.0) -> Shee
     triangles = []
     total = int(first[-1])
     for panel in range(2):
-        inside = np.column_stack((
-            _irregular(rng, columns)[1:-1] + rng.uniform(-0.2, 0.2, columns - 1) / columns,
-            RADIUS + WIDTH * (panel - 1 + rng.uniform(0.3, 0.7, columns - 1)),
-        ))  # fmt: skip
+        inside = np.column_stack(
+            (
+                _irregular(rng, columns)[1:-1] + rng.uniform(-0.2, 0.2, columns - 1) / columns,
+                RADIUS + WIDTH * (panel - 1 + rng.uniform(0.3, 0.7, columns - 1)),
+            )
+        )
         numbers = np.concatenate((np.arange(first[panel], first[panel + 2]), total + np.arange(len(inside))))
         points.append(inside)
         total += len(inside)
@@ -69,7 +70,8 @@ def _delaunay(flat: Array) -> Ints:
     found = Delaunay(flat).simplices.astype(np.int64)
     a, b, c = (flat[found[:, i]] for i in range(3))
     doubled = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    return found[doubled > 1e-9 * doubled.max()]
+    kept: Ints = found[doubled > 1e-9 * doubled.max()]
+    return kept
 
 
 def _counter_clockwise(xy: Array, triangles: Ints) -> Ints:
@@ -85,7 +87,7 @@ def worst_aspect(mesh: SheetMesh) -> float:
     return float((0.5 * longest**2 / mesh.areas).max())
 
 
-def random_meshes(result: CaseResult) -> Found:
+def random_meshes(result: CaseResult) -> None:
     """Sixteen of them, held and spring creases, folded to 90 degrees or by as much of a rest angle."""
     rng = np.random.default_rng(SEED)
     aspects, iterations = [], []
@@ -99,16 +101,32 @@ def random_meshes(result: CaseResult) -> Found:
         path = trace(model)
         fine = trace(model, strategy=FINE)
         aspect = worst_aspect(mesh)
-        yield check("random mesh: total energy", path[-1].energy.total, "N mm", fine[-1].energy.total,
-                    "four times finer increments", 1e-6, path, index=index, slender=round(slender, 2),
-                    worst_aspect=round(aspect, 1), crease="held" if "to" in fold else "spring")  # fmt: skip
+        result.check(
+            "random mesh: total energy",
+            path[-1].energy.total,
+            unit="N mm",
+            reference=fine[-1].energy.total,
+            source="four times finer increments",
+            tolerance=1e-6,
+            params={
+                "index": index,
+                "slender": round(slender, 2),
+                "worst_aspect": round(aspect, 1),
+                "crease": "held" if "to" in fold else "spring",
+            },
+            path=path,
+        )
         aspects.append(aspect)
         iterations.append(float(path.iterations))
-    yield check(
-        "random mesh: worst triangle, longest edge over height", max(aspects), "", None, "reported", None
-    )
+    result.check("random mesh: worst triangle, longest edge over height", max(aspects), source="reported")
     result.plots.append(
-        plot("hard-random", "Random meshes", "worst triangle, longest edge over height",
-             "iterations from flat to 90 degrees", [line("scene", aspects, iterations, "points")],
-             "Delaunay meshes of random points, default settings.", log="x")
-    )  # fmt: skip
+        plot(
+            "hard-random",
+            "Random meshes",
+            "worst triangle, longest edge over height",
+            "iterations from flat to 90 degrees",
+            [line("scene", aspects, iterations, "points")],
+            "Delaunay meshes of random points, default settings.",
+            log="x",
+        )
+    )

@@ -9,6 +9,7 @@ is closed.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, shee
 from meshes import SheetMesh
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.ch3.cone import circle_radius
-from verification.studies.solver.hard_cases.common import Found, check
 from verification.theory import rolled
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def ends(path: Path) -> Array:
     return np.array([state.points[end, 0] for state in path])
 
 
-def roll_up(result: CaseResult) -> Found:
+def roll_up(result: CaseResult) -> None:
     """From flat to the closed circle, every state against its arc."""
     series = []
     errors = []
@@ -94,28 +94,62 @@ def roll_up(result: CaseResult) -> Found:
         exact = [rolled.chord(LENGTH, rolled.curvature(EI, lam * CLOSING)) for lam in path.lambdas]
         found = ends(path)
         errors.append(float(np.abs(found - exact).max() / LENGTH))
-        yield check("roll-up: largest distance of the end from the elastica, over the length", errors[-1], "", 0.0,
-                    source, 0.01 if judged else None, path, along=along)  # fmt: skip
+        check = partial(result.check, params={"along": along}, path=path)
+        check(
+            "roll-up: largest distance of the end from the elastica, over the length",
+            errors[-1],
+            reference=0.0,
+            source=source,
+            tolerance=0.01 if judged else None,
+        )
         middle = strip[np.abs(path.model.mesh.points[:-3, 1]) < 1e-9]
-        yield check("roll-up: radius of the closed circle", circle_radius(middle), "mm", LENGTH / (2.0 * math.pi),
-                    source, 0.01 if judged else None, path, along=along)  # fmt: skip
+        check(
+            "roll-up: radius of the closed circle",
+            circle_radius(middle),
+            unit="mm",
+            reference=LENGTH / (2.0 * math.pi),
+            source=source,
+            tolerance=0.01 if judged else None,
+        )
         turn = path[-1].fold_angle("fold") - path[0].fold_angle("fold")
-        yield check("roll-up: turn of both ends", float(turn.sum()), "rad", 2.0 * math.pi, source,
-                    0.01 if judged else None, path, along=along)  # fmt: skip
-        yield check("roll-up: stretching over bending energy", path[-1].energy.stretching / path[-1].energy.bending, "",
-                    0.0, "inextensible", 1e-3 if judged else None, path, along=along)  # fmt: skip
+        check(
+            "roll-up: turn of both ends",
+            turn.sum(),
+            unit="rad",
+            reference=2.0 * math.pi,
+            source=source,
+            tolerance=0.01 if judged else None,
+        )
+        check(
+            "roll-up: stretching over bending energy",
+            path[-1].energy.stretching / path[-1].energy.bending,
+            reference=0.0,
+            source="inextensible",
+            tolerance=1e-3 if judged else None,
+        )
         series.append(
             line(
                 f"{along} cells", (2.0 * math.pi * path.lambdas).tolist(), (found / LENGTH).tolist(), "points"
             )
         )
-    yield check("roll-up: order of that distance in the size of the cells", math.log2(errors[-2] / errors[-1]), "", 2.0,
-                source, 0.2)  # fmt: skip
+    result.check(
+        "roll-up: order of that distance in the size of the cells",
+        math.log2(errors[-2] / errors[-1]),
+        reference=2.0,
+        source=source,
+        tolerance=0.2,
+    )
     turns = np.linspace(0.0, 2.0 * math.pi, 100)
     series.append(
         line("elastica", turns.tolist(), [rolled.chord(1.0, t) for t in turns.tolist()], "reference")
     )
     result.plots.append(
-        plot("hard-roll-up", "Strip rolled up by end moments", "M L / (E I)", "distance of the ends over the length",
-             series, "The ends meet at 2 pi, where the strip is a closed circle.")
-    )  # fmt: skip
+        plot(
+            "hard-roll-up",
+            "Strip rolled up by end moments",
+            "M L / (E I)",
+            "distance of the ends over the length",
+            series,
+            "The ends meet at 2 pi, where the strip is a closed circle.",
+        )
+    )

@@ -9,22 +9,41 @@ import numpy as np
 import meshes
 from bh import Automatic, Model, ModelError, Path, Sheet, trace
 from verification.framework.checks import CaseResult
-from verification.studies.solver.hard_cases.common import Found, annulus, check
+from verification.studies.solver.hard_cases.common import annulus
 
 
-def flat_start(result: CaseResult) -> Found:
+def flat_start(result: CaseResult) -> None:
     """Exactly flat: mountain goes up, valley down, mirror images of each other."""
     up = trace(annulus().fold("crease", to=2.0))
     down = trace(annulus().fold("crease", to=2.0 * math.pi - 2.0))
     rise = [float(p[-1].crease_points("crease")[:, 2].mean() - p[-1].points[:, 2].mean()) for p in (up, down)]
-    yield check("flat start: mountain crease rises", float(rise[0] > 0.0), "", 1.0, "convention", 0.0, up)
-    yield check("flat start: valley over mountain energy", down[-1].energy.total / up[-1].energy.total, "", 1.0,
-                 "mirror symmetry", 1e-9, down)  # fmt: skip
-    yield check("flat start: rise of the valley over that of the mountain", rise[1] / rise[0], "", -1.0,
-                 "mirror symmetry", 1e-7, down)  # fmt: skip
+    result.check(
+        "flat start: mountain crease rises",
+        rise[0] > 0.0,
+        reference=1.0,
+        source="convention",
+        tolerance=0.0,
+        path=up,
+    )
+    result.check(
+        "flat start: valley over mountain energy",
+        down[-1].energy.total / up[-1].energy.total,
+        reference=1.0,
+        source="mirror symmetry",
+        tolerance=1e-9,
+        path=down,
+    )
+    result.check(
+        "flat start: rise of the valley over that of the mountain",
+        rise[1] / rise[0],
+        reference=-1.0,
+        source="mirror symmetry",
+        tolerance=1e-7,
+        path=down,
+    )
 
 
-def ring(result: CaseResult) -> Found:
+def ring(result: CaseResult) -> None:
     """A full annulus buckles out of its plane; both mirror images have one energy."""
     mesh = meshes.structured(meshes.full_annulus(100.0, 10.0), along=64)
     energies = []
@@ -33,22 +52,59 @@ def ring(result: CaseResult) -> Found:
         path = trace(Model(mesh, sheet).fold("crease", to=to))
         plane = _out_of_plane(path)
         energies.append(path[-1].energy.total)
-        yield check("ring: rms distance of the crease from its plane", plane, "mm", None,
-                     "planar before it buckles", None, path, dihedral=round(to, 4))  # fmt: skip
-        yield check("ring: out of plane", float(plane > 1.0), "", 1.0, "must buckle", 0.0, path)
-    yield check("ring: energy of the mirror image", energies[1], "N mm", energies[0], "mirror symmetry", 1e-6)
-    planar = trace(Model(mesh, sheet).fold("crease", to=2.2), strategy=Automatic(at_bifurcation="primary"))
-    yield check("ring, planar branch: rms distance of the crease from its plane", _out_of_plane(planar), "mm", 0.0,
-                 "symmetry", 1e-9, planar)  # fmt: skip
-    yield check(
-        "ring, planar branch: found unstable", float(planar.stable is False), "", 1.0, "inertia", 0.0, planar
+        result.check(
+            "ring: rms distance of the crease from its plane",
+            plane,
+            unit="mm",
+            source="planar before it buckles",
+            params={"dihedral": round(to, 4)},
+            path=path,
+        )
+        result.check(
+            "ring: out of plane", plane > 1.0, reference=1.0, source="must buckle", tolerance=0.0, path=path
+        )
+    result.check(
+        "ring: energy of the mirror image",
+        energies[1],
+        unit="N mm",
+        reference=energies[0],
+        source="mirror symmetry",
+        tolerance=1e-6,
     )
-    yield check("ring, planar branch: energy over the buckled one", planar[-1].energy.total / energies[0], "", None,
-                 "above 1", None, planar)  # fmt: skip
+    planar = trace(Model(mesh, sheet).fold("crease", to=2.2), strategy=Automatic(at_bifurcation="primary"))
+    result.check(
+        "ring, planar branch: rms distance of the crease from its plane",
+        _out_of_plane(planar),
+        unit="mm",
+        reference=0.0,
+        source="symmetry",
+        tolerance=1e-9,
+        path=planar,
+    )
+    result.check(
+        "ring, planar branch: found unstable",
+        planar.stable is False,
+        reference=1.0,
+        source="inertia",
+        tolerance=0.0,
+        path=planar,
+    )
+    result.check(
+        "ring, planar branch: energy over the buckled one",
+        planar[-1].energy.total / energies[0],
+        source="above 1",
+        path=planar,
+    )
     _, first = planar.critical_points[0]
     fold = math.degrees(first.lam * (math.pi - 2.2))
-    yield check("ring, planar branch: fold angle where it loses its stability", fold, "degrees", None,
-                 "bisection", None, planar, modes=first.negative[1])  # fmt: skip
+    result.check(
+        "ring, planar branch: fold angle where it loses its stability",
+        fold,
+        unit="degrees",
+        source="bisection",
+        params={"modes": first.negative[1]},
+        path=planar,
+    )
 
 
 def _out_of_plane(path: Path) -> float:
@@ -57,15 +113,22 @@ def _out_of_plane(path: Path) -> float:
     return float(spread[2]) / math.sqrt(len(crease))
 
 
-def back_to_flat(result: CaseResult) -> Found:
+def back_to_flat(result: CaseResult) -> None:
     """Fold to 60 degrees and unfold: nothing is left."""
     path = trace(annulus().fold("crease", to=math.pi / 3).fold("crease", to=math.pi))
     peak = max(state.energy.total for state in path)
     left = path[-1].energy.total / peak
-    yield check("fold and unfold: energy left over its peak", left, "", 0.0, "elastic", 1e-10, path)
+    result.check(
+        "fold and unfold: energy left over its peak",
+        left,
+        reference=0.0,
+        source="elastic",
+        tolerance=1e-10,
+        path=path,
+    )
 
 
-def mechanism(result: CaseResult) -> Found:
+def mechanism(result: CaseResult) -> None:
     """Missing supports are named with the motions that they leave."""
     said = ""
     try:
@@ -73,4 +136,6 @@ def mechanism(result: CaseResult) -> Found:
     except ModelError as error:
         said = str(error)
     named = "rotation about z" in said and "\n" not in said
-    yield check("mechanism: named with its motions", float(named), "", 1.0, "one-line error", 0.0)
+    result.check(
+        "mechanism: named with its motions", named, reference=1.0, source="one-line error", tolerance=0.0
+    )

@@ -18,7 +18,6 @@ from bh.solvers.outcome import Outcome
 from meshes.pattern import CreasePattern, FoldKind
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.campaign import FINE
-from verification.studies.solver.hard_cases.common import Found, check
 
 SIDE, RADII, HEIGHTS = 100.0, (80.0, 250.0), (35.0, 70.0)
 STIFF_TO_SOFT = (0.01, 1.0, 10.0, 100.0)
@@ -36,7 +35,7 @@ def folded(folds: tuple[FoldKind, FoldKind], Lstar: float, by: float, along: int
     return Model(mesh, Sheet(E=4000.0, t=0.274)).fold("all", by=by, Lstar=Lstar)
 
 
-def two_creases(result: CaseResult) -> Found:
+def two_creases(result: CaseResult) -> None:
     """Rest angles from flat to 30 degrees (60 where the creases fight), L* over four decades."""
     series = []
     for folds, by in (
@@ -48,8 +47,16 @@ def two_creases(result: CaseResult) -> Found:
         for Lstar in STIFF_TO_SOFT:
             path = trace(folded(folds, Lstar, by))  # type: ignore[arg-type]
             fine = trace(folded(folds, Lstar, by), strategy=FINE)  # type: ignore[arg-type]
-            yield check("two creases: total energy", path[-1].energy.total, "N mm", fine[-1].energy.total,
-                        "four times finer increments", 1e-7, path, folds=senses, Lstar_mm=Lstar)  # fmt: skip
+            result.check(
+                "two creases: total energy",
+                path[-1].energy.total,
+                unit="N mm",
+                reference=fine[-1].energy.total,
+                source="four times finer increments",
+                tolerance=1e-7,
+                params={"folds": senses, "Lstar_mm": Lstar},
+                path=path,
+            )
             angles = [[abs(float(state.fold_angle(f"crease-{i}").mean())) for state in path] for i in (1, 2)]
             short.append([1.0 - angle[-1] / by for angle in angles])
             if folds[1] == "mountain":
@@ -58,18 +65,39 @@ def two_creases(result: CaseResult) -> Found:
                     line(f"{name}, L* = {Lstar:g} mm", rest, np.degrees(angle).tolist())
                     for name, angle in zip(("curved", "straighter"), angles, strict=True)
                 ]
-        yield check("two creases: share of its fold that the curved crease lacks at L* = 0.01", short[0][0], "", None,
-                    SOURCE, None, folds=senses)  # fmt: skip
+        result.check(
+            "two creases: share of its fold that the curved crease lacks at L* = 0.01",
+            short[0][0],
+            source=SOURCE,
+            params={"folds": senses},
+        )
         ordered = all(a[0] < b[0] for a, b in pairwise(short)) and all(abs(s[1]) < s[0] for s in short)
-        yield check("two creases: the curved one lags more, and more so the softer", float(ordered), "", 1.0, SOURCE,
-                    0.0, folds=senses)  # fmt: skip
+        result.check(
+            "two creases: the curved one lags more, and more so the softer",
+            ordered,
+            reference=1.0,
+            source=SOURCE,
+            tolerance=0.0,
+            params={"folds": senses},
+        )
     # beyond about 145 degrees the panel inside the curved crease crumples: whatever happens has to be named
     path = trace(folded(("mountain", "mountain"), 0.01, 5.0 * math.pi / 6.0))
-    reasons = (Outcome.REACHED, Outcome.LIMIT_POINT, Outcome.BIFURCATION, Outcome.CONTACT)
-    named = path.outcome in reasons
-    yield check("two creases: rigid springs of one sense to 150 degrees, reached or the reason named", float(named),
-                "", 1.0, "an outcome that names the reason", 0.0, furthest=round(path[-1].lam, 4))  # fmt: skip
+    named = path.outcome in (Outcome.REACHED, Outcome.LIMIT_POINT, Outcome.BIFURCATION, Outcome.CONTACT)
+    result.check(
+        "two creases: rigid springs of one sense to 150 degrees, reached or the reason named",
+        named,
+        reference=1.0,
+        source="an outcome that names the reason",
+        tolerance=0.0,
+        params={"furthest": round(path[-1].lam, 4)},
+    )
     result.plots.append(
-        plot("hard-two-creases", "Two creases of different curvature", "rest fold angle, degrees",
-             "mean fold angle, degrees", series, "Both mountain, radii 80 and 250 mm in a 100 mm square (Fig. 3.8).")
-    )  # fmt: skip
+        plot(
+            "hard-two-creases",
+            "Two creases of different curvature",
+            "rest fold angle, degrees",
+            "mean fold angle, degrees",
+            series,
+            "Both mountain, radii 80 and 250 mm in a 100 mm square (Fig. 3.8).",
+        )
+    )

@@ -17,16 +17,26 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 
-class Crossing(Protocol):
-    """A rule that forbids designs. `measure` is 0 where a design is allowed, positive where it is not."""
+class SelfIntersectionRule(Protocol):
+    """A rule that forbids designs."""
 
     def measure(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> Array:
-        """(...) of designs (..., n)."""
+        """(...) of designs (..., n).
+
+        Args:
+            surrogate: of the segments.
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+            pinched: (..., n).
+
+        Returns:
+            (...), 0 where a design is allowed, positive where it is not.
+        """
         ...
 
 
 def planar(points: ArrayLike) -> Bools:
-    """(...) True where polygons (..., n + 1, 2) cross themselves.
+    """Whether polygons intersect themselves: (...) of (..., n + 1, 2) vertices.
 
     Two segments cross if the ends of each lie on different sides of the other. Touching is allowed, so that a crease
     may end where it begins; a segment that goes straight back over the one before is not.
@@ -63,6 +73,7 @@ class Projected:
     """
 
     def measure(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> Array:
+        """(...) 1 where the chords of a design intersect in the plane, else 0; see the rule's protocol."""
         met = planar(surrogate.forward(k0, length, pinched, check=False)[0][..., :2])
         met |= planar(surrogate.unpinched(k0, length)[0][..., :2])
         return met.astype(float)
@@ -76,13 +87,16 @@ class Swept:
     not, so helices are found. The flat sheet has to be cut out of one piece: its outline must not cross itself.
 
     Attributes:
-        width: of either panel, mm; cell: length of the drawn panels along the crease, mm.
+        width: of either panel, mm.
+        cell: length of the drawn panels along the crease, mm.
     """
 
     def __init__(self, width: float = 5.0, cell: float = 5.0) -> None:
+        """Set width and cell, mm."""
         self.width, self.cell = width, cell
 
     def measure(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> Array:
+        """(...) 1 where the strips of a design intersect themselves, else 0; see the rule's protocol."""
         k0, length, on = (np.asarray(x) for x in np.broadcast_arrays(k0, length, pinched))
         found = np.empty(k0.shape[:-1])
         for at in np.ndindex(found.shape):
@@ -90,7 +104,7 @@ class Swept:
         return found
 
     def meets(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> bool:
-        """Does one design meet itself, flat, folded or pinched?"""
+        """Whether one design, (n,) each, meets itself, flat, folded or pinched."""
         from bh.analysis.contact import candidates
         from bh.analysis.triangles import intersecting
 
@@ -109,7 +123,7 @@ class Swept:
         return False
 
     def flat_is_simple(self, k0: ArrayLike, length: ArrayLike) -> bool:
-        """Can the flat strip be cut out of one sheet?"""
+        """Whether the flat strip of one design, (n,) each, can be cut out of one sheet."""
         from meshes import PatternError, parallel_creases
 
         try:
@@ -121,7 +135,14 @@ class Swept:
     def strip(
         self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools
     ) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-        """Points (m, 3), triangles (t, 3) and the number (t,) of the cell along the crease that each belongs to."""
+        """Points (m, 3), triangles (t, 3) and the number (t,) of the cell along the crease that each belongs to.
+
+        Args:
+            surrogate: of the segments.
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+            pinched: (n,).
+        """
         points, frames = self.crease(surrogate, k0, length, pinched)
         half = 0.5 * surrogate.setting.fold
         down, out = self.width * math.cos(half), self.width * math.sin(half)
@@ -139,7 +160,14 @@ class Swept:
         return np.vstack((points, left, right)), triangles, np.tile(i, 4)
 
     def crease(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> tuple[Array, Array]:
-        """(m, 3) points and (m, 3, 3) frames along the whole crease, one a cell."""
+        """(m, 3) points and (m, 3, 3) frames along the whole crease, one a cell.
+
+        Args:
+            surrogate: of the segments.
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+            pinched: (n,).
+        """
         ends, starts = surrogate.forward(k0, length, pinched, check=False)
         points, frames = [ends[:1]], [starts[:1]]
         for i, (k, size, on) in enumerate(zip(k0, length, pinched, strict=True)):
@@ -160,9 +188,17 @@ class Swept:
 
 
 def allowed(
-    rules: Sequence[Crossing], surrogate: Surrogate, k0: Array, length: Array, pinched: Bools
+    rules: Sequence[SelfIntersectionRule], surrogate: Surrogate, k0: Array, length: Array, pinched: Bools
 ) -> Array:
-    """(...) sum of the measures of some rules, 0 where a design is allowed."""
+    """(...) sum of the measures of some rules, 0 where a design is allowed.
+
+    Args:
+        rules: what is forbidden.
+        surrogate: of the segments.
+        k0: (..., n) curvatures before folding, 1/mm.
+        length: (..., n), mm.
+        pinched: (..., n).
+    """
     total: Array = np.zeros(np.shape(k0)[:-1])
     for rule in rules:
         total = total + rule.measure(surrogate, k0, length, pinched)

@@ -24,6 +24,7 @@ class Relaxed:
 
     Attributes:
         state: the equilibrium where `converged`, else where the search ended.
+        converged: whether the equilibrium was found.
         iterations: factorisations that moved the sheet.
         moved: (n,) distances of the nodes from the guess, mm; a free sheet also moves as a rigid body.
         reason: why it did not converge, or an empty string.
@@ -41,6 +42,11 @@ def relax(model: Model, points: ArrayLike, newton: Newton | None = None) -> Rela
 
     Supports and imposed angles are those of the end of the step. Nothing says that the branch is the one that folding
     reaches: compare the energies.
+
+    Args:
+        model: with one step, whose end is meant.
+        points: (n, 3) initial guess of the node positions, mm.
+        newton: how the equilibrium is solved for.
 
     Raises:
         ModelError: a model of other than one step, or positions that do not fit.

@@ -1,0 +1,148 @@
+"""The sheet of a scene: its pattern, drawn, read or made by the user's own function, and the mesh of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from bh.errors import SceneError
+from bh.model.plugins import made
+from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
+from bh.scene.reading import as_table, nearest, read_table, shown, within, without
+from bh.scene.tables import DrawnTable, GmshTable, MeshTable
+from meshes import CreasePattern, SheetMesh, structured
+
+LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
+
+
+def mesh_of(pattern: object, mesh: object, folder: Path) -> SheetMesh:
+    """The meshed sheet of a scene.
+
+    Args:
+        pattern: table [pattern].
+        mesh: table [mesh], or None.
+        folder: where files that these name are looked for.
+
+    Raises:
+        SceneError: a table that is not understood, or a mesh that would only fill the memory.
+        InputError: a file that cannot be read, or a pattern that cannot be meshed.
+    """
+    table = as_table(pattern, "pattern")
+    if "file" in table:
+        return _mesh_from_file(table, mesh, folder)
+    drawn = _drawn(table)
+    if mesh is None:
+        raise SceneError(
+            "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
+        )
+    how = _mesh_table(as_table(mesh, "mesh"))
+    if isinstance(how, DrawnTable):
+        raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
+    return _meshed(drawn, how)
+
+
+def _drawn(table: dict[str, object]) -> CreasePattern:
+    """A pattern of the library, or of the user's own: "module:function" with its arguments as keys."""
+    kind = table.get("kind")
+    listed = ", ".join(LIBRARY)
+    if kind is None:
+        raise SceneError(f"pattern.kind is missing; use one of {listed}, or give a file")
+    if isinstance(kind, str) and ":" in kind:
+        with within("pattern"):
+            own: CreasePattern = made(kind, without(table, "kind"), CreasePattern)
+            return own
+    if not isinstance(kind, str) or kind not in LIBRARY:
+        raise SceneError(
+            f"pattern.kind = {shown(kind)} is not known{nearest(kind, LIBRARY)}; use one of {listed}"
+        )
+    drawn = read_table(LIBRARY[kind], table, "pattern")
+    with within("pattern"):
+        return drawn.draw()
+
+
+def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
+    if isinstance(how, GmshTable):
+        from meshes.unstructured import sheet_area, unstructured
+
+        _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
+        with within("mesh"):
+            return unstructured(flat, size=how.size, near=how.near, growth=how.growth, seed=how.seed)
+    if not flat.rails:
+        raise SceneError(
+            f'mesh.kind = "{how.kind}" is for creases that run across the sheet side by side, or round a hole; '
+            'these do not: use kind = "gmsh" with size'
+        )
+    _check_size(flat, how)
+    with within("mesh"):
+        return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
+
+
+def _mesh_table(table: dict[str, object]) -> MeshTable | GmshTable | DrawnTable:
+    if table.get("kind") == "gmsh":
+        return read_table(GmshTable, table, "mesh")
+    if table.get("kind") == "drawn":
+        return read_table(DrawnTable, table, "mesh")
+    if "size" in table:
+        raise SceneError(
+            f'mesh.size = {shown(table["size"])} is for kind = "gmsh"; use along or aspect_ratio, or add that kind'
+        )
+    return read_table(MeshTable, table, "mesh")
+
+
+def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path) -> SheetMesh:
+    name = shown(table["file"])
+    suffix = Path(str(table["file"])).suffix.lower()
+    if suffix in (".svg", ".dxf"):
+        return _mesh_from_drawing(read_table(DrawingPattern, table, "pattern"), mesh, folder)
+    stored = read_table(FilePattern, table, "pattern")
+    if suffix != ".fold":
+        raise SceneError(f"pattern.file = {name} is no file of a pattern; give .svg, .dxf or .fold")
+    if mesh is not None:
+        raise SceneError(f"mesh: {name} brings its own faces, and they are the mesh; remove [mesh]")
+    from meshes.io import read_fold
+
+    with within("pattern.file"):
+        return read_fold(folder / stored.file, stored.frame)
+
+
+def _mesh_from_drawing(table: DrawingPattern, mesh: object, folder: Path) -> SheetMesh:
+    from meshes.io import read_drawn, read_pattern
+    from meshes.io.drawing import DrawingOptions
+
+    if mesh is None:
+        raise SceneError(
+            'mesh is missing; add a table [mesh] with kind = "gmsh" and size, along or aspect_ratio (creases side by '
+            'side), or kind = "drawn" (the faces of the drawing)'
+        )
+    how = _mesh_table(as_table(mesh, "mesh"))
+    options: DrawingOptions = {
+        "scale": table.scale,
+        "fit": table.fit,
+        "tolerance": table.tolerance,
+        "gap": table.gap,
+        "lines": table.lines,
+    }
+    with within("pattern.file"):
+        if isinstance(how, DrawnTable):
+            return read_drawn(folder / table.file, **options)
+        drawn = read_pattern(folder / table.file, **options)
+    return _meshed(drawn, how)
+
+
+def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
+    """Refuse what would only fill the memory; `structured` decides the exact numbers."""
+    panels = len(pattern.rails) - 1
+    along = float(how.along or 0)
+    if how.aspect_ratio is not None:
+        length = max(rail.length for rail in pattern.rails)
+        # at one end and in the middle: panels can taper
+        inner, outer = (rail.point(np.array([0.0, 0.5])) for rail in (pattern.rails[0], pattern.rails[-1]))
+        height = float(np.linalg.norm(outer - inner, axis=1).max()) / panels
+        along = how.aspect_ratio * length / height * how.rows
+    _check_triangles(2.0 * along * how.rows * panels)
+
+
+def _check_triangles(triangles: float) -> None:
+    if triangles > LARGEST_MESH:
+        raise SceneError(f"mesh: this is some {triangles:.2g} triangles; ask for fewer than {LARGEST_MESH:,}")
