@@ -69,7 +69,7 @@ class Automatic:
                 note = f"by arc length: {passed.note}"
                 failure = replace(passed, note=f"{failure.note}; {note}" if failure else note)
                 break
-            increment = self.load.limits(system)[0]  # load control takes over again
+            increment = self.load.cautious(system)  # load control takes over again
         if points[-1].mode != ARC and points[-1].lam < 1.0:
             last = yield from self._run(load.follow(system, points[-3:], self.patience), points)
             if last is None:
@@ -109,7 +109,7 @@ class Automatic:
             if behind_limit(points) and item.point.lam < 1.0:
                 points[:] = [replace(item.point, mode=LOAD)]
                 note = f"{item.note}; load control from here on"
-                first = load.limits(system)[0]
+                first = load.cautious(system)
                 yield replace(item, point=points[0], next_increment=first, note=note, jumped=True)
                 return None
             yield item
@@ -129,7 +129,7 @@ class Automatic:
         there = point(system, found.q, here.lam, LOAD, found.evaluation, found.negative)
         return replace(
             item, point=there, iterations=item.iterations + found.iterations, imbalance=found.evaluation.imbalance,
-            next_increment=load.limits(system)[0], note=f"arc length; {note}", jumped=True,
+            next_increment=load.cautious(system), note=f"arc length; {note}", jumped=True,
         )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from bh.mechanics.shared.contact import Touching
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.mechanics.shared.motions import describe_motion
-from bh.model.laws import HELD
+from bh.model.laws import HELD, SHEET
 from bh.model.model import Model
 from bh.model.supports import TURNED
 from bh.solvers.system import System, grows_ahead
@@ -75,7 +75,8 @@ class SupportedSheet:
         return dihedral_angles(self.positions(q, lam), self.mesh.topology.hinges)
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
+        asked = np.where(self.program.law == SHEET, 0.0, self.rotation * abs(lam_new - lam))
+        return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new), asked)
 
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         return closing.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
