@@ -116,7 +116,7 @@ class LoadControl:
                 yield Increment(here, "limit-point", iterations, math.nan, step, cuts=tuple(cuts), note=note)
                 return
             alone = len(points) == 1
-            brisk = lam - here.lam > 1.001 * self.cautious(system) if alone else len(cuts) < self.brisk
+            brisk = lam - here.lam > 0.5 * self.cautious(system) if alone else len(cuts) < self.brisk
             tried = self._try(system, points, lam, brisk)
             iterations += tried.iterations
             imbalance = tried.solution.evaluation.imbalance
