@@ -49,9 +49,10 @@ class LoadControl:
     Attributes:
         first_rotation, largest_rotation: increments where angles are imposed, rad.
         first, largest: increments of lambda where no angle is.
-        cautious_rotation: increment, rad, from which on a state without history may take Newton's careful way, and the
-            first one behind a limit point; `first` where no angle is imposed.
-        goal: iterations up to which increments grow.
+        cautious_rotation: first increment behind a limit point, rad (`first` where no angle is imposed); a state without
+            history may take Newton's careful way from half of it down.
+        goal, bold_goal: iterations up to which increments grow, by a factor of 1.7 at most; where angles are imposed
+            they grow by 2. What ends a step by a snap or by buckling is a load or a displacement, seldom an angle.
         smallest: part of the step below which an increment gives up.
         work_mismatch: largest relative difference between the energy gained in an increment and the work of the
             actuation (trapezoidal rule, corrected by the slopes at the ends where that alone would object); a larger
@@ -68,7 +69,8 @@ class LoadControl:
     first: float = 0.1
     largest: float = 0.34
     cautious_rotation: float = math.radians(15.0)
-    goal: int = 8
+    goal: int = 5
+    bold_goal: int = 8
     smallest: float = 1e-5
     work_mismatch: float = 0.2
     newton: Newton = field(default_factory=Newton)
@@ -139,7 +141,8 @@ class LoadControl:
                 )
                 return
             points = [tried.point] if tried.note else [*points[-2:], tried.point]
-            step = self._next(lam - here.lam, tried.solution.iterations, bool(cuts), largest)
+            imposed = system.rotation > 0.0
+            step = min(largest, self._next(lam - here.lam, tried.solution.iterations, bool(cuts), imposed))
             yield Increment(
                 tried.point, "reached", iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note), critical
             )  # fmt: skip
@@ -182,11 +185,12 @@ class LoadControl:
         there = point(system, found.q, lam, evaluation=found.evaluation)
         return locate(system, here, there, (before, found.negative), self.newton.tolerance)
 
-    def _next(self, taken: float, iterations: int, was_cut: bool, largest: float) -> float:
+    def _next(self, taken: float, iterations: int, was_cut: bool, imposed: bool) -> float:
         """The next increment of lambda after one of size `taken`; one that was cut is not followed by a larger one."""
-        growth = min(1.0 if was_cut else 2.0, max(0.5, math.sqrt(self.goal / max(iterations, 1))))
+        goal, most = (self.bold_goal, 2.0) if imposed else (self.goal, 1.7)
+        growth = min(1.0 if was_cut else most, max(0.5, math.sqrt(goal / max(iterations, 1))))
         # slow but successful increments must not shrink away
-        return min(largest, max(10.0 * self.smallest, growth * taken))
+        return max(10.0 * self.smallest, growth * taken)
 
     @staticmethod
     def _tangent_guess(
@@ -224,6 +228,6 @@ class LoadControl:
         if abs(gained - work) > most:
             # a long increment on a curved path; the slopes at its ends tell that from a jump
             work += taken**2 / 12.0 * (power_rate(system, here) - power_rate(system, there))
-        if not abs(gained - work) <= most:
-            return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
+            if not abs(gained - work) <= most:  # nor if the slopes are not known
+                return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
         return ""

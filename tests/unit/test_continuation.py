@@ -20,6 +20,7 @@ from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
 from bh.solvers.trace import Strategy, Walk, walk
 from tests.unit.test_newton import Arch, Column, Stiffening, Toy
+from verification.studies.app_b.shell_folding import sheet_model
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 
 Array = NDArray[np.float64]
@@ -267,3 +268,18 @@ def test_a_crease_without_stiffness_is_a_mechanism() -> None:
     assert len(path) >= 1
     stiff = trace(two_panels().crease("door", stiffness=0.1).force("node:3", each=(0.0, 0.0, 1e-3)))
     assert stiff.outcome == "reached"
+
+
+@pytest.mark.parametrize(
+    ("formulation", "along", "rows"),
+    [("bars-and-hinges", 32, 1), ("consistent", 16, 2), ("linear-shell", 16, 2), ("shell", 8, 1)],
+)
+def test_a_right_angle_takes_one_increment(formulation: str, along: int, rows: int) -> None:
+    """App. B (a) from flat: six iterations by default, and the state that small increments end in."""
+    model = sheet_model("a", along, rows, formulation=formulation, kind="staggered")
+    model = model.fold("crease", to=0.5 * math.pi)
+    small = LoadControl(first_rotation=math.radians(15.0), largest_rotation=math.radians(27.0))
+    bold, timid = trace(model), trace(model, strategy=Automatic(load=small))
+    assert bold.iterations <= 6
+    assert timid.iterations > 12
+    assert bold[-1].energy.total == pytest.approx(timid[-1].energy.total, rel=1e-9)
