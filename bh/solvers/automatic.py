@@ -106,6 +106,10 @@ class Automatic:
                     points[:] = [left.point]
                     yield left
                     return None
+                if item.point.lam >= 1.0 and item.point.negative:
+                    yield item
+                    note = "the end state is not stable, and no stable one was found nearby"
+                    return replace(item, outcome="unstable", iterations=0, note=note)
             if behind_limit(points) and item.point.lam < 1.0:
                 points[:] = [replace(item.point, mode=LOAD)]
                 note = f"{item.note}; load control from here on"
@@ -117,11 +121,12 @@ class Automatic:
 
     @staticmethod
     def _leave(system: System, item: Increment, load: LoadControl) -> Increment | None:
-        """The stable state below one that lies behind a bifurcation of a stable branch, or None."""
+        """The stable state below one behind a bifurcation of a stable branch, or below an unstable end; or None."""
         first = item.critical[0] if item.critical else None
-        if first is None or first.kind != "bifurcation" or first.negative[0] != 0 or item.point.lam >= 1.0:
-            return None
         here = item.point
+        branches = first is not None and first.kind == "bifurcation" and first.negative[0] == 0
+        if not (bool(here.negative) if here.lam >= 1.0 else branches):
+            return None
         saddle = Solution(here.q, system.evaluate(here.q, here.lam), 0, True, negative=here.negative)
         found, note = leave_saddle(system, saddle, here.lam, load.newton)
         if not note:

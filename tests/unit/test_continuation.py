@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -283,3 +284,34 @@ def test_a_right_angle_takes_one_increment(formulation: str, along: int, rows: i
     assert bold.iterations <= 6
     assert timid.iterations > 12
     assert bold[-1].energy.total == pytest.approx(timid[-1].energy.total, rel=1e-9)
+
+
+def ended(system: Toy, q: Array) -> list[Increment]:
+    """What `Automatic` makes of an arc that ends in an unstable state at lambda = 1."""
+    end = replace(point(system, q, 1.0, ARC), negative=1)
+    arc = iter([Increment(end, "reached", 3, 0.0, 0.1)])
+    passing = Automatic()._pass(arc, [], LoadControl(newton=Newton(careful=20)), system)
+    found = []
+    while True:
+        try:
+            found.append(next(passing))
+        except StopIteration as stop:
+            return found if stop.value is None else [*found, stop.value]
+
+
+def test_an_unstable_end_is_left_or_named() -> None:
+    """The straight column beyond its load bends at the end; a hill without a valley is told."""
+    (bent,) = ended(Column(), np.array([1.0, 0.0]))
+    assert bent.outcome == "reached"
+    assert bent.stable
+    assert bent.point.q[1] ** 2 == pytest.approx((bent.point.q[0] - 0.3) / 2.0, abs=1e-7)
+
+    class Hill(Toy):
+        def internal(self, q: Array) -> tuple[float, Array, Array]:
+            return -0.5 * float(q @ q), -q, -np.eye(1)
+
+    last, failure = ended(Hill(1, [0.0]), np.zeros(1))
+    assert last.outcome == "reached"
+    assert failure.outcome == "unstable"
+    assert failure.point is last.point
+    assert "no stable one" in failure.note
