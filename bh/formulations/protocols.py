@@ -59,10 +59,6 @@ class SheetSystem(System, Protocol):
         """(n,) work of nodal forces (nodes, 3), N, on the unknowns: the transpose of `vectors`."""
         ...
 
-    def control_stiffness(self, q: Array, lam: float) -> float:
-        """Second derivative of the energy by lambda at fixed q, N mm."""
-        ...
-
 
 @runtime_checkable
 class NodalUnknowns(Protocol):

@@ -70,7 +70,7 @@ class Automatic:
                 note = f"by arc length: {passed.note}"
                 failure = replace(passed, note=f"{failure.note}; {note}" if failure else note)
                 break
-            increment = self.load.limits(system)[0]  # load control takes over again
+            increment = self.load.cautious(system)  # load control takes over again
         if points[-1].mode != ARC and points[-1].lam < 1.0:
             last = yield from self._run(load.follow(system, points[-3:], self.patience), points)
             if last is None:
@@ -107,10 +107,14 @@ class Automatic:
                     points[:] = [left.point]
                     yield left
                     return None
+                if item.point.lam >= 1.0 and item.point.negative:
+                    yield item
+                    note = "the end state is not stable, and no stable one was found nearby"
+                    return replace(item, outcome=Outcome.UNSTABLE, iterations=0, note=note)
             if behind_limit(points) and item.point.lam < 1.0:
                 points[:] = [replace(item.point, mode=LOAD)]
                 note = f"{item.note}; load control from here on"
-                first = load.limits(system)[0]
+                first = load.cautious(system)
                 yield replace(item, point=points[0], next_increment=first, note=note, jumped=True)
                 return None
             yield item
@@ -118,16 +122,12 @@ class Automatic:
 
     @staticmethod
     def _leave(system: System, item: Increment, load: LoadControl) -> Increment | None:
-        """The stable state below one that lies behind a bifurcation of a stable branch, or None."""
+        """The stable state below one behind a bifurcation of a stable branch, or below an unstable end; or None."""
         first = item.critical[0] if item.critical else None
-        if (
-            first is None
-            or first.kind is not Critical.BIFURCATION
-            or first.negative[0] != 0
-            or item.point.lam >= 1.0
-        ):
-            return None
         here = item.point
+        branches = first is not None and first.kind is Critical.BIFURCATION and first.negative[0] == 0
+        if not (bool(here.negative) if here.lam >= 1.0 else branches):
+            return None
         saddle = Solution(here.q, system.evaluate(here.q, here.lam), 0, True, negative=here.negative)
         found, note = leave_saddle(system, saddle, here.lam, load.newton)
         if not note:
@@ -135,7 +135,7 @@ class Automatic:
         there = point(system, found.q, here.lam, LOAD, found.evaluation, found.negative)
         return replace(
             item, point=there, iterations=item.iterations + found.iterations, imbalance=found.evaluation.imbalance,
-            next_increment=load.limits(system)[0], note=f"arc length; {note}", jumped=True,
+            next_increment=load.cautious(system), note=f"arc length; {note}", jumped=True,
         )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point
+from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point, power_rate
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import count_negative
 from bh.solvers.newton import Newton, Solution
@@ -44,16 +44,21 @@ class _Trial:
 class LoadControl:
     """Adaptive increments of lambda with extrapolated starts.
 
-    The start from a flat sheet is the hard one, so the first increment is small; after that the guess is the
-    polynomial through the last three states and their element forces.
+    It begins boldly and cuts early: an increment that does not contract is given up after a few iterations, and one
+    that is accepted has the work of the actuation to show for its energy. The guess is the polynomial through the last
+    three states and their element forces.
 
     Attributes:
         first_rotation, largest_rotation: increments where angles are imposed, rad.
         first, largest: increments of lambda where no angle is.
-        goal: iterations that an increment should take.
+        cautious_rotation: first increment behind a limit point, rad (`first` where no angle is imposed); a state
+            without history may take Newton's careful way from half of it down.
+        goal, bold_goal: iterations up to which increments grow, by a factor of 1.7 at most; where angles are imposed
+            they grow by 2. What ends a step by a snap or by buckling is a load or a displacement, seldom an angle.
         smallest: part of the step below which an increment gives up.
         work_mismatch: largest relative difference between the energy gained in an increment and the work of the
-            actuation (trapezoidal rule); a larger one means that the state jumped to another branch.
+            actuation (trapezoidal rule, corrected by the slopes at the ends where that alone would object); a larger
+            one means that the state jumped to another branch.
         brisk: cuts of an increment before Newton's careful way is tried.
         at_bifurcation: where the branch loses its stability, go on along the stable branch of lowest energy
             ("stable"), stay on the one that is not stable ("primary"), or end with the outcome "bifurcation" ("stop").
@@ -61,11 +66,13 @@ class LoadControl:
             finding out by cutting it; only of use where something else can pass it (`Automatic`).
     """
 
-    first_rotation: float = math.radians(15.0)
-    largest_rotation: float = math.radians(27.0)
+    first_rotation: float = math.radians(90.0)
+    largest_rotation: float = math.radians(90.0)
     first: float = 0.1
     largest: float = 0.34
+    cautious_rotation: float = math.radians(15.0)
     goal: int = 5
+    bold_goal: int = 8
     smallest: float = 1e-5
     work_mismatch: float = 0.2
     newton: Newton = field(default_factory=Newton)
@@ -80,6 +87,11 @@ class LoadControl:
                 1.0, self.largest_rotation / system.rotation
             )
         return self.first, self.largest
+
+    def cautious(self, system: System) -> float:
+        """Increment of lambda where nothing is known of the path's course."""
+        first = self.limits(system)[0]
+        return min(first, self.cautious_rotation / system.rotation) if system.rotation > 0.0 else first
 
     def follow(
         self,
@@ -109,7 +121,9 @@ class LoadControl:
                     here, Outcome.LIMIT_POINT, iterations, math.nan, step, cuts=tuple(cuts), note=note
                 )
                 return
-            tried = self._try(system, points, lam, brisk=len(points) > 1 and len(cuts) < self.brisk)
+            alone = len(points) == 1
+            brisk = lam - here.lam > 0.5 * self.cautious(system) if alone else len(cuts) < self.brisk
+            tried = self._try(system, points, lam, brisk)
             iterations += tried.iterations
             imbalance = tried.solution.evaluation.imbalance
             if tried.objection:
@@ -138,7 +152,8 @@ class LoadControl:
                 )
                 return
             points = [tried.point] if tried.note else [*points[-2:], tried.point]
-            step = self._next(lam - here.lam, tried.solution.iterations, bool(cuts), largest)
+            imposed = system.rotation > 0.0
+            step = min(largest, self._next(lam - here.lam, tried.solution.iterations, bool(cuts), imposed))
             yield Increment(
                 tried.point, Outcome.REACHED, iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note),
                 critical,
@@ -152,7 +167,7 @@ class LoadControl:
         """
         here = points[-1]
         newton = replace(self.newton, unstable=self.at_bifurcation != "stable")
-        method = replace(newton, careful=0) if brisk else newton
+        method = replace(newton, careful=0, hasty=True) if brisk else newton
         q, forces = extrapolate(points, lam)
         primary = found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
         iterations, note = found.iterations, ""
@@ -183,11 +198,12 @@ class LoadControl:
         there = point(system, found.q, lam, evaluation=found.evaluation)
         return locate(system, here, there, (before, found.negative), self.newton.tolerance)
 
-    def _next(self, taken: float, iterations: int, was_cut: bool, largest: float) -> float:
+    def _next(self, taken: float, iterations: int, was_cut: bool, imposed: bool) -> float:
         """The next increment of lambda after one of size `taken`; one that was cut is not followed by a larger one."""
-        growth = min(1.0 if was_cut else 1.7, max(0.5, math.sqrt(self.goal / max(iterations, 1))))
+        goal, most = (self.bold_goal, 2.0) if imposed else (self.goal, 1.7)
+        growth = min(1.0 if was_cut else most, max(0.5, math.sqrt(goal / max(iterations, 1))))
         # slow but successful increments must not shrink away
-        return min(largest, max(10.0 * self.smallest, growth * taken))
+        return max(10.0 * self.smallest, growth * taken)
 
     @staticmethod
     def _tangent_guess(
@@ -219,9 +235,13 @@ class LoadControl:
             return turned
         gained = there.energy - here.energy
         taken = there.lam - here.lam
-        work = 0.5 * (here.power + there.power) * taken
         size = max(abs(here.power), abs(there.power)) * taken
         noise = 1e-9 * max(abs(here.energy), abs(there.energy)) + 1e-15 * system.energy_scale
-        if abs(gained - work) > self.work_mismatch * size + noise:
-            return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
+        most = self.work_mismatch * size + noise
+        work = 0.5 * (here.power + there.power) * taken
+        if abs(gained - work) > most:
+            # a long increment on a curved path; the slopes at its ends tell that from a jump
+            work += taken**2 / 12.0 * (power_rate(system, here) - power_rate(system, there))
+            if not abs(gained - work) <= most:  # nor if the slopes are not known
+                return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
         return ""

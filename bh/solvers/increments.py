@@ -9,6 +9,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.factor import IndefiniteError
 from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.system import Evaluation, System
 
@@ -109,6 +110,16 @@ def point(
     """The point of a path at given unknowns; `evaluation` is the system's there, if it is known already."""
     evaluation = evaluation or system.evaluate(q, lam)
     return Point(lam, q, evaluation.forces, evaluation.energy, system.power(q, lam), mode, negative)
+
+
+def power_rate(system: System, here: Point) -> float:
+    """d power / d lambda along the path's own tangent, N mm; nan where the state is critical."""
+    try:
+        factor, _ = system.tangent(here.q, here.lam, here.forces).matrix.factorise_any()
+    except IndefiniteError:
+        return np.nan
+    rate = system.control_rate(here.q, here.lam)
+    return system.control_stiffness(here.q, here.lam) - float(rate @ factor.solve(rate))
 
 
 def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:

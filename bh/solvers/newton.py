@@ -5,7 +5,7 @@ Where both stop, a pseudo-transient motion to rest is the last resort (`bh.solve
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -56,6 +56,7 @@ class Newton:
         bold, careful: most iterations of either way.
         bold_shift: largest shift of the bold way; a tangent that is more indefinite asks for the careful one.
         transient: the last resort; None to do without.
+        hasty: give the bold way up where its steps contract too slowly; for increments that are cheaper cut than saved.
         unstable: take indefinite tangents as they are and go boldly only, to stay on a branch that is not stable.
     """
 
@@ -64,6 +65,7 @@ class Newton:
     careful: int = 150
     bold_shift: float = 1e-5
     transient: PseudoTransient | None = field(default_factory=PseudoTransient)
+    hasty: bool = False
     unstable: bool = False
 
     def solve(
@@ -100,6 +102,7 @@ class Newton:
         now = system.evaluate(q, lam)
         forces = now.forces if forces is None else forces
         least, before = now.imbalance, np.inf
+        sizes: list[float] = []  # of the steps taken
         for iteration in range(self.bold):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, careful=False)
@@ -110,6 +113,9 @@ class Newton:
             dq = -factor.solve(now.residual)
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, careful=False)
+            sizes.append(float(np.linalg.norm(dq[: system.primal])))
+            if self.hasty and now.imbalance > NEAR_SADDLE and slow(sizes):
+                return Solution(q, now, iteration, False, "slow contraction")
             forces = tangent.predicted_forces(now.forces, dq)
             q, before = q + dq, now.imbalance
             now = system.evaluate(q, lam)
@@ -181,6 +187,15 @@ class Newton:
     ) -> Solution:
         negative = count_negative(system.tangent(q, lam, now.forces).matrix)
         return Solution(q, now, iterations, True, "", negative, careful)
+
+
+def slow(sizes: Sequence[float]) -> bool:
+    """Do the sizes of Newton's steps, from the fifth on, not even halve in two iterations?
+
+    The first ones say nothing: the second is often the largest, when the stretching that large rotations have left in
+    the linear prediction is taken out.
+    """
+    return len(sizes) > 4 and sizes[-1] > 0.5 * sizes[-3]
 
 
 def roll_off(

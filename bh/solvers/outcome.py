@@ -13,6 +13,7 @@ class Outcome(StrEnum):
     BIFURCATION = "bifurcation"
     MECHANISM = "mechanism"
     CONTACT = "contact"
+    UNSTABLE = "unstable"  # in equilibrium, but on a branch that the sheet would leave
     STALLED = "stalled"
     TARGET_MISSED = "target-missed"  # what an `Until` wants does not come about
     UNFINISHED = "unfinished"  # a path whose run was stopped

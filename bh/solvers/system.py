@@ -119,6 +119,10 @@ class System(Protocol):
         """Rate of work of the actuation, d energy / d lambda at fixed q, N mm."""
         ...
 
+    def control_stiffness(self, q: Array, lam: float) -> float:
+        """Second derivative of the energy by lambda at fixed q, N mm."""
+        ...
+
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Why an increment from one state to the next is not to be trusted, or an empty string."""
         ...

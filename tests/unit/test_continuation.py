@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
 from bh.solvers.trace import Strategy, Walk, walk
 from tests.unit.test_newton import Arch, Column, Small, Stiffening
+from verification.studies.app_b.shell_folding import sheet_model
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 
 Array = NDArray[np.float64]
@@ -267,3 +269,49 @@ def test_a_crease_without_stiffness_is_a_mechanism() -> None:
     assert len(path) >= 1
     stiff = trace(two_panels().crease("door", stiffness=0.1).force("node:3", each=(0.0, 0.0, 1e-3)))
     assert stiff.outcome == "reached"
+
+
+@pytest.mark.parametrize(
+    ("formulation", "along", "rows"),
+    [("bars-and-hinges", 32, 1), ("consistent", 16, 2), ("linear-shell", 16, 2), ("shell", 8, 1)],
+)
+def test_a_right_angle_takes_one_increment(formulation: str, along: int, rows: int) -> None:
+    """App. B (a) from flat: six iterations by default, and the state that small increments end in."""
+    model = sheet_model("a", along, rows, formulation=formulation, kind="staggered")
+    model = model.fold("crease", to=0.5 * math.pi)
+    small = LoadControl(first_rotation=math.radians(15.0), largest_rotation=math.radians(27.0))
+    bold, timid = trace(model), trace(model, strategy=Automatic(load=small))
+    assert bold.iterations <= 6
+    assert timid.iterations > 12
+    assert bold[-1].energy.total == pytest.approx(timid[-1].energy.total, rel=1e-9)
+
+
+def ended(system: Small, q: Array) -> list[Increment]:
+    """What `Automatic` makes of an arc that ends in an unstable state at lambda = 1."""
+    end = replace(point(system, q, 1.0, ARC), negative=1)
+    arc = iter([Increment(end, "reached", 3, 0.0, 0.1)])
+    passing = Automatic()._pass(arc, [], LoadControl(newton=Newton(careful=20)), system)
+    found = []
+    while True:
+        try:
+            found.append(next(passing))
+        except StopIteration as stop:
+            return found if stop.value is None else [*found, stop.value]
+
+
+def test_an_unstable_end_is_left_or_named() -> None:
+    """The straight column beyond its load bends at the end; a hill without a valley is told."""
+    (bent,) = ended(Column(), np.array([1.0, 0.0]))
+    assert bent.outcome == "reached"
+    assert bent.stable
+    assert bent.point.q[1] ** 2 == pytest.approx((bent.point.q[0] - 0.3) / 2.0, abs=1e-7)
+
+    class Hill(Small):
+        def internal(self, q: Array) -> tuple[float, Array, Array]:
+            return -0.5 * float(q @ q), -q, -np.eye(1)
+
+    last, failure = ended(Hill(1, [0.0]), np.zeros(1))
+    assert last.outcome == "reached"
+    assert failure.outcome == "unstable"
+    assert failure.point is last.point
+    assert "no stable one" in failure.note

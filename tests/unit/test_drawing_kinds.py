@@ -313,8 +313,8 @@ def test_closed_periodic_splines_end_at_their_domain(tmp_path: Path) -> None:
     # where a uniform cubic passes its control points: (P[i-1] + 4 P[i] + P[i+1]) / 6
     share = (4.0 + 2.0 * np.cos(np.pi / 4.0)) / 6.0
     half = share * np.array([30.0, 20.0])
-    assert points.min(axis=0) == pytest.approx([60.0, 40.0] - half, abs=0.02)
-    assert points.max(axis=0) == pytest.approx([60.0, 40.0] + half, abs=0.02)
+    assert points.min(axis=0) == pytest.approx(np.array([60.0, 40.0]) - half, abs=0.02)
+    assert points.max(axis=0) == pytest.approx(np.array([60.0, 40.0]) + half, abs=0.02)
 
 
 def test_dimensions_and_what_has_no_length_are_skipped(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from bh.solvers.increments import Increment, Point, extrapolate, point
 from bh.solvers.linear import linear_response
 from bh.solvers.matrices import BandMatrix
 from bh.solvers.modes import factorise_shifted, lowest_mode
-from bh.solvers.newton import Newton, Solution, line_search
+from bh.solvers.newton import Newton, Solution, line_search, slow
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation, Tangent
 from bh.solvers.trace import Walk, walk
@@ -334,7 +335,10 @@ def test_limits_by_rotation_or_by_lambda() -> None:
     system, strategy = Springs(), LoadControl()
     assert strategy.limits(system) == (0.1, 0.34)
     system.rotation = math.radians(90.0)  # type: ignore[misc]
-    assert strategy.limits(system) == pytest.approx((15.0 / 90.0, 27.0 / 90.0))
+    assert strategy.limits(system) == (1.0, 1.0)
+    assert strategy.cautious(system) == pytest.approx(15.0 / 90.0)
+    system.rotation = math.radians(135.0)  # type: ignore[misc]
+    assert strategy.limits(system) == pytest.approx((90.0 / 135.0, 90.0 / 135.0))
     system.rotation = math.radians(5.0)  # type: ignore[misc]
     assert strategy.limits(system) == (1.0, 1.0)
 
@@ -412,6 +416,50 @@ def test_a_history_is_taken_up() -> None:
     rest = list(walk(Walk(system, strategy, tuple(points[1:4]), whole[2].next_increment)))
     assert [s.point.lam for s in rest] == [s.point.lam for s in whole[3:]]
     assert [s.point.q[0] for s in rest] == [s.point.q[0] for s in whole[3:]]
+
+
+def test_slow_contraction() -> None:
+    """The first four steps say nothing; then each must halve that of two iterations before."""
+    assert not slow([1.0, 2.0, 3.0, 4.0])
+    assert slow([1.0, 2.0, 3.0, 2.0, 2.0])
+    assert not slow([1.0, 2.0, 3.0, 2.0, 1.0])
+
+
+def test_a_hasty_newton_gives_up_early() -> None:
+    """Energy |q|^1.55: every iterate is -0.82 times the one before, and two steps shrink by a third only."""
+
+    class Sharp(Small):
+        def internal(self, q: Array) -> tuple[float, Array, Array]:
+            size = np.abs(q)
+            return float((size**1.55).sum()), 1.55 * np.sign(q) * size**0.55, np.diag(0.8525 * size**-0.45)
+
+    patient, hasty = (
+        Newton(careful=0, hasty=haste).solve(Sharp(1, [0.0]), np.array([1.0]), 1.0) for haste in (False, True)
+    )
+    assert not patient.converged
+    assert not hasty.converged
+    assert (patient.iterations, hasty.iterations) == (14, 4)
+    assert hasty.reason == "slow contraction"
+
+
+def test_a_long_increment_is_told_from_a_jump_by_the_slopes_of_the_work() -> None:
+    """Work lambda^5: the trapezoidal rule is off by 30 % of the last power, with the slopes by 3 %; a jump is seen."""
+
+    class Power(Small):
+        def control_rate(self, q: Array, lam: float) -> Array:
+            return np.zeros(1)
+
+        def control_stiffness(self, q: Array, lam: float) -> float:
+            return 20.0 * lam**3
+
+        def internal(self, q: Array) -> tuple[float, Array, Array]:
+            return 0.0, np.zeros(1), np.eye(1)
+
+    system, strategy = Power(1, [0.0]), LoadControl()
+    a, b = (Point(lam, np.zeros(1), np.zeros(1), lam**5, 5.0 * lam**4) for lam in (0.0, 1.0))
+    assert abs(1.0 - 0.5 * (a.power + b.power)) > strategy.work_mismatch * b.power
+    assert strategy._jump(system, a, b) == ""
+    assert "not the work" in strategy._jump(system, a, replace(b, energy=4.0))
 
 
 def test_other_newton() -> None:

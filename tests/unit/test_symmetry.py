@@ -95,7 +95,8 @@ def between_oblique_supports(along: int, name: str) -> bh.Model:
         model = model.support(place, (normal, (0.0, 0.0, 1.0)))
     model = model.support("corner:inner-start", ((1.0, 0.0, 0.0),))
     model = model.support("corner:inner-end", ((0.0, 1.0, 0.0),))
-    return model.fold("crease", rest=2.6, Lstar=25.0)
+    # at 16 degrees the consistent sheet buckles out of its symmetry, which the half does not follow
+    return model.fold("crease", rest=2.9, Lstar=25.0)
 
 
 @pytest.mark.parametrize("name", BOTH)

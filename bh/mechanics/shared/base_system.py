@@ -13,7 +13,7 @@ from bh.mechanics.shared import penetration as closing
 from bh.mechanics.shared.contact import RigidContact
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
-from bh.model.laws import PRESCRIBED
+from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.model import Model
 from bh.model.supports import MOTIONS, TURNED, rigid_motions
 from bh.solvers.outcome import Outcome
@@ -91,7 +91,8 @@ class SupportedSheet:
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Why an increment between two states is not to be trusted, or an empty string."""
-        return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
+        asked = np.where(self.load_step.law == SHEET, 0.0, self.rotation * abs(lam_new - lam))
+        return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new), asked)
 
     def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Which panels passed through each other between two states, or an empty string."""

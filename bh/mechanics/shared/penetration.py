@@ -96,9 +96,12 @@ def crossing(mesh: SheetMesh, before: Array, after: Array) -> str:
     return f"the panels at {hinge_name(mesh, int(np.argmax(jump)))} would pass through each other"
 
 
-def objection(mesh: SheetMesh, before: Array, after: Array) -> str:
-    """Why an increment between dihedral angles (m,) of two states is not to be trusted, or an empty string."""
-    turn = float(np.abs(after - before).max(initial=0.0))
+def objection(mesh: SheetMesh, before: Array, after: Array, asked: Array) -> str:
+    """Why an increment between dihedral angles (m,) of two states is not to be trusted, or an empty string.
+
+    `asked` (m,) is how far the actuation turns each hinge, rad: that much it may turn more than the others.
+    """
+    turn = float((np.abs(after - before) - asked).max(initial=0.0))
     far = f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
     return crossing(mesh, before, after) or far
 
