@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.materials import Material
 from bh.mechanics.bars_and_hinges import to_triangles
+from bh.mechanics.consistent_elements import LINEAR
 from bh.mechanics.consistent_kernels import TURN
+from bh.mechanics.consistent_membrane import Measure, constant_strain, smoothed_strain
 from bh.mechanics.consistent_system import ConsistentSystem
 from bh.mechanics.kinematics import dihedral_angles
 from bh.model import Model
@@ -32,17 +35,21 @@ class Consistent:
 
     name = "consistent"
     takes_nu = True
-    refinement = Refinement("staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9)
+    refinement: Refinement | None = Refinement("staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9)
+
+    def __init__(self, measure: Measure = smoothed_strain, material: Material = LINEAR) -> None:
+        """What measures the strain of the sheet, and its material (E, nu and t are the sheet's)."""
+        self.measure, self.material = measure, material
 
     def system(self, model: Model, program: StepProgram, start: State | None) -> ConsistentSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
-        return ConsistentSystem(model, program, start)
+        return ConsistentSystem(model, program, start, None, self.measure, self.material)
 
     def half(
         self, model: Model, program: StepProgram, start: State | None, plane: Mirror
     ) -> ConsistentSystem:
         """The system of the kept half of a symmetric sheet; `start` is a state of the whole."""
-        return ConsistentSystem(model, program, start, plane)
+        return ConsistentSystem(model, program, start, plane, self.measure, self.material)
 
     def whole(
         self, whole: ConsistentSystem, half: ConsistentSystem, plane: Mirror, q: Array, lam: float
@@ -75,7 +82,7 @@ class Consistent:
         x = system.positions(q, lam)
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
-        stretching, bending = now.stretching, system.bending_by_triangle(now.theta)
+        stretching, bending = system.stretching_by_triangle(x), system.bending_by_triangle(now.theta)
         folding = 0.5 * e.spring_stiffness * now.turns**2
 
         angles = dihedral_angles(x, topology.hinges)
@@ -103,6 +110,16 @@ class Consistent:
             crease_moments=moments, stable=stable,
             pressing={} if system.touching is None else system.touching.pressing(x, lam),
         )  # fmt: skip
+
+
+class ConstantStrain(Consistent):
+    """The same with constant-strain triangles: the member that `linear-shell` of `fem` is the twin of."""
+
+    name = "consistent-constant"
+    refinement = None
+
+    def __init__(self, material: Material = LINEAR) -> None:
+        super().__init__(constant_strain, material)
 
 
 def _unknowns(system: ConsistentSystem, x: Array, lam: float) -> Array:

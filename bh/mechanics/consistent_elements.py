@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.laws import HELD, SHEET, SPRING
+from bh.materials import LinearElastic, Material
 from bh.mechanics.consistent_kernels import TURN
 from bh.mechanics.consistent_patches import (
     Patches,
     bending_matrices,
     patches,
-    stretching_matrices,
     triangle_frames,
 )
+from bh.mechanics.consistent_membrane import Measure, smoothed_strain
+from bh.mechanics.consistent_stretching import Stretching
 from bh.mechanics.hinge_lock import ZONE, until_closed
 from bh.mechanics.kinematics import dihedral_angles
 from bh.mechanics.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+LINEAR = LinearElastic()
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +44,8 @@ class ConsistentElements:
 
     Attributes:
         members: (t,) which triangles of the mesh these are; triangles: (t, 3) nodes; edge k is opposite corner k.
-        rest_square: (t, 3) squares of the edges' lengths in the stress-free sheet, mm^2.
-        K: (t, 3, 3) energy of stretching 1/2 gamma.K.gamma, N / mm^3.
+        heights: (t, 3) of the triangles on their edges in the stress-free sheet, mm.
+        stretching: cells of the membrane and their law.
         B_triangle: (t, 3, 3) energy of bending of a triangle by the angles at its edges, N mm.
         patches: matrices and angles of the patches.
         quad, ghost, place, rotation, column: of the angles, see `bh.mechanics.consistent_kernels`.
@@ -57,8 +60,8 @@ class ConsistentElements:
 
     members: Ints
     triangles: Ints
-    rest_square: Array
-    K: Array
+    heights: Array
+    stretching: Stretching
     B_triangle: Array
     patches: Patches
     quad: Ints
@@ -81,12 +84,18 @@ class ConsistentElements:
 
 
 def consistent_elements(
-    model: Model, program: StepProgram, held_start: Array, moment_start: Array, plane: Mirror | None = None
+    model: Model,
+    program: StepProgram,
+    held_start: Array,
+    moment_start: Array,
+    plane: Mirror | None = None,
+    measure: Measure = smoothed_strain,
+    material: Material = LINEAR,
 ) -> ConsistentElements:
     """Element arrays of a model in one step; `held_start` and `moment_start` (m,) are what its creases begin with.
 
     Dihedral angles (rad) and total moments (N mm) of all hinges. With a `plane` they are those of the half of a
-    symmetric sheet (`bh.mechanics.mirrored`).
+    symmetric sheet (`bh.mechanics.mirrored`). `measure` is what measures the strain of the `material`.
 
     Raises:
         ModelError: given element stiffness, or a couple on a crease that is no spring.
@@ -108,6 +117,7 @@ def consistent_elements(
 
         joined = half_patches(joined, spring, plane)
     rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
+    membrane, law_of_strain = measure(mesh, creased(mesh, law)), material.stretching(sheet)
     quad, ghost = _quads(mesh, joined)
     nodes, place = _rows(joined, quad)
     has = rotation >= 0
@@ -132,8 +142,9 @@ def consistent_elements(
     begin = held_start[springs] - carried / np.where(k_fold == 0.0, np.inf, k_fold)
     begin = np.where(np.isnan(program.rest.start[springs]), begin, program.rest.start[springs])
     whole = ConsistentElements(
-        members=np.arange(len(mesh.triangles)), triangles=mesh.triangles, rest_square=(edges**2).sum(axis=2),
-        K=stretching_matrices(edges, areas, sheet.E, sheet.t, sheet.nu), B_triangle=B, patches=joined,
+        members=np.arange(len(mesh.triangles)), triangles=mesh.triangles,
+        heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2), stretching=Stretching(membrane, law_of_strain),
+        B_triangle=B, patches=joined,
         quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
         width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=Ramp(begin, program.rest.end[springs]),
@@ -142,6 +153,16 @@ def consistent_elements(
         lock=lock_stiffness(model, program), rotations=rotations,
     )  # fmt: skip
     return whole if plane is None else half_consistent(whole, plane)
+
+
+def creased(mesh: SheetMesh, law: Ints) -> Bools:
+    """(m,) hinges that are drawn as creases or fold in this step: the strain may jump there, whatever a step does."""
+    topology = mesh.topology
+    out = law != SHEET
+    for name in mesh.creases:
+        hinge = topology.edge_hinges[topology.find_edges(mesh.crease_edges(name))]
+        out[hinge[hinge >= 0]] = True
+    return out
 
 
 def lock_stiffness(model: Model, program: StepProgram) -> Array:

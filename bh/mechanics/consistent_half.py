@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bh.actuation import Ramp
 from bh.mechanics.consistent_kernels import NONE, TURN
 from bh.mechanics.consistent_patches import Patches
+from bh.mechanics.consistent_stretching import Stretching
 from bh.symmetry import Mirror
 
 if TYPE_CHECKING:
@@ -62,12 +63,13 @@ def half_consistent(e: ConsistentElements, plane: Mirror) -> ConsistentElements:
     """Triangles, springs and locks of the half; patches and rotations are those of the half already."""
     weight = plane.triangle_weight
     triangle = weight > 0.0
+    membrane = e.stretching.membrane.weighted(weight, plane.hinge_weight)
     by = plane.hinge_weight[e.springs]
     spring = by > 0.0
     by = by[spring]
     return replace(
         e, members=e.members[triangle], triangles=np.ascontiguousarray(e.triangles[triangle]),
-        rest_square=e.rest_square[triangle], K=(weight[:, None, None] * e.K)[triangle],
+        heights=e.heights[triangle], stretching=Stretching(membrane, e.stretching.law),
         B_triangle=(weight[:, None, None] * e.B_triangle)[triangle], springs=e.springs[spring],
         hinges=np.ascontiguousarray(e.hinges[spring]), turns=e.turns[spring],
         spring_stiffness=by * e.spring_stiffness[spring],

@@ -9,11 +9,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from bh.materials import Material
 from bh.mechanics import closing as closings
 from bh.mechanics import consistent_kernels as kernels
 from bh.mechanics import consistent_setup as setup
 from bh.mechanics.consistent_design import ConsistentDesign
-from bh.mechanics.consistent_elements import consistent_elements, lock_stiffness
+from bh.mechanics.consistent_elements import LINEAR, consistent_elements, lock_stiffness
+from bh.mechanics.consistent_membrane import Measure, smoothed_strain
 from bh.mechanics.consistent_pattern import rotation_pattern
 from bh.mechanics.hinge_lock import lock_terms
 from bh.mechanics.kinematics import dihedral_angles
@@ -34,7 +36,7 @@ ROUNDING = 8.0 * np.finfo(float).eps
 
 
 class ElementForces(NamedTuple):
-    """Edge forces N (t, 3), N/mm; moments of patches M (c, a), spring creases S (h,) and locks L (m,), N mm."""
+    """Bar forces N (b,), N/mm; moments of patches M (c, a), spring creases S (h,) and locks L (m,), N mm."""
 
     N: Array
     M: Array
@@ -45,13 +47,13 @@ class ElementForces(NamedTuple):
 class Internal(NamedTuple):
     """Energies (N mm), their gradients to positions f (n, 3) and rotations r (r,), and element forces.
 
-    `stretching` (t,) is that of the triangles, `bending` the whole, `springs` that of the springs and their couples,
+    `stretching` and `bending` are the whole, `springs` that of the springs and their couples,
     `lock` that of locks.
     `size` is a typical element force (N), `theta` (c, a) are the angles of the patches and `turns` (h,) what the
     springs have turned (rad).
     """
 
-    stretching: Array
+    stretching: float
     bending: float
     springs: float
     lock: float
@@ -67,7 +69,13 @@ class ConsistentSystem(SupportedSheet):
     """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then edge rotations (rad)."""
 
     def __init__(
-        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+        self,
+        model: Model,
+        program: StepProgram,
+        start: State | None,
+        plane: Mirror | None = None,
+        measure: Measure = smoothed_strain,
+        material: Material = LINEAR,
     ) -> None:
         of_half = program
         if plane is not None:
@@ -90,7 +98,7 @@ class ConsistentSystem(SupportedSheet):
             if start is None
             else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
         )
-        self.elements = consistent_elements(model, program, angles, moments, plane)
+        self.elements = consistent_elements(model, program, angles, moments, plane, measure, material)
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
@@ -135,13 +143,13 @@ class ConsistentSystem(SupportedSheet):
     @cached_property
     def _counts(self) -> tuple[int, int, int, int]:
         e = self.elements
-        return 3 * len(e.triangles), e.rotation.size, len(e.springs), len(e.lock)
+        return len(e.stretching.membrane.bars), e.rotation.size, len(e.springs), len(e.lock)
 
     def split(self, forces: Array) -> ElementForces:
         """Element forces as they belong together."""
         t, c, h, _ = self._counts
         M = forces[t : t + c].reshape(self.elements.rotation.shape)
-        return ElementForces(forces[:t].reshape(-1, 3), M, forces[t + c : t + c + h], forces[t + c + h :])
+        return ElementForces(forces[:t], M, forces[t + c : t + c + h], forces[t + c + h :])
 
     # ------------------------------------------------------------------------------- the System protocol
 
@@ -150,9 +158,9 @@ class ConsistentSystem(SupportedSheet):
         e, joined = self.elements, self.elements.patches
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
-        stretching, turns = np.empty(len(e.triangles)), np.empty(len(e.springs))
+        turns = np.empty(len(e.springs))
         N, M, S, L = self.split(forces)
-        size = kernels.stretching_forces(x, e.triangles, e.rest_square, e.K, f, N, stretching)
+        stretching, size = e.stretching.forces(x, f, N)
         more, closing = kernels.bending_forces(
             x, alpha, joined.kind, e.quad, e.ghost, e.rest.at(lam), e.rotation, joined.B, f, r, M, theta
         )
@@ -165,6 +173,12 @@ class ConsistentSystem(SupportedSheet):
         size = float(np.sqrt((size + more + most) / (len(forces) - len(L))))
         bending = 0.5 * float(np.vdot(M, theta))
         return Internal(stretching, bending, springs, lock, size, f, r, forces, theta, turns)
+
+    def stretching_by_triangle(self, x: Array) -> Array:
+        """(t,) energy of stretching, N mm, of the triangles of the mesh at positions x."""
+        topology = self.mesh.topology
+        beside = topology.edge_triangles[topology.hinge_edges]
+        return self.elements.stretching.by_triangle(x, len(self.mesh.triangles), beside)
 
     def bending_by_triangle(self, theta: Array) -> Array:
         """(t,) energy of bending, N mm, for the angles (c, a) of the patches."""
@@ -182,7 +196,7 @@ class ConsistentSystem(SupportedSheet):
         load = self.force.at(lam)
         touched = 0.0 if self.touching is None else self.touching.forces(x, lam, now.f)
         energy = (
-            float(now.stretching.sum())
+            now.stretching
             + now.bending
             + now.springs
             + now.lock
@@ -207,7 +221,7 @@ class ConsistentSystem(SupportedSheet):
         """(rotations,) height of a triangle on the edge of each rotation, mm: what turns a moment into a force."""
         e = self.elements
         height = np.ones((len(self.mesh.triangles), 3))
-        height[e.members] = 2.0 * self.mesh.areas[e.members, None] / np.sqrt(e.rest_square)
+        height[e.members] = e.heights
         out = np.ones(e.rotations)
         used = e.rotation >= 0
         out[e.rotation[used]] = height.ravel()[e.patches.half_edge[used]]
@@ -217,11 +231,9 @@ class ConsistentSystem(SupportedSheet):
     def _stiffest(self) -> tuple[float, float]:
         """Largest stiffness of an edge, N/mm, and of a hinge over the height of its wing, N / rad."""
         e = self.elements
-        stretch = np.einsum("tkk,tk->tk", e.K, e.rest_square).max()
-        height = 2.0 * self.mesh.areas[e.members, None] / np.sqrt(e.rest_square)
-        bend = (np.einsum("tkk->tk", e.B_triangle) / height).max()
-        spring = (e.spring_stiffness / height.min()).max(initial=0.0)
-        return float(stretch), float(max(bend, spring))
+        bend = (np.einsum("tkk->tk", e.B_triangle) / e.heights).max()
+        spring = (e.spring_stiffness / e.heights.min()).max(initial=0.0)
+        return e.stretching.largest, float(max(bend, spring))
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
         e, joined, pattern = self.elements, self.elements.patches, self._pattern
@@ -229,7 +241,7 @@ class ConsistentSystem(SupportedSheet):
         N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)
         axes = (self._frame_of, self.constraints.frames)
-        kernels.stretching_tangent(x, e.triangles, e.K, N, *axes, pattern.slots[0], data)
+        e.stretching.tangent(x, N, *axes, pattern.slots[0], pattern.slots[3], data)
         closing = kernels.bending_tangent(
             x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, joined.B, M, e.nodes, *axes,
             pattern.slots[1], data,
@@ -282,7 +294,7 @@ class ConsistentSystem(SupportedSheet):
         e, by = self.elements, float(controlled)
         rates, turns = np.empty(sum(self._counts)), np.empty(len(e.springs))
         N, M, S, L = self.split(rates)
-        kernels.stretching_rates(x, v, e.triangles, e.K, N)
+        e.stretching.rates(x, v, N)
         joined = e.patches
         kernels.bending_rates(
             x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, joined.B, M
@@ -316,7 +328,7 @@ class ConsistentSystem(SupportedSheet):
         rates, turns = self._force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
-        kernels.stretching_force_rates(x, v, e.triangles, N, dN, f)
+        e.stretching.force_rates(x, v, N, dN, f)
         kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, M, dM, f, r)
         kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
         if L.any():
