@@ -40,7 +40,7 @@ def rotation_pattern(
     corners = e.nodes[:, (e.nodes >= 0).any(axis=0)]
     patches = np.hstack((np.where(corners >= 0, corners, none), np.where(has, n + e.rotation, none)))
     springs = np.hstack((e.hinges, n + e.turns))
-    groups: tuple[Ints, ...] = (e.triangles, patches, springs, hinges)
+    groups: tuple[Ints, ...] = (mesh.triangles, patches, springs, hinges)
     if ground is not None:
         groups += (mesh.triangles[[ground]],)
     pattern = build_pattern(table, displacements.pattern_nodes(groups)[1], places)
