@@ -19,13 +19,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.mechanics import consistent_membrane_kernels as kernels
 from meshes import SheetMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-# bars of an edge cell between its nodes (wing, edge, edge, wing), the edge itself first
-FIVE = np.array([[1, 2], [1, 0], [2, 0], [1, 3], [2, 3]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,8 @@ class Cells:
     Attributes:
         source: (c,) rows of the mesh's triangles (three bars) or hinges (five bars).
         nodes: (c, p) their nodes.
-        bars: (c, k) rows of `Membrane.bars`; `owned` those whose force this cell takes to the tangent.
+        bars: (c, k) rows of `Membrane.bars`: of a triangle opposite its corners, of a hinge (wing, edge, edge, wing) = 0..3
+            those between 1-2, 1-0, 2-0, 1-3, 2-3; `owned` those whose force this cell takes to the tangent.
         strain: (c, 3, k) map S from gamma (mm^2) to the strain (xx, yy, 2 xy).
         area: (c,) of the stress-free sheet, mm^2.
         share: (c,) part of it that lies in the first triangle of an edge; ones for triangles.
@@ -125,13 +125,11 @@ def _membrane(mesh: SheetMesh, part: Array, smooth: Bools) -> Membrane:
 
 
 def _triangle_cells(mesh: SheetMesh, rows: Ints, part: Array) -> Cells:
-    from bh.mechanics.consistent_patches import triangle_frames
-
-    edges, areas = triangle_frames(mesh.points, mesh.triangles[rows])
+    strain, areas = kernels.triangle_strains(mesh.points, mesh.triangles[rows])
     bars = mesh.topology.triangle_edges[rows]
     return Cells(
         source=rows, nodes=np.ascontiguousarray(mesh.triangles[rows]), bars=np.ascontiguousarray(bars),
-        owned=np.zeros(bars.shape, dtype=bool), strain=strain_map(edges), area=part * areas,
+        owned=np.zeros(bars.shape, dtype=bool), strain=strain, area=part * areas,
         share=np.ones(len(rows)),
     )  # fmt: skip
 
@@ -139,51 +137,21 @@ def _triangle_cells(mesh: SheetMesh, rows: Ints, part: Array) -> Cells:
 def _edge_cells(mesh: SheetMesh, rows: Ints) -> Cells:
     topology = mesh.topology
     nodes = topology.hinges[rows]
-    ends = nodes[:, FIVE]
-    bars = topology.find_edges(ends.reshape(-1, 2)).reshape(len(rows), 5)
-    vectors, areas = unfolded(mesh.points, nodes)
+    # of the first triangle, which runs along the edge, the edge from the head to the wing comes next; of the other
+    # one, which runs against it, that from the tail
+    sides = topology.edge_triangles[topology.hinge_edges[rows]]
+    around = topology.triangle_edges[sides]
+    own = (around == topology.hinge_edges[rows][:, None, None]).argmax(axis=2)
+    after, before = (np.take_along_axis(around, (own[..., None] + k) % 3, 2)[..., 0] for k in (1, 2))
+    bars = np.column_stack(
+        (topology.hinge_edges[rows], before[:, 0], after[:, 0], after[:, 1], before[:, 1])
+    )
+    strain, areas = kernels.edge_strains(mesh.points, nodes)
     whole = areas.sum(axis=1)
-    strain = np.zeros((len(rows), 3, 5))
-    for side, own in enumerate(([0, 1, 2], [0, 3, 4])):
-        strain[:, :, own] += (areas[:, side] / whole)[:, None, None] * strain_map(vectors[:, own])
     return Cells(
         source=rows, nodes=np.ascontiguousarray(nodes), bars=bars, owned=np.zeros(bars.shape, dtype=bool),
         strain=strain, area=whole / 3.0, share=areas[:, 0] / whole,
     )  # fmt: skip
-
-
-def unfolded(points: Array, hinges: Ints) -> tuple[Array, Array]:
-    """(h, 5, 2) vectors of the five bars in one plane, the edge along x and the first wing above; areas (h, 2)."""
-    wing, tail, head, other = (points[hinges[:, k]] for k in range(4))
-    edge = head - tail
-    length = np.linalg.norm(edge, axis=1)
-    along = edge / length[:, None]
-    places = np.zeros((len(hinges), 4, 2))
-    places[:, 2, 0] = length
-    areas = np.empty((len(hinges), 2))
-    for side, (corner, at, sign) in enumerate(((wing, 0, 1.0), (other, 3, -1.0))):
-        arm = corner - tail
-        places[:, at, 0] = np.einsum("hi,hi->h", arm, along)
-        height = np.linalg.norm(np.cross(along, arm), axis=1)
-        places[:, at, 1] = sign * height
-        areas[:, side] = 0.5 * length * height
-    return places[:, FIVE[:, 1]] - places[:, FIVE[:, 0]], areas
-
-
-def strain_map(vectors: Array) -> Array:
-    """(c, 3, 3) strain (xx, yy, 2 xy) from gamma of three bars with stress-free vectors (c, 3, 2), mm.
-
-    The strain for which bar k alone has gamma is the symmetric product of the normals of the two others.
-    """
-    x, y = vectors[..., 0], vectors[..., 1]
-    out = np.empty((len(vectors), 3, 3))
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        scale = 1.0 / ((x[:, i] * y[:, k] - y[:, i] * x[:, k]) * (x[:, j] * y[:, k] - y[:, j] * x[:, k]))
-        out[:, 0, k] = scale * y[:, i] * y[:, j]
-        out[:, 1, k] = scale * x[:, i] * x[:, j]
-        out[:, 2, k] = -scale * (x[:, i] * y[:, j] + x[:, j] * y[:, i])
-    return out
 
 
 def _select(cells: Cells, weight: Array) -> Cells:
@@ -198,10 +166,11 @@ def _owned(membrane: Membrane) -> Membrane:
     """Every bar is owned by one cell."""
     three, five = membrane.cells
     flat = np.concatenate((three.bars.ravel(), five.bars.ravel()))
-    owned = np.zeros(len(flat), dtype=bool)
-    owned[np.unique(flat, return_index=True)[1]] = True
-    first = three.bars.size
+    last = np.full(len(membrane.bars), -1, dtype=np.int64)
+    last[flat] = np.arange(len(flat))
+    owned = last[flat] == np.arange(len(flat))
+    split = three.bars.size
     return replace(
-        membrane, triangles=replace(three, owned=owned[:first].reshape(three.bars.shape)),
-        edges=replace(five, owned=owned[first:].reshape(five.bars.shape)),
+        membrane, triangles=replace(three, owned=owned[:split].reshape(three.bars.shape)),
+        edges=replace(five, owned=owned[split:].reshape(five.bars.shape)),
     )  # fmt: skip

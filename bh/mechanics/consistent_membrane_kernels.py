@@ -14,6 +14,85 @@ from bh.mechanics.assembly import add_lower, rotate
 from bh.mechanics.kinematics import OPTIONS
 
 
+# ------------------------------------------------------------------------------------------- once a step
+
+
+@njit(inline="always", **OPTIONS)
+def _add_strain_map(d, part, bars, out):  # type: ignore[no-untyped-def]
+    """Add to out (3, k) a part of the strain (xx, yy, 2 xy) that three `bars` with plane vectors d (k, 2) measure.
+
+    The strain for which one bar alone has gamma is the symmetric product of the normals of the two others.
+    """
+    for k in range(3):
+        K, i, j = bars[k], bars[(k + 1) % 3], bars[(k + 2) % 3]
+        scale = part / ((d[i, 0] * d[K, 1] - d[i, 1] * d[K, 0]) * (d[j, 0] * d[K, 1] - d[j, 1] * d[K, 0]))
+        out[0, K] += scale * d[i, 1] * d[j, 1]
+        out[1, K] += scale * d[i, 0] * d[j, 0]
+        out[2, K] -= scale * (d[i, 0] * d[j, 1] + d[i, 1] * d[j, 0])
+
+
+@njit(inline="always", **OPTIONS)
+def _beside(x, tail, head, wing, out):  # type: ignore[no-untyped-def]
+    """Writes the place (2,) of a wing from the tail, along the edge and off it; returns the edge's length."""
+    edge2 = arm2 = along = 0.0
+    for i in range(3):
+        e, w = x[head, i] - x[tail, i], x[wing, i] - x[tail, i]
+        edge2 += e * e
+        arm2 += w * w
+        along += e * w
+    length = np.sqrt(edge2)
+    cross2 = 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        c = (x[head, j] - x[tail, j]) * (x[wing, k] - x[tail, k])
+        c -= (x[head, k] - x[tail, k]) * (x[wing, j] - x[tail, j])
+        cross2 += c * c
+    out[0], out[1] = along / length, np.sqrt(cross2) / length
+    return length
+
+
+@njit(**OPTIONS)
+def triangle_strains(x, triangles):  # type: ignore[no-untyped-def]
+    """(c, 3, 3) maps from gamma of the bars opposite the corners to the strain, x along bar 0; areas (c,), mm^2."""
+    strain, areas = np.zeros((len(triangles), 3, 3)), np.empty(len(triangles))
+    d, wing, bars = np.empty((3, 2)), np.empty(2), np.arange(3)
+    for c in range(len(triangles)):
+        length = _beside(x, triangles[c, 1], triangles[c, 2], triangles[c, 0], wing)
+        areas[c] = 0.5 * length * wing[1]
+        d[0, 0], d[0, 1] = length, 0.0
+        d[1, 0], d[1, 1] = wing[0] - length, wing[1]
+        d[2, 0], d[2, 1] = wing[0], wing[1]
+        _add_strain_map(d, 1.0, bars, strain[c])
+    return strain, areas
+
+
+@njit(**OPTIONS)
+def edge_strains(x, hinges):  # type: ignore[no-untyped-def]
+    """(c, 3, 5) maps from gamma of five bars to the mean strain, x along the edge; areas (c, 2) of the triangles, mm^2.
+
+    Both triangles lie in one plane, unfolded about the edge: the first wing above it, the other one below.
+    """
+    strain, areas = np.zeros((len(hinges), 3, 5)), np.empty((len(hinges), 2))
+    d, one, two = np.empty((5, 2)), np.empty(2), np.empty(2)
+    first, second = np.array([0, 1, 2]), np.array([0, 3, 4])
+    for c in range(len(hinges)):
+        length = _beside(x, hinges[c, 1], hinges[c, 2], hinges[c, 0], one)
+        _beside(x, hinges[c, 1], hinges[c, 2], hinges[c, 3], two)
+        areas[c, 0], areas[c, 1] = 0.5 * length * one[1], 0.5 * length * two[1]
+        d[0, 0], d[0, 1] = length, 0.0
+        d[1, 0], d[1, 1] = one[0], one[1]
+        d[2, 0], d[2, 1] = one[0] - length, one[1]
+        d[3, 0], d[3, 1] = two[0], -two[1]
+        d[4, 0], d[4, 1] = two[0] - length, -two[1]
+        part = one[1] / (one[1] + two[1])
+        _add_strain_map(d, part, first, strain[c])
+        _add_strain_map(d, 1.0 - part, second, strain[c])
+    return strain, areas
+
+
+# ------------------------------------------------------------------------------------------- every iteration
+
+
 @njit(**OPTIONS)
 def bar_strains(x, bars, rest_square, gamma):  # type: ignore[no-untyped-def]
     """Writes gamma (b,), mm^2."""
@@ -35,15 +114,20 @@ def bar_rates(x, v, bars, rate):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def cell_forces(bars, K, gamma, N):  # type: ignore[no-untyped-def]
-    """Adds K gamma of cells with `bars` (c, k) to N (b,)."""
-    most = bars.shape[1]
-    for c in range(len(bars)):
-        for k in range(most):
-            s = 0.0
-            for m in range(most):
-                s += K[c, k, m] * gamma[bars[c, m]]
-            N[bars[c, k]] += s
+def cell_forces(triangles, K3, edges, K5, gamma, N):  # type: ignore[no-untyped-def]
+    """Writes the sums N (b,) of K gamma over the cells with bars `triangles` (c, 3) and `edges` (c, 5)."""
+    N[:] = 0.0
+    for c in range(len(triangles)):
+        g0, g1, g2 = gamma[triangles[c, 0]], gamma[triangles[c, 1]], gamma[triangles[c, 2]]
+        for k in range(3):
+            N[triangles[c, k]] += K3[c, k, 0] * g0 + K3[c, k, 1] * g1 + K3[c, k, 2] * g2
+    for c in range(len(edges)):
+        g0, g1, g2 = gamma[edges[c, 0]], gamma[edges[c, 1]], gamma[edges[c, 2]]
+        g3, g4 = gamma[edges[c, 3]], gamma[edges[c, 4]]
+        for k in range(5):
+            N[edges[c, k]] += (
+                K5[c, k, 0] * g0 + K5[c, k, 1] * g1 + K5[c, k, 2] * g2 + K5[c, k, 3] * g3 + K5[c, k, 4] * g4
+            )
 
 
 @njit(**OPTIONS)

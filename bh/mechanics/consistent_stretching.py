@@ -48,14 +48,17 @@ class Stretching:
     def forces(self, x: Array, f: Array, N: Array) -> tuple[float, float]:
         """Energy (N mm) and the sum of squared bar forces (N^2); adds the gradient to f (n, 3) and writes N."""
         m, gamma = self.membrane, self.gamma(x)
-        N[:] = 0.0
         if self._K:
-            for cells, K in zip(m.cells, self._K, strict=True):
-                kernels.cell_forces(cells.bars, K, gamma, N)
+            self._by_stiffness(self._K, gamma, N)
             energy = 0.5 * float(N @ gamma)
         else:
+            N[:] = 0.0
             energy = sum(self._by_law(cells, gamma, N) for cells in m.cells)
         return energy, kernels.bar_forces(x, m.bars, m.rest_square, N, f)
+
+    def _by_stiffness(self, K: tuple[Array, ...], gamma: Array, N: Array) -> None:
+        three, five = self.membrane.cells
+        kernels.cell_forces(three.bars, K[0], five.bars, K[1], gamma, N)
 
     def _by_law(self, cells: Cells, gamma: Array, N: Array) -> float:
         strain = cells.strains(gamma)
@@ -81,9 +84,7 @@ class Stretching:
         m = self.membrane
         rate = np.empty(len(m.bars))
         kernels.bar_rates(x, v, m.bars, rate)
-        dN[:] = 0.0
-        for cells, K in zip(m.cells, self.stiffness(x), strict=True):
-            kernels.cell_forces(cells.bars, K, rate, dN)
+        self._by_stiffness(self.stiffness(x), rate, dN)
 
     def force_rates(self, x: Array, v: Array, N: Array, dN: Array, f: Array) -> None:
         """Add the rate of the gradient to f (n, 3)."""
