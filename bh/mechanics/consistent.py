@@ -35,7 +35,9 @@ class Consistent:
 
     name = "consistent"
     takes_nu = True
-    refinement: Refinement | None = Refinement("staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9)
+    refinement: Refinement | None = Refinement(
+        "staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9
+    )
 
     def __init__(self, measure: Measure = smoothed_strain, material: Material = LINEAR) -> None:
         """What measures the strain of the sheet, and its material (E, nu and t are the sheet's)."""

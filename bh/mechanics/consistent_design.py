@@ -105,7 +105,7 @@ class ConsistentDesign:
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the rotations, along v (n, 3) and w."""
         system, e, x = self.system, self.system.elements, self.x
-        rates, _ = system._force_rates(x, v, w, closing=bool(self.L.any()), controlled=False)
+        rates, _ = system._force_rates(x, v, w, e.patches.B, closing=bool(self.L.any()), controlled=False)
         dN, dM, dS, _ = system.split(rates)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         e.stretching.force_rates(x, v, self.N, dN, f)

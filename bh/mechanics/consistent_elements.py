@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from bh.actuation import Ramp
 from bh.errors import ModelError
 from bh.laws import HELD, SHEET, SPRING
-from bh.materials import LinearElastic, Material
-from bh.mechanics.consistent_kernels import TURN
+from bh.materials import Constant, LinearElastic, Material
+from bh.mechanics.consistent_bending import Bending
+from bh.mechanics.consistent_kernels import OWN, TURN
 from bh.mechanics.consistent_patches import (
     Patches,
     bending_matrices,
+    curvature_maps,
     patches,
     triangle_frames,
 )
@@ -45,7 +47,7 @@ class ConsistentElements:
     Attributes:
         members: (t,) which triangles of the mesh these are; triangles: (t, 3) nodes; edge k is opposite corner k.
         heights: (t, 3) of the triangles on their edges in the stress-free sheet, mm.
-        stretching: cells of the membrane and their law.
+        stretching: cells of the membrane and their law; `bending` patches and theirs.
         B_triangle: (t, 3, 3) energy of bending of a triangle by the angles at its edges, N mm.
         patches: matrices and angles of the patches.
         quad, ghost, place, rotation, column: of the angles, see `bh.mechanics.consistent_kernels`.
@@ -62,6 +64,7 @@ class ConsistentElements:
     triangles: Ints
     heights: Array
     stretching: Stretching
+    bending: Bending
     B_triangle: Array
     patches: Patches
     quad: Ints
@@ -106,17 +109,20 @@ def consistent_elements(
     _check_moments(mesh, program)
     topology = mesh.topology
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
-    B = bending_matrices(edges, areas, sheet.bending_stiffness(), sheet.nu)
+    maps, of_curvature = curvature_maps(edges, areas), material.bending(sheet)
+    B = bending_matrices(maps, areas, of_curvature.moduli(np.zeros((1, 3)))[0])
     clamped = np.zeros(len(topology.edges), dtype=bool)
     clamped[topology.find_edges(program.constraints.clamped)] = True
     spring = law == SPRING
     part = None if plane is None else plane.triangle_weight
-    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part)
+    condense = isinstance(of_curvature, Constant)
+    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part, condense=condense)
     if plane is not None:
         from bh.mechanics.consistent_half import half_consistent, half_patches
 
         joined = half_patches(joined, spring, plane)
     rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
+    part_area = areas if part is None else part * areas
     membrane, law_of_strain = measure(mesh, creased(mesh, law)), material.stretching(sheet)
     quad, ghost = _quads(mesh, joined)
     nodes, place = _rows(joined, quad)
@@ -144,7 +150,7 @@ def consistent_elements(
     whole = ConsistentElements(
         members=np.arange(len(mesh.triangles)), triangles=mesh.triangles,
         heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2), stretching=Stretching(membrane, law_of_strain),
-        B_triangle=B, patches=joined,
+        bending=Bending(joined, of_curvature, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
         quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
         width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=Ramp(begin, program.rest.end[springs]),
@@ -210,7 +216,8 @@ def _number_rotations(
 ) -> tuple[Ints, Ints, int]:
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
 
-    There is one for each hinge between two patches, and two for each spring crease; but one for a spring in the plane
+    There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that keeps
+    its own; but one for a spring in the plane
     of a symmetric sheet, and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
@@ -225,7 +232,10 @@ def _number_rotations(
     triangles = mesh.topology.edge_triangles[mesh.topology.hinge_edges, 0]
     side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
     has = (joined.hinge >= 0) & ~joined.inner
-    return np.where(has, both[joined.hinge, side], -1), both, int(count.sum())
+    rotation = np.where(has, both[joined.hinge, side], -1)
+    free = (joined.hinge < 0) & (joined.kind == OWN)
+    rotation[free] = count.sum() + np.arange(free.sum())
+    return rotation, both, int(count.sum() + free.sum())
 
 
 def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:

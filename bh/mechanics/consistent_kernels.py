@@ -81,6 +81,41 @@ def bending_forces(x, alpha, kind, quad, ghost, rest, rotation, B, f, r, M, thet
 
 
 @njit(**OPTIONS)
+def bending_angles(x, alpha, kind, quad, ghost, rest, rotation, theta):  # type: ignore[no-untyped-def]
+    """Writes the angles (c, a) alone; whether a hinge is about to close."""
+    xl, g = np.empty((4, 3)), np.empty(12)
+    closing = False
+    for c in range(len(kind)):
+        for a in range(kind.shape[1]):
+            angle = alpha[rotation[c, a]] if rotation[c, a] >= 0 else 0.0
+            if kind[c, a] == TURN:
+                geometry = _turn_geometry(x, quad[c, a], ghost[c, a], xl, g)
+                angle = geometry[0] - rest[c, a] - angle
+                closing = closing or in_zone(geometry[0])
+            theta[c, a] = angle
+    return closing
+
+
+@njit(**OPTIONS)
+def bending_gradient(x, kind, quad, ghost, rotation, M, f, r):  # type: ignore[no-untyped-def]
+    """Sum of squared forces (N^2); adds the gradient of the energy to f and r for moments M (c, a) of any law."""
+    xl, g = np.empty((4, 3)), np.empty(12)
+    size = 0.0
+    for c in range(len(kind)):
+        for a in range(kind.shape[1]):
+            s = M[c, a]
+            if rotation[c, a] >= 0:
+                r[rotation[c, a]] += s if kind[c, a] == OWN else -s
+            if kind[c, a] == TURN:
+                _turn_geometry(x, quad[c, a], ghost[c, a], xl, g)
+                size += s * s * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+                for p in range(4):
+                    for i in range(3):
+                        f[quad[c, a, p], i] += s * g[3 * p + i]
+    return size
+
+
+@njit(**OPTIONS)
 def _add_placed(H, small, place):  # type: ignore[no-untyped-def]
     """Add the lower triangle of `small` (12, 12) to that of H; `place` may name a row twice (a clamp's ghost)."""
     for p in range(12):

@@ -143,9 +143,7 @@ def _edge_cells(mesh: SheetMesh, rows: Ints) -> Cells:
     around = topology.triangle_edges[sides]
     own = (around == topology.hinge_edges[rows][:, None, None]).argmax(axis=2)
     after, before = (np.take_along_axis(around, (own[..., None] + k) % 3, 2)[..., 0] for k in (1, 2))
-    bars = np.column_stack(
-        (topology.hinge_edges[rows], before[:, 0], after[:, 0], after[:, 1], before[:, 1])
-    )
+    bars = np.column_stack((topology.hinge_edges[rows], before[:, 0], after[:, 0], after[:, 1], before[:, 1]))
     strain, areas = kernels.edge_strains(mesh.points, nodes)
     whole = areas.sum(axis=1)
     return Cells(

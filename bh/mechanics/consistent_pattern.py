@@ -32,8 +32,9 @@ def rotation_pattern(
     places = np.zeros((none + 1, 3))
     places[:n] = mesh.points
     has = e.rotation >= 0
-    hinges = mesh.topology.hinges
-    ends = np.vstack((hinges[e.patches.hinge[has], 1:3], np.repeat(e.hinges[:, 1:3], 2, axis=0)))
+    topology, hinges = mesh.topology, mesh.topology.hinges
+    edge = topology.triangle_edges.ravel()[e.patches.half_edge[has]]
+    ends = np.vstack((topology.edges[edge], np.repeat(e.hinges[:, 1:3], 2, axis=0)))
     at = np.concatenate((e.rotation[has], e.turns.ravel()))
     places[n + at] = mesh.points[ends].mean(axis=1)
 

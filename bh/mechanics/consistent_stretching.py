@@ -24,6 +24,8 @@ class Stretching:
     def __init__(self, membrane: Membrane, law: Law) -> None:
         self.membrane, self.law = membrane, law
         self.constant = isinstance(law, Constant)
+        self._at: Array | None = None
+        self._last: tuple[Array, ...] = ()
         self._K: tuple[Array, ...] = (
             tuple(cells.stiffness(law.matrix) for cells in membrane.cells)
             if isinstance(law, Constant)
@@ -40,10 +42,13 @@ class Stretching:
         """(c, k, k) of both kinds of cells at x: derivatives of the bars' N by gamma, N / mm^3."""
         if self._K:
             return self._K
-        gamma = self.gamma(x)
-        return tuple(
-            cells.stiffness(self.law.moduli(cells.strains(gamma))) for cells in self.membrane.cells
-        )
+        if self._at is not x:  # the tangent and the forces that it predicts ask at the same positions
+            gamma = self.gamma(x)
+            self._last = tuple(
+                cells.stiffness(self.law.moduli(cells.strains(gamma))) for cells in self.membrane.cells
+            )
+            self._at = x
+        return self._last
 
     def forces(self, x: Array, f: Array, N: Array) -> tuple[float, float]:
         """Energy (N mm) and the sum of squared bar forces (N^2); adds the gradient to f (n, 3) and writes N."""
@@ -93,9 +98,7 @@ class Stretching:
     def by_triangle(self, x: Array, triangles: int, beside: Ints) -> Array:
         """(triangles,) energies, N mm; that of an edge is shared by area with `beside` (m, 2), the sides of hinges."""
         gamma = self.gamma(x)
-        three, five = (
-            cells.area * self.law.energy(cells.strains(gamma)) for cells in self.membrane.cells
-        )
+        three, five = (cells.area * self.law.energy(cells.strains(gamma)) for cells in self.membrane.cells)
         out = np.zeros(triangles)
         np.add.at(out, self.membrane.triangles.source, three)
         sides, share = beside[self.membrane.edges.source], self.membrane.edges.share

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.materials import Material
 from bh.mechanics import closing as closings
 from bh.mechanics import consistent_kernels as kernels
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ROUNDING = 8.0 * np.finfo(float).eps
+ITERATIONS = 30  # for the rotations of least energy with a law of bending that is not linear
 
 
 class ElementForces(NamedTuple):
@@ -102,7 +104,7 @@ class ConsistentSystem(SupportedSheet):
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
-        self._tangent_at = mesh.points
+        self._tangent_at, self._tangent_B = mesh.points, self.elements.patches.B
         self._closing = False
         self._frame_of = np.append(self.constraints.frame_of, -1)
 
@@ -122,20 +124,29 @@ class ConsistentSystem(SupportedSheet):
 
     def rotations_at(self, x: Array, lam: float) -> Array:
         """(rotations,) of least energy at positions x (n, 3)."""
-        r = self.internal(x, np.zeros(self.size - self.moving), lam).r
-        return np.asarray(-self._rotation_factor.solve(r)) if np.abs(r).max(initial=0.0) > 0.0 else r
+        alpha = np.zeros(self.size - self.moving)
+        now = self.internal(x, alpha, lam)
+        if self.elements.bending.constant:
+            return np.asarray(-self._rotation_factor.solve(now.r)) if now.r.any() else now.r
+        for _ in range(ITERATIONS):
+            if np.abs(now.r).max(initial=0.0) <= 1e-12 * self._stiffest[1]:
+                return alpha
+            B = self.elements.bending.stiffness(now.theta)
+            alpha = alpha - sp.linalg.splu(self.rotation_stiffness(B)).solve(now.r)
+            now = self.internal(x, alpha, lam)
+        raise ModelError("no rotations of least energy at these positions: the law of bending is not convex there")
 
     @cached_property
     def _rotation_factor(self) -> Any:
-        return sp.linalg.splu(self.rotation_stiffness())
+        return sp.linalg.splu(self.rotation_stiffness(self.elements.patches.B))
 
-    def rotation_stiffness(self) -> sp.csc_matrix:
-        """Hessian of the energy in the rotations alone, which does not depend on anything."""
+    def rotation_stiffness(self, B: Array) -> sp.csc_matrix:
+        """Hessian of the energy in the rotations alone, with stiffnesses B (c, a, a) of the patches."""
         e, joined = self.elements, self.elements.patches
-        most = joined.B.size + 4 * len(e.springs)
+        most = B.size + 4 * len(e.springs)
         rows, columns, values = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
         used = setup.rotation_matrix(
-            e.rotation, joined.kind, joined.B, e.turns, e.spring_stiffness, rows, columns, values
+            e.rotation, joined.kind, B, e.turns, e.spring_stiffness, rows, columns, values
         )
         entries = (values[:used], (rows[:used], columns[:used]))
         return sp.csc_matrix(entries, shape=(e.rotations, e.rotations))
@@ -155,15 +166,13 @@ class ConsistentSystem(SupportedSheet):
 
     def internal(self, x: Array, alpha: Array, lam: float) -> Internal:
         """Energies, gradient and element forces at positions x and rotations alpha."""
-        e, joined = self.elements, self.elements.patches
+        e = self.elements
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
         turns = np.empty(len(e.springs))
         N, M, S, L = self.split(forces)
         stretching, size = e.stretching.forces(x, f, N)
-        more, closing = kernels.bending_forces(
-            x, alpha, joined.kind, e.quad, e.ghost, e.rest.at(lam), e.rotation, joined.B, f, r, M, theta
-        )
+        bending, more, closing = e.bending.forces(x, alpha, e.rest.at(lam), f, r, M, theta)
         rest, couple = e.spring_rest.at(lam), e.couple.at(lam)
         springs, most, too = kernels.spring_forces(
             x, alpha, e.hinges, e.spring_stiffness, rest, couple, e.turns, f, r, S, turns
@@ -171,7 +180,6 @@ class ConsistentSystem(SupportedSheet):
         L[:] = 0.0
         lock = closings.lock_forces(x, self.hinges, e.lock, f, L) if closing or too else 0.0
         size = float(np.sqrt((size + more + most) / (len(forces) - len(L))))
-        bending = 0.5 * float(np.vdot(M, theta))
         return Internal(stretching, bending, springs, lock, size, f, r, forces, theta, turns)
 
     def stretching_by_triangle(self, x: Array) -> Array:
@@ -182,13 +190,7 @@ class ConsistentSystem(SupportedSheet):
 
     def bending_by_triangle(self, theta: Array) -> Array:
         """(t,) energy of bending, N mm, for the angles (c, a) of the patches."""
-        e = self.elements
-        half = np.einsum("cha,ca->ch", e.patches.shares, theta).reshape(*e.patches.members.shape, 3)
-        inside = e.patches.members >= 0
-        out = np.empty(len(e.triangles))
-        member = e.patches.members[inside]
-        out[member] = 0.5 * np.einsum("tk,tkl,tl->t", half[inside], e.B_triangle[member], half[inside])
-        return out
+        return self.elements.bending.by_triangle(theta, self.elements.B_triangle)
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         x = self.positions(q, lam)
@@ -242,8 +244,11 @@ class ConsistentSystem(SupportedSheet):
         data = np.zeros(pattern.size)
         axes = (self._frame_of, self.constraints.frames)
         e.stretching.tangent(x, N, *axes, pattern.slots[0], pattern.slots[3], data)
+        B = joined.B
+        if not e.bending.constant:
+            B = e.bending.stiffness(e.bending.angles(x, q[self.moving :], e.rest.at(lam)))
         closing = kernels.bending_tangent(
-            x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, joined.B, M, e.nodes, *axes,
+            x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, B, M, e.nodes, *axes,
             pattern.slots[1], data,
         )  # fmt: skip
         closing |= kernels.spring_tangent(
@@ -254,7 +259,7 @@ class ConsistentSystem(SupportedSheet):
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
         self._closing = bool(closing)
-        self._tangent_at = x
+        self._tangent_at, self._tangent_B = x, B
         if not self.constraints.rigid_body:
             return pattern.matrix(data)
         rigid = self.displacements.rigid(x)
@@ -280,15 +285,17 @@ class ConsistentSystem(SupportedSheet):
 
     def predicted_forces(self, forces: Array, dq: Array) -> Array:
         v = self.vectors(dq)
-        rates, _ = self._force_rates(self._tangent_at, v, dq[self.moving :], self._closing, controlled=False)
+        rates, _ = self._force_rates(
+            self._tangent_at, v, dq[self.moving :], self._tangent_B, self._closing, controlled=False
+        )
         return forces + rates
 
     def _force_rates(
-        self, x: Array, v: Array, w: Array, closing: bool, controlled: bool
+        self, x: Array, v: Array, w: Array, B: Array, closing: bool, controlled: bool
     ) -> tuple[Array, Array]:
         """Rates of the element forces and of the springs' turns for velocities v (n, 3) and w (rotations,) at x.
 
-        `controlled` adds what rest angles and couples do while lambda grows at the rate 1; without `closing` there are
+        B (c, a, a) are the stiffnesses of the patches there. `controlled` adds what rest angles and couples do while lambda grows at the rate 1; without `closing` there are
         no locks.
         """
         e, by = self.elements, float(controlled)
@@ -297,7 +304,7 @@ class ConsistentSystem(SupportedSheet):
         e.stretching.rates(x, v, N)
         joined = e.patches
         kernels.bending_rates(
-            x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, joined.B, M
+            x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, B, M
         )
         kernels.spring_rates(
             x,
@@ -325,7 +332,8 @@ class ConsistentSystem(SupportedSheet):
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         v = self.displacements.prescribed_motion
-        rates, turns = self._force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
+        B = e.bending.stiffness(now.theta)
+        rates, turns = self._force_rates(x, v, np.zeros(e.rotations), B, closing=False, controlled=True)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
         e.stretching.force_rates(x, v, N, dN, f)
@@ -367,5 +375,11 @@ class ConsistentSystem(SupportedSheet):
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more
 
     def design(self, q: Array, lam: float) -> ConsistentDesign:
-        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
+        """Derivatives with respect to element data at a state (`bh.sensitivities`).
+
+        Raises:
+            ModelError: the material is not linear.
+        """
+        if not (self.elements.stretching.constant and self.elements.bending.constant):
+            raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
         return ConsistentDesign(self, q, lam)

@@ -13,7 +13,9 @@ import meshes
 from bh import Fold, Model, Sheet, trace
 from bh.errors import ModelError
 from bh.formulations import formulation, takes_nu
-from bh.mechanics.consistent_patches import bending_matrices, stretching_matrices, triangle_frames
+from bh.mechanics.consistent_patches import bending_matrices, curvature_maps, triangle_frames
+from bh.materials import LinearElastic
+from bh.mechanics.consistent_membrane_kernels import triangle_strains
 from bh.model import ElementStiffness
 from bh.program import program
 from meshes.structured import Kind
@@ -51,9 +53,12 @@ def test_triangle_matrices(nu: float) -> None:
     points = np.array([[0.0, 0.0, 1.0], [3.0, 0.4, 2.0], [0.7, 0.2, 1.8]])
     edges, areas = triangle_frames(points, np.array([[0, 1, 2]]))
     sheet = Sheet(E=1000.0, t=0.1, nu=nu)
-    K = stretching_matrices(edges, areas, sheet.E, sheet.t, nu)[0]
+    strain_map, found = triangle_strains(points, np.array([[0, 1, 2]]))
+    assert found == pytest.approx(areas, rel=1e-12)
+    C = LinearElastic().stretching(sheet).matrix
+    K = areas[0] * strain_map[0].T @ C @ strain_map[0]
     D = sheet.bending_stiffness()
-    B = bending_matrices(edges, areas, D, nu)[0]
+    B = bending_matrices(curvature_maps(edges, areas), areas, LinearElastic().bending(sheet).matrix)[0]
     lengths = np.linalg.norm(edges[0], axis=1)
     normals = np.column_stack((edges[0][:, 1], -edges[0][:, 0])) / lengths[:, None]
     for tensor in np.random.default_rng(1).normal(size=(5, 2, 2)):

@@ -48,7 +48,9 @@ def test_cells_cover_the_sheet_and_own_every_bar_once(measure: object) -> None:
     crease = none(mesh)
     crease[::7] = True
     membrane: Membrane = measure(mesh, crease)  # type: ignore[operator]
-    assert sum(float(cells.area.sum()) for cells in membrane.cells) == pytest.approx(mesh.areas.sum(), rel=1e-13)
+    assert sum(float(cells.area.sum()) for cells in membrane.cells) == pytest.approx(
+        mesh.areas.sum(), rel=1e-13
+    )
     owned = np.concatenate([cells.bars[cells.owned] for cells in membrane.cells])
     assert np.array_equal(np.sort(owned), np.arange(len(membrane.bars)))
     if measure is smoothed_strain:
@@ -128,7 +130,9 @@ def hessian(mesh: meshes.SheetMesh, sheet: Sheet) -> Array:
     """Second derivatives of the energy of a free sheet, of positions and rotations, without any ground."""
     model = Model(mesh, sheet, formulation="consistent")
     creases = [name for name in mesh.creases]
-    model = model.fold(creases[0], rest=math.pi, Lstar=5.0) if creases else model.force("node:0", each=(0.0,) * 3)
+    model = (
+        model.fold(creases[0], rest=math.pi, Lstar=5.0) if creases else model.force("node:0", each=(0.0,) * 3)
+    )
     system = Consistent().system(model, program(model)[0], None)
     assert isinstance(system, ConsistentSystem)
     design = system.design(np.zeros(system.size), 0.0)
@@ -180,7 +184,10 @@ def bent(mesh: meshes.SheetMesh, made: Consistent, length: float, height: float)
     model = Model(mesh, replace(SHEET, nu=0.0), formulation="consistent").support("all", "z")
     model = model.support("edge:start", "x").support("corner:inner-start", "y")
     model = model.step(
-        *(Displace([int(i)], "x", -turn * float(mesh.points[i, 1] - 0.5 * height)) for i in mesh.nodes("edge:end"))
+        *(
+            Displace([int(i)], "x", -turn * float(mesh.points[i, 1] - 0.5 * height))
+            for i in mesh.nodes("edge:end")
+        )
     )
     system = made.system(model, program(model)[0], None)
     beam = SHEET.E * SHEET.t * height**3 / 12.0 * turn**2 / (2.0 * length)
@@ -222,7 +229,9 @@ def test_folded_energies_rise_from_below() -> None:
         assert path.outcome == "reached"
         totals.append(path[-1].energy.total)
     assert 0.0 < np.diff(totals).min()
-    assert [total / 0.05370 - 1.0 for total in totals] == pytest.approx([-0.124, -0.038, -0.013, -0.004], abs=0.001)
+    assert [total / 0.05370 - 1.0 for total in totals] == pytest.approx(
+        [-0.124, -0.038, -0.013, -0.004], abs=0.001
+    )
 
 
 def test_energy_density_is_shared_by_area() -> None:
