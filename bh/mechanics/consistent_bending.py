@@ -53,9 +53,7 @@ class Bending:
                 x, alpha, p.kind, self.quad, self.ghost, rest, self.rotation, p.B, f, r, M, theta
             )
             return 0.5 * float(np.vdot(M, theta)), size, closing
-        closing = kernels.bending_angles(
-            x, alpha, p.kind, self.quad, self.ghost, rest, self.rotation, theta
-        )
+        closing = kernels.bending_angles(x, alpha, p.kind, self.quad, self.ghost, rest, self.rotation, theta)
         curvature = self.curvature(theta)
         moment = self._area[:, None] * self.law.stress(curvature)
         M[:] = np.einsum("cia,ci->ca", self._maps, moment)
@@ -77,9 +75,7 @@ class Bending:
     def angles(self, x: Array, alpha: Array, rest: Array) -> Array:
         """(c, a) angles at positions x (n, 3) and rotations alpha, rad."""
         theta = np.empty(self.rotation.shape)
-        kernels.bending_angles(
-            x, alpha, self.patches.kind, self.quad, self.ghost, rest, self.rotation, theta
-        )
+        kernels.bending_angles(x, alpha, self.patches.kind, self.quad, self.ghost, rest, self.rotation, theta)
         return theta
 
     def by_triangle(self, theta: Array, B_triangle: Array) -> Array:

@@ -14,6 +14,7 @@ from bh.laws import HELD, SHEET, SPRING
 from bh.materials import Constant, LinearElastic, Material
 from bh.mechanics.consistent_bending import Bending
 from bh.mechanics.consistent_kernels import OWN, TURN
+from bh.mechanics.consistent_membrane import Measure, smoothed_strain
 from bh.mechanics.consistent_patches import (
     Patches,
     bending_matrices,
@@ -21,7 +22,6 @@ from bh.mechanics.consistent_patches import (
     patches,
     triangle_frames,
 )
-from bh.mechanics.consistent_membrane import Measure, smoothed_strain
 from bh.mechanics.consistent_stretching import Stretching
 from bh.mechanics.hinge_lock import ZONE, until_closed
 from bh.mechanics.kinematics import dihedral_angles

@@ -13,7 +13,6 @@ from numba import njit
 from bh.mechanics.assembly import add_lower, rotate
 from bh.mechanics.kinematics import OPTIONS
 
-
 # ------------------------------------------------------------------------------------------- once a step
 
 

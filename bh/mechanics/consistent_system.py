@@ -134,7 +134,9 @@ class ConsistentSystem(SupportedSheet):
             B = self.elements.bending.stiffness(now.theta)
             alpha = alpha - sp.linalg.splu(self.rotation_stiffness(B)).solve(now.r)
             now = self.internal(x, alpha, lam)
-        raise ModelError("no rotations of least energy at these positions: the law of bending is not convex there")
+        raise ModelError(
+            "no rotations of least energy at these positions: the law of bending is not convex there"
+        )
 
     @cached_property
     def _rotation_factor(self) -> Any:
@@ -303,9 +305,7 @@ class ConsistentSystem(SupportedSheet):
         N, M, S, L = self.split(rates)
         e.stretching.rates(x, v, N)
         joined = e.patches
-        kernels.bending_rates(
-            x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, B, M
-        )
+        kernels.bending_rates(x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, B, M)
         kernels.spring_rates(
             x,
             v,

@@ -124,7 +124,9 @@ def test_strips(kind: Kind) -> None:
         assert plates.strip_ratio("torsion", kind, 1, alpha).value == pytest.approx(1.0, rel=1e-9)
     assert plates.strip_ratio("torsion", kind, 1, 2.0, nu=0.38).value == pytest.approx(1.0 / 1.38, rel=1e-9)
     assert plates.strip_ratio("bending_out_of_plane", kind, 2).value == pytest.approx(1.0, abs=0.005)
-    sheared = 1.0 / (1.0 + 3.0 * 2.0 * 1.2 / 12.0 / 10.0**2)  # of a cantilever, L / H = 10 (Timoshenko), nu = 0
+    sheared = 1.0 / (
+        1.0 + 3.0 * 2.0 * 1.2 / 12.0 / 10.0**2
+    )  # of a cantilever, L / H = 10 (Timoshenko), nu = 0
     stiff = [plates.strip_ratio("bending_in_plane", kind, rows).value - sheared for rows in (2, 4, 8)]
     assert all(rate > 1.8 for rate in plates.rates(stiff))
     assert 0.0 < stiff[-1] < 0.025
