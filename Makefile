@@ -132,5 +132,5 @@ $(VENV)/.project: pyproject.toml $(VENV)/.packages
 
 $(VENV)/.warm: $(VENV)/.project
 	@echo "== Warming the compiled caches"
-	@$(PY) -m bh.warm_up
+	@$(PY) -m bh.commands.warm_up
 	@touch $@

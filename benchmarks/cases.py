@@ -13,10 +13,10 @@ from typing import Any
 
 import bh
 import meshes
-from bh.formulations import formulation
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.loading.program import program
+from bh.runtime.threads import one_blas_thread
 from bh.solvers import pardiso
-from bh.threads import one_blas_thread
 
 SHEET = bh.Sheet(E=4000.0, nu=0.0, t=0.127)
 STRIPS = (64, 142, 1428, 14_285, 42_856)  # cells along the crease: 456 to 300,000 unknowns

@@ -18,11 +18,11 @@ import numpy as np
 
 import bh
 from benchmarks.cases import SHEETS, STRIPS, array_problem, least, one_iteration, strip, wide
-from bh.provenance import versions
+from bh.commands.warm_up import warm_up
+from bh.paths.provenance import versions
+from bh.runtime.threads import one_blas_thread
 from bh.solvers import pardiso
-from bh.threads import one_blas_thread
-from bh.warm_up import warm_up
-from verification.appendix_b import model as appendix_b
+from verification.studies.app_b.appendix_b import model as appendix_b
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "performance.md"

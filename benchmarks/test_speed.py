@@ -10,12 +10,12 @@ import pytest
 
 import bh
 from benchmarks.cases import array_problem, strip, wide
-from bh.formulations import formulation
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.loading.program import program
+from bh.runtime.threads import one_blas_thread
 from bh.solvers.increments import point
 from bh.solvers.trace import Walk, walk
-from bh.threads import one_blas_thread
-from verification.appendix_b import model
+from verification.studies.app_b.appendix_b import model
 
 
 @pytest.fixture(scope="module")

@@ -8,45 +8,45 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from bh.kernel_cache import ensure as _ensure_kernel_cache
+from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
-    from bh.accuracy import Accuracy
-    from bh.actuation import Bar, Displace, Fold, Force, Moment, Pinch, Tether
     from bh.errors import InputError, ModelError, PathFileError, SceneError
-    from bh.model import CreaseLaw, Model, Sheet
-    from bh.observables import Until, depth
-    from bh.path import Path
-    from bh.refinement import Goal
-    from bh.scene import load_scene
+    from bh.formulations.observables import Until, depth
+    from bh.formulations.state import Energy, State
+    from bh.model.actuations import Bar, Displace, Fold, Force, Moment, Pinch, Tether
+    from bh.model.model import CreaseLaw, Model, Sheet
+    from bh.model.refinement import Goal
+    from bh.model.supports import RigidBody, Support
+    from bh.paths.path import Path
+    from bh.scene.load import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
     from bh.solvers.automatic import Automatic
     from bh.solvers.continuation import LoadControl
     from bh.solvers.newton import Newton
-    from bh.state import Energy, State
-    from bh.supports import RigidBody, Support
-    from bh.tracing import trace
+    from bh.solving.accuracy import Accuracy
+    from bh.solving.follow import trace
 
 _HOME = {
-    "Accuracy": "bh.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
-    "Bar": "bh.actuation", "CreaseLaw": "bh.model", "Tether": "bh.actuation",
-    "Displace": "bh.actuation", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.state",
-    "Fold": "bh.actuation",
-    "Force": "bh.actuation", "Goal": "bh.refinement", "InputError": "bh.errors",
+    "Accuracy": "bh.solving.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
+    "Bar": "bh.model.actuations", "CreaseLaw": "bh.model.model", "Tether": "bh.model.actuations",
+    "Displace": "bh.model.actuations", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.formulations.state",
+    "Fold": "bh.model.actuations",
+    "Force": "bh.model.actuations", "Goal": "bh.model.refinement", "InputError": "bh.errors",
     "LoadControl": "bh.solvers.continuation",
-    "Model": "bh.model", "ModelError": "bh.errors", "Moment": "bh.actuation", "Newton": "bh.solvers.newton",
-    "Path": "bh.path", "PathFileError": "bh.errors", "Pinch": "bh.actuation",
-    "RigidBody": "bh.supports", "SceneError": "bh.errors",
-    "Sheet": "bh.model", "State": "bh.state", "Until": "bh.observables", "depth": "bh.observables",
-    "Support": "bh.supports", "load_scene": "bh.scene", "trace": "bh.tracing",
+    "Model": "bh.model.model", "ModelError": "bh.errors", "Moment": "bh.model.actuations", "Newton": "bh.solvers.newton",
+    "Path": "bh.paths.path", "PathFileError": "bh.errors", "Pinch": "bh.model.actuations",
+    "RigidBody": "bh.model.supports", "SceneError": "bh.errors",
+    "Sheet": "bh.model.model", "State": "bh.formulations.state", "Until": "bh.formulations.observables", "depth": "bh.formulations.observables",
+    "Support": "bh.model.supports", "load_scene": "bh.scene.load", "trace": "bh.solving.follow",
 }  # fmt: skip
 
 _SUBMODULES = {
     "contact": "bh.analysis.contact", "corrugation": "bh.applications.corrugation",
-    "creases": "bh.analysis.creases", "interactive": "bh.interactive",
+    "creases": "bh.analysis.creases", "interactive": "bh.plotting.interactive",
     "isometric": "bh.analysis.isometric",
     "node_sensitivities": "bh.analysis.node_sensitivities", "pinching": "bh.applications.pinching",
-    "plotting": "bh.plotting", "polish": "bh.analysis.polish", "scan": "bh.scan",
+    "plotting": "bh.plotting", "polish": "bh.applications.polish", "scan": "bh.applications.scan",
     "rulings": "bh.analysis.rulings",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe", "sweep": "bh.sweep",

@@ -34,8 +34,8 @@ PAGES = {
 # packages whose __all__ is public, and modules that are public as a whole
 PUBLIC = ("bh", "meshes")
 MODULES = (
-    "bh.plotting", "bh.interactive", "bh.analysis.stiffness_probe", "bh.analysis.contact", "bh.analysis.creases",
-    "bh.analysis.isometric", "bh.scan",
+    "bh.plotting", "bh.plotting.interactive", "bh.analysis.stiffness_probe", "bh.analysis.contact", "bh.analysis.creases",
+    "bh.analysis.isometric", "bh.applications.scan",
 )  # fmt: skip
 
 
@@ -147,7 +147,7 @@ def write_reference(folder: Path) -> None:
 
 def write_gallery(folder: Path) -> None:
     """Run every example and write a page of what came out, beside what went in."""
-    from bh import interactive
+    from bh.plotting import interactive
 
     folder.mkdir(parents=True)
     static = folder.parent / "viewer"
@@ -168,7 +168,7 @@ def write_gallery(folder: Path) -> None:
 def scene_page(file: Path, folder: Path) -> str:
     """The page of a scene: what it says, the folded sheet to turn, its pattern, its energies. Returns the title."""
     import bh
-    from bh import interactive
+    from bh.plotting import interactive
 
     text = file.read_text(encoding="utf-8")
     comment = re.match(r"(?:#.*\n)+", text)

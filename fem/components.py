@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Ramp
 from bh.errors import ModelError
-from bh.supports import Constraints
+from bh.model.actuations import Ramp
+from bh.model.supports import Constraints
 from fem.connectors import Connectors
 from fem.shell import ShellElements
 from meshes import SheetMesh

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Ramp
 from bh.errors import ModelError
-from bh.laws import HELD, SHEET, SPRING
-from bh.model import Model
-from bh.step_program import StepProgram
+from bh.loading.load_step import StepProgram
+from bh.model.actuations import Ramp
+from bh.model.laws import HELD, SHEET, SPRING
+from bh.model.model import Model
 from fem.shell import edge_tangents
 from fem.spaces import tables
 from meshes.curved import ElementMesh

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.model import Model, Sheet
-from bh.program import program
-from bh.refinement import Refinement
+from bh.formulations.state import State
+from bh.loading.load_step import StepProgram
+from bh.loading.program import program
+from bh.model.model import Model, Sheet
+from bh.model.refinement import Refinement
+from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment, point
 from bh.solvers.trace import Strategy, Walk, walk
-from bh.state import State
-from bh.step_program import StepProgram
-from bh.threads import one_blas_thread
 from fem.loads import EdgeMoments
 from fem.observables import ShellState, observe
 from fem.shell import ShellElements, shell_elements

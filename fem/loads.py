@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Displace, Fold, Force, Ramp
 from bh.errors import ModelError
-from bh.model import Model
-from bh.observables import Until
-from bh.program import program
-from bh.supports import Constraints, select
+from bh.formulations.observables import Until
+from bh.loading.program import program
+from bh.model.actuations import Actuation, Displace, Fold, Force, Ramp
+from bh.model.model import Model
+from bh.model.supports import Constraints, select
 from fem.components import edge_set
 from fem.shell import ShellElements
 from meshes.curved import ElementMesh

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model import Model, Sheet
-from bh.state import Energy, State
-from bh.step_program import crease_hinges
+from bh.formulations.state import Energy, State
+from bh.loading.load_step import crease_hinges
+from bh.model.model import Model, Sheet
 from fem.kernels import Frames
 from fem.shell import ShellElements
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model import Sheet
+from bh.model.model import Sheet
 from fem import kernels
 from fem.kernels import Frames, Loops
 from fem.spaces import MOMENTS, STRAINS, Tables, tables

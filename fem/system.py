@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Ramp
 from bh.errors import ModelError
-from bh.model import Model
+from bh.loading.load_step import StepProgram
+from bh.model.actuations import Ramp
+from bh.model.model import Model
+from bh.model.supports import TURNED, UNBALANCED
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.system import Evaluation, grows_ahead
-from bh.step_program import StepProgram
-from bh.supports import TURNED, UNBALANCED
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out

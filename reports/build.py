@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bh import interactive
+from bh.plotting import interactive
 from meshes.errors import FileFormatError
 from meshes.io.export import replacing
 from reports import words
@@ -28,7 +28,7 @@ from reports.records import (
     shortfall,
     validated,
 )
-from verification.chapters import CHAPTERS, OTHER, Chapter, chapter_of
+from verification.framework.chapters import CHAPTERS, OTHER, Chapter, chapter_of
 
 SOURCE = (
     "Equation numbers, “the source” and “App. B” refer to the dissertation “How Curved Creases Enhance the "

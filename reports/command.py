@@ -38,7 +38,7 @@ def report(
 
     page = results / "report.html" if out is None else out
     if not reuse:
-        from verification.run import run
+        from verification.framework.run import run
 
         at_once = jobs or min(os.cpu_count() or 1, MOST_JOBS)
         run(None, results, quick, lambda text: typer.echo(text, err=True), at_once)

@@ -247,7 +247,7 @@ def read(file: Path) -> Results:
 
 def known_cases() -> list[str]:
     """Names of all verification cases that there are."""
-    from verification.cases import CASES
+    from verification.framework.cases import CASES
 
     return list(CASES)
 

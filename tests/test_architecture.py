@@ -21,16 +21,24 @@ HEAVY = (
 )  # fmt: skip
 
 DESCRIPTION = (
-    "bh.errors", "bh.model", "bh.supports", "bh.actuation", "bh.pinch_zone", "bh.laws", "bh.ramps", "bh.plugins",
-    "bh.step_program", "bh.program", "bh.observables",
-    "bh.describe", "bh.scene", "bh.scene_schema", "bh.scene_patterns", "bh.scene_tables", "bh.state", "bh.formulations",
-    "bh.refinement", "bh.symmetry", "bh.advice",
+    "bh.errors", "bh.model", "bh.model.supports", "bh.model.actuations", "bh.model.pinch", "bh.model.laws", "bh.loading.builder", "bh.model.plugins",
+    "bh.loading.load_step", "bh.program", "bh.formulations.observables",
+    "bh.model.serialise", "bh.scene", "bh.scene.tables", "bh.scene.patterns", "bh.scene.reading", "bh.state", "bh.formulations",
+    "bh.model.refinement", "bh.symmetry", "bh.formulations.remarks",
 )  # fmt: skip
-PATH = ("bh.path", "bh.halves", "bh.tracing", "bh.provenance", "bh.storage", "bh.progress", "bh.threads")
+PATH = (
+    "bh.path",
+    "bh.formulations.symmetry_reduction",
+    "bh.solving.follow",
+    "bh.paths.provenance",
+    "bh.paths.storage",
+    "bh.runtime.progress",
+    "bh.runtime.threads",
+)
 PROTOCOL = ("bh.solvers.matrices", "bh.solvers.sparse", "bh.solvers.saddle", "bh.solvers.system")
 TOP = (
-    "bh.sweep", "bh.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.panels", "bh.charts", "bh.animation",
-    "bh.offscreen", "bh.warm_up",
+    "bh.sweep", "bh.commands.cli", "bh.run", "bh.plotting", "bh.interactive", "bh.plotting.panels", "bh.plotting.charts", "bh.plotting.animation",
+    "bh.plotting.offscreen", "bh.commands.warm_up",
     "bh.accuracy", "bh.check", "bh.design", "bh.example", "bh.export", "bh.schema",
 )  # fmt: skip
 
@@ -64,7 +72,7 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
             "bh.analysis",
             "bh.applications",
             *TOP,
-            "bh.kernel_cache",
+            "bh.runtime.kernel_cache",
         ),
     ),
     ("fem", ("meshes", "fem", *DESCRIPTION, "bh.solvers", *PATH)),
@@ -75,9 +83,9 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
 DRIVERS = (
     "bh.solvers",
     "bh.path",
-    "bh.storage",
+    "bh.paths.storage",
     "bh.scene",
-    "bh.cli",
+    "bh.commands.cli",
     "bh.run",
     "bh.formulations",
     "bh.model",
@@ -139,7 +147,7 @@ def test_house_is_there() -> None:
     """The walk finds the modules; an empty list would let every rule pass."""
     for part in ("meshes", "bh", "verification"):
         assert sum(within(name, part) for name in FILES) > 5
-    assert {"bh.mechanics.kinematics", "bh.solvers.newton", "bh.path", "meshes.mesh"} <= set(FILES)
+    assert {"bh.mechanics.shared.kinematics", "bh.solvers.newton", "bh.path", "meshes.mesh"} <= set(FILES)
 
 
 @pytest.mark.parametrize("name", sorted(FILES))
@@ -152,22 +160,30 @@ def test_imports(name: str) -> None:
     ("module", "source", "wrong"),
     [
         ("meshes.mesh", "import bh", "bh"),
-        ("meshes.io.fold", "def f():\n    from verification.checks import Check", "verification.checks"),
+        (
+            "meshes.io.fold",
+            "def f():\n    from verification.framework.checks import Check",
+            "verification.framework.checks",
+        ),
         ("bh.model", "from bh.path import trace", "bh.path"),
         ("bh.model", "from bh import trace", "bh"),
-        ("bh.state", "import bh.mechanics.kinematics as k", "bh.mechanics.kinematics"),
+        ("bh.state", "import bh.mechanics.shared.kinematics as k", "bh.mechanics.shared.kinematics"),
         ("bh.mechanics.shell", "from bh.solvers.newton import Newton", "bh.solvers.newton"),
         ("bh.mechanics.shell", "from bh.path import Path", "bh.path"),
-        ("bh.solvers.newton", "from bh.mechanics import kinematics", "bh.mechanics.kinematics"),
-        ("bh.solvers.newton", "from ..mechanics import kinematics", "bh.mechanics.kinematics"),
+        ("bh.solvers.newton", "from bh.mechanics import kinematics", "bh.mechanics.shared.kinematics"),
+        ("bh.solvers.newton", "from ..mechanics import kinematics", "bh.mechanics.shared.kinematics"),
         ("bh.solvers.newton", "from bh.model import Model", "bh.model"),
         ("bh.solvers.newton", "from bh.program import StepProgram", "bh.program"),
         ("bh.path", "from bh.mechanics.bars_and_hinges import X", "bh.mechanics.bars_and_hinges"),
-        ("bh.cli", "from fem import shell", "fem.shell"),
-        ("bh.analysis.observables", "import bh.cli", "bh.cli"),
-        ("fem.shell", "from bh.mechanics.kinematics import dihedral_angles", "bh.mechanics.kinematics"),
+        ("bh.commands.cli", "from fem import shell", "fem.shell"),
+        ("bh.analysis.observables", "import bh.commands.cli", "bh.commands.cli"),
+        (
+            "fem.shell",
+            "from bh.mechanics.shared.kinematics import dihedral_angles",
+            "bh.mechanics.shared.kinematics",
+        ),
         ("fem.shell", "import verification", "verification"),
-        ("verification.cone", "from reports import build", "reports.build"),
+        ("verification.studies.ch3.cone", "from reports import build", "reports.build"),
         ("reports.build", "from bh import trace", "bh"),
         ("reports.build", "from bh.path import Path", "bh.path"),
         ("reports.build", "from bh.solvers.newton import Newton", "bh.solvers.newton"),
@@ -277,9 +293,9 @@ def test_facade_loads_nothing() -> None:
         if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node))
     ]
     found = {m for m in imported(ast.Module(body, []), "bh", True, set(FILES)) if m.split(".")[0] in HOUSE}
-    assert found == {"bh.kernel_cache"}
+    assert found == {"bh.runtime.kernel_cache"}
     assert (
-        not {m.split(".")[0] for m in imports_of("bh.kernel_cache")}
+        not {m.split(".")[0] for m in imports_of("bh.runtime.kernel_cache")}
         - set(sys.stdlib_module_names)
         - {"__future__"}
     )

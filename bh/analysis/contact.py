@@ -19,8 +19,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.path import Path
-from bh.state import State
+from bh.formulations.state import State
+from bh.paths.path import Path
 from meshes import SheetMesh
 from meshes.errors import MeshError
 from meshes.topology import Ints, boundary_loops

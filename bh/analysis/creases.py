@@ -18,8 +18,8 @@ from bh.analysis import relations
 from bh.analysis.differences import Differentiation, FiniteDifferences, SmoothingSpline, one_sided
 from bh.analysis.generators import Generators, panel_generators
 from bh.errors import ModelError
-from bh.state import State
-from bh.step_program import crease_hinges
+from bh.formulations.state import State
+from bh.loading.load_step import crease_hinges
 from meshes import SheetMesh
 from meshes.curves import arc_lengths
 

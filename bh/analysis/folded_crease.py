@@ -13,7 +13,7 @@ from bh.analysis.differences import Differentiation, InterpolatingSpline
 from bh.analysis.isometric_mesh import Placed, ruled_mesh, strip_mesh
 from bh.analysis.ruled import ALONG, TRIMMED, Panel
 from bh.errors import ModelError
-from bh.model import Sheet
+from bh.model.model import Sheet
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]

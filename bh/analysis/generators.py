@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from bh.analysis.contact import Panels
 from bh.errors import ModelError
-from bh.state import State
-from bh.step_program import crease_hinges
+from bh.formulations.state import State
+from bh.loading.load_step import crease_hinges
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]

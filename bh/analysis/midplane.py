@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
-from bh.state import State
+from bh.formulations.state import State
 from meshes import SheetMesh
 from meshes.curves import arc_lengths, interpolated
 

@@ -24,9 +24,9 @@ from bh.analysis.sensitivities import (
     differences,
 )
 from bh.errors import ModelError
-from bh.path import Path
-from bh.program import program
-from bh.threads import one_blas_thread
+from bh.loading.program import program
+from bh.paths.path import Path
+from bh.runtime.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

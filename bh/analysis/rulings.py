@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array
 
 from bh.errors import ModelError
-from bh.state import State
+from bh.formulations.state import State
 
 Array = NDArray[np.float64]
 SMOOTH = 3  # rounds of averaging over neighbours

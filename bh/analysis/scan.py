@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.analysis.clouds import IDENTITY, Motion, ScanError, checked
-from bh.state import State
+from bh.formulations.state import State
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ supports), the design p behind them and an observable J, the adjoint a of the fa
 one solve for each observable and any number of design parameters. Here q are the places of the free nodes, with the
 edge rotations or moments that go with them: they stay while the stress-free sheet changes under them.
 
-K, a and both partial derivatives are exact (`bh.mechanics.bar_hinge_design`, `consistent_design`). dd/dp comes from the
+K, a and both partial derivatives are exact (`bh.mechanics.bars_and_hinges.derivatives`, `consistent_design`). dd/dp comes from the
 function that makes the model: central differences of sixth order of the element data. No solution and no residual is
 differenced, only smooth closed formulas such as a length or E t^3 L^2 / (6 A). Their error is measured as the distance
 to differences of fourth order and reported (`Sensitivity.error`). Of a stiffness the derivative of K along the sheet's
@@ -27,18 +27,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
-from bh.formulations import formulation
-from bh.model import Model
-from bh.observables import until_of
-from bh.path import Path
-from bh.program import program
+from bh.formulations.observables import until_of
+from bh.formulations.registry import formulation
+from bh.formulations.state import State
+from bh.loading.load_step import crease_hinges
+from bh.loading.program import program
+from bh.model.model import Model
+from bh.model.supports import directions, select
+from bh.paths.path import Path
+from bh.runtime.threads import one_blas_thread
 from bh.solvers.factor import Factor, IndefiniteError
 from bh.solvers.matrices import FreeBodyMatrix
 from bh.solvers.saddle import MultiplierMatrix
-from bh.state import State
-from bh.step_program import crease_hinges
-from bh.supports import directions, select
-from bh.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Data = dict[str, Array]

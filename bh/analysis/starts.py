@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
-from bh.formulations import formulation
-from bh.model import Model
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.formulations.state import State
+from bh.loading.program import program
+from bh.model.model import Model
+from bh.runtime.threads import one_blas_thread
 from bh.solvers.newton import Newton
-from bh.state import State
-from bh.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 

@@ -28,12 +28,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from bh.analysis.modes import Mode, Response, lowest
 from bh.errors import ModelError
-from bh.path import Path
+from bh.model.supports import directions, select
+from bh.paths.path import Path
+from bh.runtime.threads import one_blas_thread
 from bh.solvers.factor import Factor, IndefiniteError, Matrix
 from bh.solvers.matrices import FreeBodyMatrix
 from bh.solvers.saddle import MultiplierMatrix
-from bh.supports import directions, select
-from bh.threads import one_blas_thread
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]

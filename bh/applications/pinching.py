@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 import meshes
 from bh.analysis.midplane import MidPlane, midplane
 from bh.errors import InputError, ModelError
-from bh.model import Model, Sheet
-from bh.path import Path
-from bh.state import State
-from bh.tracing import trace
+from bh.formulations.state import State
+from bh.model.model import Model, Sheet
+from bh.paths.path import Path
+from bh.solving.follow import trace
 from meshes import CreasePattern
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model import Sheet
+from bh.model.model import Sheet
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model import Sheet
+from bh.model.model import Sheet
 
 Array = NDArray[np.float64]
 

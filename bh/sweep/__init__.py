@@ -21,7 +21,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bh.provenance import versions
+from bh.paths.provenance import versions
 from bh.sweep import runner
 from bh.sweep.dataset import ABOUT_RUN, Label, dataset, load, save
 from bh.sweep.journal import Journal

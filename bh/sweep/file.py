@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from bh.errors import InputError
-from bh.scene_tables import Table, as_table, check_keys, one_line, read_table, read_toml
+from bh.scene.reading import Table, as_table, check_keys, one_line, read_table, read_toml
 from bh.sweep import SceneTask, scene
 from bh.sweep.dataset import Label
 from bh.sweep.points import Points, SweepError, grid, read_csv

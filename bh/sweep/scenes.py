@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from bh.errors import InputError
-from bh.path import Path as Trace
-from bh.scene import Scene, scene_from_tables
-from bh.scene_tables import read_toml
-from bh.supports import select
+from bh.model.supports import select
+from bh.paths.path import Path as Trace
+from bh.scene.load import Scene, scene_from_tables
+from bh.scene.reading import read_toml
+from bh.solving.follow import trace
 from bh.sweep.dataset import Label
 from bh.sweep.points import SweepError, Value
 from bh.sweep.task import Measured
-from bh.tracing import trace
 
 TOKEN = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 ENERGIES = ("stretching", "bending", "folding", "total")

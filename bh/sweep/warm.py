@@ -13,12 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from bh.describe import fingerprint
-from bh.model import Model
-from bh.path import Path, Record, StepOutcome
+from bh.model.model import Model
+from bh.model.serialise import fingerprint
+from bh.paths.path import Path, Record, StepOutcome
+from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
-from bh.threads import one_blas_thread
-from bh.tracing import trace
+from bh.solving.follow import trace
 
 SAME = 1e-6  # of the sheet's size: states this near each other are one
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import bh
-from bh.applications.corrugation_design import Candidate, Design, Front, Task, pareto
+from bh.applications.corrugation.design import Candidate, Design, Front, Task, pareto
 
 SOURCE = {  # the four curved patterns of the source, for comparison
     "parabolic-point": Design(2.0, 1.0, 1.0, 5),

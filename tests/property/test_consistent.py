@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh import Displace, Fold, Force, Model, Moment, Sheet, trace
-from bh.formulations import formulation
-from bh.mechanics import consistent_elements, pattern
-from bh.mechanics.consistent_patches import patches
-from bh.mechanics.consistent_system import ConsistentSystem
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.loading.program import program
+from bh.mechanics.consistent import elements as consistent_elements
+from bh.mechanics.consistent.patches import patches
+from bh.mechanics.consistent.system import ConsistentSystem
+from bh.mechanics.shared import sparsity as pattern
 from bh.solvers.linear import linear_response
-from verification.derivatives import differences, prediction_ratio, random_rotation
+from verification.studies.solver.derivatives import differences, prediction_ratio, random_rotation
 
 Array = NDArray[np.float64]
 SHEET = Sheet(E=4000.0, t=0.2, nu=0.3)

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh import Fold, Force, Model, Sheet, trace
-from bh.formulations import formulation
-from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
-from bh.mechanics.hinge_lock import ZONE, lock_terms, until_closed
-from bh.mechanics.kinematics import dihedral_angles
-from bh.mechanics.stiffness import bending_hinge_stiffness
-from bh.model import ElementStiffness
-from bh.program import program
-from bh.scene import parse_scene
-from bh.step_program import crease_hinges, hinge_name
-from verification.derivatives import differences
+from bh.formulations.registry import formulation
+from bh.loading.load_step import crease_hinges, hinge_name
+from bh.loading.program import program
+from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness
+from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.shared.hinge_lock import ZONE, lock_terms, until_closed
+from bh.mechanics.shared.kinematics import dihedral_angles
+from bh.model.model import ElementStiffness
+from bh.scene.load import parse_scene
+from verification.studies.solver.derivatives import differences
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi

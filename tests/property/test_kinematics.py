@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import meshes
-from bh.mechanics import kinematics
+from bh.mechanics.shared import kinematics
 
 Array = NDArray[np.float64]
 CHECK = settings(deadline=None, derandomize=True, max_examples=150)

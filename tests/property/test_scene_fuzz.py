@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bh.errors import InputError
-from bh.scene import Scene, parse_scene
+from bh.scene.load import Scene, parse_scene
 
 SCENES = [
     {

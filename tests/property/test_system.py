@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh import Displace, Fold, Force, Model, Moment, Sheet, trace
-from bh.formulations import formulation
-from bh.mechanics import pattern as patterns
-from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
-from bh.model import ElementStiffness
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.loading.program import program
+from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.shared import sparsity as patterns
+from bh.model.model import ElementStiffness
 from bh.solvers.linear import linear_response
 from bh.solvers.matrices import FreeBodyMatrix
 from bh.solvers.saddle import MultiplierMatrix
-from verification.derivatives import differences, prediction_ratio
+from verification.studies.solver.derivatives import differences, prediction_ratio
 
 Array = NDArray[np.float64]
 SHEET = Sheet(E=4000.0, t=0.2)

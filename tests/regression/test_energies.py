@@ -14,7 +14,7 @@ import pytest
 import bh
 import meshes
 from bh import LoadControl, Model, Sheet, trace
-from verification import appendix_b
+from verification.studies.app_b import appendix_b
 
 SAME = 1e-8  # relative; solutions by other increments differ by 1e-10 at most
 SHEET = Sheet(E=4000.0, t=0.127)

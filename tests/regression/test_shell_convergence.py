@@ -10,13 +10,13 @@ import pytest
 
 import bh
 import meshes
-from bh.model import Model
+from bh.model.model import Model
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import Increment
 from fem.kirchhoff_love import follow
 from fem.observables import ShellState
-from verification import shell_folding as folding
-from verification.appendix_b_shell import TABLE_B1
+from verification.studies.app_b import shell_folding as folding
+from verification.studies.app_b.appendix_b_shell import TABLE_B1
 from verification.theory import shell_benchmarks as sze
 
 

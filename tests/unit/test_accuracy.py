@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import bh
-import bh.accuracy
+import bh.solving.accuracy
 import meshes
-from bh.accuracy import candidates, estimate
-from bh.cli import main
+from bh.commands.cli import main
 from bh.errors import ModelError, SceneError
-from bh.refinement import Refinement, mesh_at, pattern_of
-from bh.scene import parse_scene
-from verification.honesty import TRAINING, examine
+from bh.model.refinement import Refinement, mesh_at, pattern_of
+from bh.scene.load import parse_scene
+from bh.solving.accuracy import candidates, estimate
+from verification.studies.solver.honesty import TRAINING, examine
 
 SHEET = bh.Sheet(E=4000.0, nu=0.38, t=0.127)
 SECTOR = meshes.annulus_sector(100.0, 10.0, math.pi / 4)
@@ -93,7 +93,7 @@ def test_estimate_of_a_power_law(order: float) -> None:
     told, found = estimate(values)
     assert found == pytest.approx(order)
     error = abs(float(values[-1][0]) - 2.0) / float(values[-1][0])
-    assert told == pytest.approx(bh.accuracy.SAFETY * error)
+    assert told == pytest.approx(bh.solving.accuracy.SAFETY * error)
 
 
 def test_values_that_turn_back_are_not_trusted() -> None:
@@ -157,13 +157,13 @@ def test_goals(goal: bh.Goal) -> None:
     told = path.accuracy
     assert told is not None
     assert told.met
-    value = bh.accuracy.reading(path, goal)
+    value = bh.solving.accuracy.reading(path, goal)
     np.testing.assert_array_equal(value, told.trials[-1].value)
     assert value.shape == ((3,) if goal.of == "tip" else (1,))
 
 
 def test_what_is_not_met_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bh.accuracy, "LARGEST", 100)
+    monkeypatch.setattr(bh.solving.accuracy, "LARGEST", 100)
     path = bh.trace(model().fold("crease", by=1.0), accuracy=1e-4)
     assert path.accuracy is not None
     assert not path.accuracy.met
@@ -263,7 +263,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     assert found["accuracy"]["trials"][-1]["unknowns"] == found["unknowns"]
     assert found["formulation"] == found["accuracy"]["formulation"]
     assert bh.Path.load("out/path.bh")[-1].energy.total == pytest.approx(found["energy"]["total"])
-    monkeypatch.setattr(bh.accuracy, "LARGEST", 10)
+    monkeypatch.setattr(bh.solving.accuracy, "LARGEST", 10)
     Path("scene.toml").write_text(SCENE.format(accuracy=0.0001))
     assert main(["run", "scene.toml", "-o", "other", "-q"]) == 1
     assert "not met" in capsys.readouterr().err

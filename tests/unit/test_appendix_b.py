@@ -14,13 +14,13 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from verification import appendix_b_cross as cross
-from verification import appendix_b_fields as fields
-from verification import appendix_b_shell as table
-from verification import cases, command
-from verification import shell_folding as folding
-from verification.alignment import aligned, hausdorff
-from verification.checks import CaseResult, Check, Context
+from verification.framework import cases, command
+from verification.framework.alignment import aligned, hausdorff
+from verification.framework.checks import CaseResult, Check, Context
+from verification.studies.app_b import appendix_b_cross as cross
+from verification.studies.app_b import appendix_b_fields as fields
+from verification.studies.app_b import appendix_b_shell as table
+from verification.studies.app_b import shell_folding as folding
 
 U = np.linspace(0.0, 3.0, 40)
 HELIX = np.stack([np.cos(U), np.sin(U), U], axis=1)
@@ -199,7 +199,7 @@ def test_the_command_runs_all_parts(monkeypatch: pytest.MonkeyPatch, tmp_path: P
         asked.append(names)
         return {"checks": [], "versions": {}}
 
-    monkeypatch.setattr("verification.run.run", run)
+    monkeypatch.setattr("verification.framework.run.run", run)
     app = typer.Typer()
     app.command()(command.verify)
     done = CliRunner().invoke(app, ["appendix_b", "--quick", "--results", str(tmp_path)])

@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
-from bh.cli import main
+from bh.commands.cli import main
 from bh.errors import InputError
-from bh.scene import load_scene, parse_scene
+from bh.scene.load import load_scene, parse_scene
 
 BASE = {
     "pattern": '[pattern]\nkind = "annulus_sector"\nradius = 100.0\nwidth = 10.0\nangle = 0.5\n',
@@ -357,7 +357,7 @@ def test_traceback_only_with_debug(tmp_path, capsys):
 
 def test_whole_program(tmp_path):
     (tmp_path / "bad.toml").write_text(text_of(sheet="[sheet]\nE = 1\nt = -1\n"))
-    program = [sys.executable, "-m", "bh.cli", "run", "bad.toml"]
+    program = [sys.executable, "-m", "bh.commands.cli", "run", "bad.toml"]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert done.stdout == ""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from verification import cone, fig3_6, fig3_8, fig3_10
+from verification.studies.ch3 import cone, fig3_6, fig3_8, fig3_10
 
 
 def test_lifted_annulus_is_softest_on_the_coarse_mesh_of_bars() -> None:

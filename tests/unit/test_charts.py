@@ -12,9 +12,9 @@ import pytest
 
 import bh
 import meshes
-from bh import animation as moving
-from bh import offscreen, plotting
-from bh.actuation import Displace
+from bh import plotting
+from bh.model.actuations import Displace
+from bh.plotting import moving, offscreen
 from meshes.errors import InputError
 from tests.unit.test_plotting import needs_opengl
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import bh.progress
-from bh.cli import ABOUT, app, main
-from bh.path import Path as Trace
+import bh.runtime.progress
+from bh.commands.cli import ABOUT, app, main
+from bh.paths.path import Path as Trace
 
 BIN = Path(sys.executable).parent / "bh"
 SECTOR = """
@@ -176,7 +176,7 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 import bh
-from bh.run import solve
+from bh.commands.run import solve
 
 class Kill:
     states = 0
@@ -266,7 +266,7 @@ def interrupt_after(states, monkeypatch):
         def close(self, outcome):
             pass
 
-    monkeypatch.setattr(bh.progress, "Bar", Interrupting)
+    monkeypatch.setattr(bh.runtime.progress, "Bar", Interrupting)
 
 
 def test_interrupt_says_how_to_go_on(here, monkeypatch, capsys):
@@ -279,7 +279,8 @@ def test_interrupt_says_how_to_go_on(here, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [("bh.scene", "load_scene"), ("bh.run", "extras"), ("bh.run", "result")]
+    ("module", "name"),
+    [("bh.scene.load", "load_scene"), ("bh.commands.run", "extras"), ("bh.commands.run", "result")],
 )
 def test_interrupt_anywhere_is_one_line(here, monkeypatch, capsys, module, name):
     def stop(*_, **__):
@@ -297,7 +298,7 @@ def test_interrupt_of_another_packages_command(here, monkeypatch, capsys):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("verification.run.run", stop)
+    monkeypatch.setattr("verification.framework.run.run", stop)
     assert main(["verify", "cone"]) == 130
     assert capsys.readouterr() == ("", "bh: interrupted\n")
 
@@ -350,8 +351,8 @@ def test_extras_of_an_older_run_do_not_stay(here):
 
 
 def test_plain_progress_where_there_is_no_terminal(here, monkeypatch, capsys):
-    monkeypatch.setattr(bh.progress.Bar, "first", 0.0)
-    monkeypatch.setattr(bh.progress.Bar, "every", 0.0)
+    monkeypatch.setattr(bh.runtime.progress.Bar, "first", 0.0)
+    monkeypatch.setattr(bh.runtime.progress.Bar, "every", 0.0)
     assert main(["run", "two.toml", "-o", "out"]) == 0
     out, err = capsys.readouterr()
     assert "lambda" not in out
@@ -401,7 +402,9 @@ def drawn(monkeypatch):
         bh.plotting, "picture", lambda state, file, **_: calls.append(("picture", state.lam, file))
     )
     monkeypatch.setattr(
-        bh.plotting, "export_series", lambda path, folder, *name: calls.append(("series", str(folder)))
+        bh.plotting,
+        "export_series",
+        lambda path, folder, *name: calls.append(("series", str(folder))),
     )
     monkeypatch.setattr(bh.plotting, "show", lambda state, **_: calls.append(("show", state.lam)))
     return calls
@@ -473,7 +476,7 @@ def test_short_help_is_that_of_the_commands():
 
 def test_starts_fast_and_light():
     heavy = "numpy", "numba", "pydantic", "pyvista", "scipy", "matplotlib", "shapely"
-    check = f"import sys, bh.cli; sys.exit(' '.join(m for m in {heavy} if m in sys.modules))"
+    check = f"import sys, bh.commands.cli; sys.exit(' '.join(m for m in {heavy} if m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", check], capture_output=True, text=True).stderr.strip() == ""
     times = []
     for _ in range(3):
@@ -485,7 +488,7 @@ def test_starts_fast_and_light():
 
 
 def test_commands_of_other_packages(monkeypatch, capsys):
-    from bh.cli import _proxy
+    from bh.commands.cli import _proxy
 
     def check(cases: list[str], fast: bool = False, level: int = 3) -> None:
         """Check the cases."""
@@ -521,12 +524,12 @@ def test_commands_of_other_packages(monkeypatch, capsys):
 
 
 def test_a_fault_of_the_program_is_told_as_such(here, monkeypatch, capsys):
-    import bh.run
+    import bh.commands.run
 
     def fail(*_, **__):
         raise RuntimeError("a\nfault")
 
-    monkeypatch.setattr(bh.run, "solve", fail)
+    monkeypatch.setattr(bh.commands.run, "solve", fail)
     assert main(["run", "good.toml"]) == 3
     err = capsys.readouterr().err
     assert err.startswith("bh: RuntimeError: a fault (a fault of the program")

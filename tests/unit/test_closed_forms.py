@@ -11,9 +11,14 @@ import pytest
 import bh
 import meshes
 from bh import Displace, Fold, Force, Model, Sheet, trace
-from bh.formulations import formulation
-from bh.mechanics.stiffness import bar_stiffness, bending_hinge_stiffness, diagonal_factor, shear_exact_factor
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.loading.program import program
+from bh.mechanics.bars_and_hinges.stiffness import (
+    bar_stiffness,
+    bending_hinge_stiffness,
+    diagonal_factor,
+    shear_exact_factor,
+)
 from bh.solvers.linear import linear_response
 from meshes.structured import Kind
 from verification.theory import cone as cone_theory

@@ -12,15 +12,15 @@ import pytest
 import meshes
 from bh import Fold, Model, Sheet, trace
 from bh.errors import ModelError
-from bh.formulations import formulation, takes_nu
-from bh.mechanics.consistent_patches import bending_matrices, curvature_maps, triangle_frames
+from bh.formulations.registry import formulation, takes_nu
+from bh.loading.program import program
 from bh.materials import LinearElastic
-from bh.mechanics.consistent_membrane_kernels import triangle_strains
-from bh.model import ElementStiffness
-from bh.program import program
+from bh.mechanics.consistent.membrane_kernels import triangle_strains
+from bh.mechanics.consistent.patches import bending_matrices, curvature_maps, triangle_frames
+from bh.model.model import ElementStiffness
 from meshes.structured import Kind
-from verification import plates
-from verification.patch_tests import (
+from verification.studies.solver import plates
+from verification.studies.solver.patch_tests import (
     CURVATURES,
     STRETCHES,
     bending_error,
@@ -230,7 +230,7 @@ def test_poissons_ratio_counts() -> None:
 @pytest.mark.parametrize("actuation", ["a", "d"])
 def test_appendix_b_within_design(actuation: str) -> None:
     """32 x 4 is within 3 % of the limit that finer meshes show (0.0537 and 0.0505 N mm), on every pattern."""
-    from verification.convergence import folded
+    from verification.studies.solver.convergence import folded
 
     limit = {"a": 0.05371, "d": 0.05046}[actuation]
     for kind in KINDS:
@@ -241,7 +241,7 @@ def test_appendix_b_within_design(actuation: str) -> None:
 
 def test_ring_does_not_lock() -> None:
     """One row of ever longer cells round a full annulus: the energy of the saddle stays."""
-    from verification.convergence import ring
+    from verification.studies.solver.convergence import ring
 
     one, two = (ring(along, 1, "consistent") for along in (90, 150))
     assert two[-1].energy.total == pytest.approx(one[-1].energy.total, rel=0.005)
@@ -329,8 +329,8 @@ fold = { crease = "crease", to = 3.0 }
 def test_scene_with_a_clamp(tmp_path: Any) -> None:
     """From a scene to a path file and back: the clamp is kept, and states are the same to the bit."""
     from bh import Path, Support
-    from bh.describe import fingerprint
-    from bh.scene import parse_scene
+    from bh.model.serialise import fingerprint
+    from bh.scene.load import parse_scene
 
     scene = parse_scene(SCENE)
     assert scene.model.supports[0].clamp is True

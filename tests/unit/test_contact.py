@@ -19,8 +19,8 @@ import meshes
 from bh import Model, Sheet, State, trace
 from bh.analysis.contact import Panels, _Detector, candidates, first_contact, seen_once, self_contact
 from bh.analysis.triangles import intersecting
-from bh.cli import main
-from bh.scene import load_scene
+from bh.commands.cli import main
+from bh.scene.load import load_scene
 from meshes.topology import boundary_loops
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
 from bh.solvers.trace import Strategy, Walk, walk
 from tests.unit.test_newton import Arch, Column, Stiffening, Toy
-from verification.toys import VonMisesTruss
+from verification.studies.solver.benchmark_systems import VonMisesTruss
 
 Array = NDArray[np.float64]
 ARCH_LIMIT = 2.0 / (3.0 * math.sqrt(3.0))

@@ -11,7 +11,7 @@ import pytest
 from bh import ModelError
 from bh.analysis.stiffness_probe import Probe
 from bh.applications.corrugation import POLYESTER, Folded, fold, tangent_bending, top_down
-from bh.applications.corrugation_design import (
+from bh.applications.corrugation.design import (
     BOUNDS,
     Design,
     Front,

@@ -10,10 +10,10 @@ import pytest
 
 import bh
 from bh import ModelError
-from bh.applications.corrugation import POLYESTER, Folded, fold
-from bh.applications.corrugation_bending import Rig, _turn, second_stage, settle, three_point
-from bh.applications.corrugation_sections import bottom_up, rectangles, section_moments, top_down
-from bh.observables import depth_of
+from bh.applications.corrugation.bending import Rig, _turn, second_stage, settle, three_point
+from bh.applications.corrugation.folding import POLYESTER, Folded, fold
+from bh.applications.corrugation.sections import bottom_up, rectangles, section_moments, top_down
+from bh.formulations.observables import depth_of
 
 
 @cache

@@ -8,12 +8,12 @@ import pytest
 import meshes
 from bh import Model, Sheet, trace
 from bh.errors import SceneError
-from bh.scene import parse_scene
+from bh.scene.load import parse_scene
 from meshes import PatternError
 from meshes.corrugations import KINDS
 from meshes.curves import sample
 from meshes.tapered import smallest_angles
-from verification.tables4 import PRINTED, formula
+from verification.studies.ch4.tables4 import PRINTED, formula
 
 CURVED = KINDS[1:]
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import bh
 import meshes
-from bh.mechanics.bar_hinge_system import BarsAndHingesSystem
-from bh.mechanics.consistent_system import ConsistentSystem
-from bh.program import program
+from bh.loading.program import program
+from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.consistent.system import ConsistentSystem
 from bh.solvers.matrices import BandMatrix
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -78,14 +78,14 @@ def test_consistent_has_springs_for_springs_only() -> None:
 def test_no_rotations_without_the_consistent_formulation() -> None:
     """Bars and hinges load neither the other formulations nor what is asked for apart."""
     loaded = loaded_after(PULLED.format(formulation="bars-and-hinges"))
-    assert "bh.mechanics.bar_hinge_system" in loaded
+    assert "bh.mechanics.bars_and_hinges.system" in loaded
     assert not loaded & {
-        "bh.accuracy",
-        "bh.halves",
-        "bh.symmetry",
-        "bh.mechanics.mirrored",
-        "bh.refinement",
-        "bh.scene",
+        "bh.solving.accuracy",
+        "bh.formulations.symmetry_reduction",
+        "bh.loading.symmetry",
+        "bh.mechanics.shared.mirrored",
+        "bh.model.refinement",
+        "bh.scene.load",
     }
     others = ("bh.mechanics.consistent", "fem", "skfem", "bh.analysis")
     assert not [name for name in loaded if name.startswith(others)]
@@ -93,9 +93,14 @@ def test_no_rotations_without_the_consistent_formulation() -> None:
 
 def test_the_consistent_formulation_loads_no_shell() -> None:
     loaded = loaded_after(PULLED.format(formulation="consistent"))
-    assert "bh.mechanics.consistent_system" in loaded
+    assert "bh.mechanics.consistent.system" in loaded
     assert not [name for name in loaded if name.split(".")[0] in ("fem", "skfem", "gmsh", "pydantic")]
-    assert not loaded & {"bh.accuracy", "bh.halves", "bh.symmetry", "bh.mechanics.consistent_half"}
+    assert not loaded & {
+        "bh.solving.accuracy",
+        "bh.formulations.symmetry_reduction",
+        "bh.loading.symmetry",
+        "bh.mechanics.consistent.half",
+    }
 
 
 def test_what_is_asked_for_is_loaded() -> None:
@@ -105,4 +110,8 @@ def test_what_is_asked_for_is_loaded() -> None:
         "mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=4)\n"
         "bh.trace(bh.Model(mesh, bh.Sheet(E=4000.0, t=0.1)).fold('crease', to=3.0), symmetry='y')"
     )
-    assert {"bh.halves", "bh.symmetry", "bh.mechanics.mirrored"} <= loaded_after(code)
+    assert {
+        "bh.formulations.symmetry_reduction",
+        "bh.loading.symmetry",
+        "bh.mechanics.shared.mirrored",
+    } <= loaded_after(code)

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import bh
+import meshes
 from bh.analysis.contact import first_contact
-from bh.mechanics.kinematics import hinge_geometry
+from bh.mechanics.shared.kinematics import hinge_geometry
 from meshes import structured, unstructured
 from meshes.io import read_drawn, read_fold, read_pattern
 from meshes.topology import dihedral_angles
@@ -105,7 +106,7 @@ def test_springs_of_a_folded_sheet_begin_at_its_angles():
     half = 20.0 * math.cos(0.4)
     points = np.array([(x, y, height if x == 0.0 else 0.0) for x in (-half, 0.0, half) for y in (0.0, 30.0)])
     triangles = np.array([(0, 2, 3), (0, 3, 1), (2, 4, 5), (2, 5, 3)])
-    mesh = bh.model.SheetMesh(
+    mesh = meshes.SheetMesh(
         points, triangles, {"crease:ridge": np.array([(2, 3)])}, folds={"ridge": "mountain"}
     )
     angles = [hinge_geometry(np.array(mesh.points), hinge, np.empty(12))[0] for hinge in mesh.topology.hinges]

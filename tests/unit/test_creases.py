@@ -14,7 +14,7 @@ import bh
 import meshes
 from bh.analysis import relations
 from bh.analysis.creases import FiniteDifferences, SmoothingSpline, along, curve_of, panel_generators
-from bh.state import State
+from bh.formulations.state import State
 from meshes.errors import InputError
 
 Array = NDArray[np.float64]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 pytest.importorskip("xarray")
-import bh.design
-from bh.cli import main
-from bh.path import Path as Trace
+import bh.commands.design
+from bh.commands.cli import main
+from bh.paths.path import Path as Trace
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "design" / "reach.toml"
 
@@ -43,7 +43,7 @@ def test_a_curve_from_points(tmp_path: Path) -> None:
     rows = [f"{100.0 * math.sin(a)},{100.0 * (1.0 - math.cos(a))}" for a in turn]
     (tmp_path / "quarter.csv").write_text("x,y\n" + "\n".join(rows))
     (tmp_path / "fit.toml").write_text('[target]\ncurve = "quarter.csv"\n[search]\nsegments = 1\n')
-    answer = bh.design.solve(tmp_path / "fit.toml")
+    answer = bh.commands.design.solve(tmp_path / "fit.toml")
     assert answer.design.k0[0] == pytest.approx(math.sin(math.pi / 4) / 100.0, rel=1e-3)
     assert answer.measure["mean distance of the simulated strip"][0] < 1.0
 
@@ -74,5 +74,5 @@ def test_bad_targets(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: s
 
 def test_curves_begin_at_the_origin(tmp_path: Path) -> None:
     (tmp_path / "off.csv").write_text("10,10\n20,20\n")
-    with pytest.raises(bh.design.DesignError, match="begin at the origin"):
-        bh.design.read_curve(tmp_path / "off.csv")
+    with pytest.raises(bh.commands.design.DesignError, match="begin at the origin"):
+        bh.commands.design.read_curve(tmp_path / "off.csv")

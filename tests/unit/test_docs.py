@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from bh import scene_patterns, scene_tables
-from bh import scene_schema as schema
-from bh.scene import SECTIONS
+from bh.scene import patterns as scene_patterns
+from bh.scene import reading as scene_tables
+from bh.scene import tables as schema
+from bh.scene.load import SECTIONS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
 TABLES: dict[str, type[scene_tables.Table]] = {

@@ -63,7 +63,7 @@ def test_reference_has_every_public_name(tmp_path: Path) -> None:
         "bh.Path",
         "meshes.structured",
         "bh.plotting.response",
-        "bh.interactive.view",
+        "bh.plotting.interactive.view",
     ):
         assert f":: {name}\n" in everything
     for name in bh.__all__:

@@ -14,13 +14,13 @@ import pytest
 
 import bh
 import meshes
-from bh.advice import remarks
-from bh.check import report
-from bh.cli import main
+from bh.commands.cli import main
 from bh.errors import InputError
-from bh.example import example
-from bh.scene import SECTIONS, load_scene, parse_scene, read_toml
-from bh.schema import schema
+from bh.formulations.remarks import remarks
+from bh.scene.example import example
+from bh.scene.json_schema import schema
+from bh.scene.load import SECTIONS, load_scene, parse_scene, read_toml
+from bh.scene.report import report
 from meshes.io.strokes import Rules, Stroke, parse_colour
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,9 +12,9 @@ import trimesh
 
 import bh
 import meshes
-from bh.cli import main
+from bh.commands.cli import main
 from bh.errors import InputError
-from bh.export import FOLDED, write_flat, write_state
+from bh.paths.export import FOLDED, write_flat, write_state
 from meshes.io import read_fold, read_pattern, write_gltf
 
 SCENE = """

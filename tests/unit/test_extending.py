@@ -16,8 +16,8 @@ import pytest
 import bh
 import meshes
 from bh.errors import InputError
-from verification import cases
-from verification.run import run
+from verification.framework import cases
+from verification.framework.run import run
 
 PAGE = (FilePath(__file__).resolve().parents[2] / "docs" / "extending.md").read_text(encoding="utf-8")
 SHEET = bh.Sheet(E=4000.0, t=0.127)
@@ -119,7 +119,7 @@ def test_formulation() -> None:
 
 
 def test_study(mine: ModuleType, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "verification.mine", mine)
+    monkeypatch.setitem(sys.modules, "verification.studies.ch3.mine", mine)
     monkeypatch.setitem(cases.BY_NAME, "mine", cases.Study("mine", "3"))
     assert run(["mine"], tmp_path)["cases"][0]["verdict"] == "holds"
 

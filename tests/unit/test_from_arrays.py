@@ -12,8 +12,8 @@ import pytest
 
 import bh
 import meshes
-from bh.formulations import formulation
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.loading.program import program
 
 PEERS = FilePath(__file__).parents[3] / "shared" / "peer_problems"
 # total, bending and folding energy (N mm) on which six independent codes agree; bars with Green's strain

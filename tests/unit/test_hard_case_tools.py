@@ -10,19 +10,24 @@ import pytest
 
 import meshes
 from bh import Model, trace
-from bh.mechanics.kinematics import dihedral_angles
-from verification.dense_origami import DenseOrigami, Law, hinge_angles, hinge_gradients
-from verification.hard_cases.arches import arch_model, truss_model
-from verification.hard_cases.assemblages import Assemblage, eggbox_bending, extremes, miura_bistable
-from verification.hard_cases.parameters import condition_number, supported
-from verification.hard_cases.pinching import PINCHED, crease_curvature, pinched_crease
-from verification.hard_cases.random_meshes import random_mesh, worst_aspect
-from verification.hard_cases.roll_up import CLOSING, LENGTH, ends, roll_model
-from verification.hard_cases.same_answer import renumbered
-from verification.hard_cases.two_creases import folded
+from bh.mechanics.shared.kinematics import dihedral_angles
+from verification.studies.solver.benchmark_systems import VonMisesTruss
+from verification.studies.solver.dense_origami import DenseOrigami, Law, hinge_angles, hinge_gradients
+from verification.studies.solver.hard_cases.arches import arch_model, truss_model
+from verification.studies.solver.hard_cases.assemblages import (
+    Assemblage,
+    eggbox_bending,
+    extremes,
+    miura_bistable,
+)
+from verification.studies.solver.hard_cases.parameters import condition_number, supported
+from verification.studies.solver.hard_cases.pinching import PINCHED, crease_curvature, pinched_crease
+from verification.studies.solver.hard_cases.random_meshes import random_mesh, worst_aspect
+from verification.studies.solver.hard_cases.roll_up import CLOSING, LENGTH, ends, roll_model
+from verification.studies.solver.hard_cases.same_answer import renumbered
+from verification.studies.solver.hard_cases.two_creases import folded
 from verification.theory import rolled
 from verification.theory.arch import SineArch
-from verification.toys import VonMisesTruss
 
 ASSEMBLAGES = pytest.mark.parametrize("make", [miura_bistable, eggbox_bending])
 

@@ -7,10 +7,10 @@ import pytest
 
 from bh import ArcLength
 from bh.solvers.increments import point
-from verification.campaign import TEST_SCENES, play, scenes
-from verification.checks import CaseResult
-from verification.hard_cases import STUDIES
-from verification.toys import VonMisesTruss
+from verification.framework.checks import CaseResult
+from verification.studies.solver.benchmark_systems import VonMisesTruss
+from verification.studies.solver.campaign import TEST_SCENES, play, scenes
+from verification.studies.solver.hard_cases import STUDIES
 
 SLOW = {"assemblages", "random meshes"}  # their parts are tried by test_hard_case_tools.py
 

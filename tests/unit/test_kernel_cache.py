@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from bh import kernel_cache
+from bh.runtime import kernel_cache
 
 ROOT = Path(__file__).resolve().parents[2]
 SOLVE = """

@@ -12,8 +12,8 @@ import pytest
 import bh
 import meshes
 from bh.errors import InputError
-from bh.mechanics.consistent import ConstantStrain
-from bh.model import Model, Sheet
+from bh.mechanics.consistent.formulation import ConstantStrain
+from bh.model.model import Model, Sheet
 from fem.observables import ShellState
 
 MYLAR = Sheet(E=4000.0, nu=0.38, t=0.127)

@@ -14,14 +14,14 @@ import bh
 import meshes
 from bh import Displace, Fold, Model, Sheet
 from bh.errors import ModelError
-from bh.formulations import formulation
+from bh.formulations.registry import formulation
+from bh.loading.program import program
 from bh.materials import Constant, Law, LinearElastic
-from bh.mechanics.consistent import Consistent
-from bh.mechanics.consistent_system import ConsistentSystem
-from bh.program import program
+from bh.mechanics.consistent.formulation import Consistent
+from bh.mechanics.consistent.system import ConsistentSystem
 from bh.solvers.linear import linear_response
-from verification.derivatives import differences, prediction_ratio
-from verification.patch_tests import distorted
+from verification.studies.solver.derivatives import differences, prediction_ratio
+from verification.studies.solver.patch_tests import distorted
 
 Array = NDArray[np.float64]
 RUBBER = Sheet(E=3.0, nu=0.5, t=0.2)

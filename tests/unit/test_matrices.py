@@ -9,8 +9,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from bh.mechanics import pattern as patterns
-from bh.mechanics.pattern import build_pattern
+from bh.mechanics.shared import sparsity as patterns
+from bh.mechanics.shared.sparsity import build_pattern
 from bh.solvers.matrices import (
     BandMatrix,
     FreeBodyMatrix,

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Displace, Model, Sheet, trace
-from bh.formulations import formulation
-from bh.mechanics.consistent import Consistent, ConstantStrain
-from bh.mechanics.consistent_membrane import Membrane, constant_strain, smoothed_strain
-from bh.mechanics.consistent_membrane_kernels import edge_strains
-from bh.mechanics.consistent_system import ConsistentSystem
-from bh.program import program
+from bh.formulations.registry import formulation
+from bh.loading.program import program
+from bh.mechanics.consistent.formulation import Consistent, ConstantStrain
+from bh.mechanics.consistent.membrane import Membrane, constant_strain, smoothed_strain
+from bh.mechanics.consistent.membrane_kernels import edge_strains
+from bh.mechanics.consistent.system import ConsistentSystem
 from bh.solvers.linear import linear_response
 from meshes.structured import Kind
-from verification import plates
-from verification.convergence import folded, sector
-from verification.patch_tests import distorted
+from verification.studies.solver import plates
+from verification.studies.solver.convergence import folded, sector
+from verification.studies.solver.patch_tests import distorted
 
 Array = NDArray[np.float64]
 KINDS: tuple[Kind, ...] = get_args(Kind)

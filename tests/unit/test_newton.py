@@ -19,7 +19,7 @@ from bh.solvers.newton import Newton, Solution, line_search
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
 from bh.solvers.trace import Walk, walk
-from verification.toys import Silent
+from verification.studies.solver.benchmark_systems import Silent
 
 Array = NDArray[np.float64]
 

@@ -66,7 +66,7 @@ def test_a_chain_is_smooth_where_its_pieces_meet() -> None:
 
 def test_chains_are_meshed_lifted_stored() -> None:
     from bh import Model, Sheet
-    from bh.describe import describe, fingerprint, rebuild
+    from bh.model.serialise import describe, fingerprint, rebuild
 
     pattern = meshes.parallel_creases((0.02, 0.0, -0.01), (40.0, 20.0, 40.0), 5.0, 2)
     for mesh in (meshes.structured(pattern, along=50), meshes.unstructured(pattern, size=2.5)):

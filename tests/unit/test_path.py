@@ -32,9 +32,9 @@ from bh import (
     Sheet,
     trace,
 )
-from bh.describe import describe, fingerprint, rebuild
+from bh.loading.load_step import crease_hinges
+from bh.model.serialise import describe, fingerprint, rebuild
 from bh.solvers.newton import Solution
-from bh.step_program import crease_hinges
 
 SHEET = Sheet(E=4000.0, t=0.127)
 D = SHEET.bending_stiffness(nu=0.0)

@@ -10,10 +10,10 @@ import pytest
 
 import meshes
 from bh import Fold, Model, ModelError, Pinch, Sheet, trace
-from bh.laws import HELD, SPRING
-from bh.pinch_zone import Chain, chain, parts
-from bh.program import program
-from bh.step_program import crease_hinges
+from bh.loading.load_step import crease_hinges
+from bh.loading.program import program
+from bh.model.laws import HELD, SPRING
+from bh.model.pinch import Chain, chain, parts
 
 PLATE = Sheet(E=4000.0, t=0.5)
 ONE = meshes.structured(meshes.annulus_sector(100.0, 5.0, 1.0), along=40)
@@ -228,7 +228,7 @@ def test_a_saved_path_knows_its_pinch(tmp_path) -> None:
 
 
 def test_a_scene_says_the_same() -> None:
-    from bh.scene import parse_scene
+    from bh.scene.load import parse_scene
 
     scene = parse_scene(
         """

@@ -22,7 +22,7 @@ from bh.applications.pinching import (
     respond,
     shipped,
 )
-from verification.pinching import proportion
+from verification.studies.ch5.pinching import proportion
 
 SOURCE_WAY = Pinching(zone=10.0, profile="grip", rows=1, formulation="bars-and-hinges")
 COARSE = Pinching(cell=2.0, rows=1)

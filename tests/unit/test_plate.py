@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import skfem
 
-from bh.model import Model, Sheet
-from bh.program import program
+from bh.loading.program import program
+from bh.model.model import Model, Sheet
 from bh.solvers.linear import linear_response
 from fem.kirchhoff_love import Shell
 from fem.plate import Deflection, Plate, hhj, morley

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 import bh
 import meshes
-from bh import offscreen, plotting
+from bh import plotting
+from bh.plotting import offscreen, pictures
 from meshes.errors import InputError
 
 
@@ -154,7 +155,7 @@ def test_window_needs_a_display(path: bh.Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_camera_keeps_z_up_and_sees_the_upper_side(path: bh.Path) -> None:
     for state in (path[0], path[-1]):
-        camera = plotting._camera(state, 4 / 3, None)
+        camera = pictures._camera(state, 4 / 3, None)
         axes = np.array((camera.across, camera.up, camera.back))
         assert np.allclose(axes @ axes.T, np.eye(3))
         assert camera.across[2] == 0.0
@@ -228,7 +229,7 @@ def test_broken_series_changes_nothing(
         if len(calls) == 3:
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(plotting, "write_mesh", full_disk)
+    monkeypatch.setattr(pictures, "write_mesh", full_disk)
     with pytest.raises(InputError, match="No space left on device") as caught:
         plotting.export_series(path, tmp_path)
     assert "\n" not in str(caught.value)

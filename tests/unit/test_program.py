@@ -11,10 +11,10 @@ import pytest
 
 import meshes
 from bh import CreaseLaw, Displace, Fold, Force, Model, ModelError, Moment, Sheet
-from bh.actuation import Ramp
-from bh.laws import HELD, SHEET, SPRING
-from bh.program import program
-from bh.step_program import crease_hinges
+from bh.loading.load_step import crease_hinges
+from bh.loading.program import program
+from bh.model.actuations import Ramp
+from bh.model.laws import HELD, SHEET, SPRING
 
 STEEL = Sheet(E=4000.0, t=0.2)
 K = 4000.0 * 0.2**3 / 12.0  # bending stiffness, N mm

@@ -11,7 +11,7 @@ import pytest
 
 import bh
 import meshes
-from bh.scene import load_scene
+from bh.scene.load import load_scene
 from meshes import InputError
 
 SHEET = bh.Sheet(E=4000.0, t=0.127)

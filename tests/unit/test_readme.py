@@ -13,14 +13,14 @@ import pytest
 import typer.main
 
 import bh
-import bh.cli
-from bh import offscreen
-from verification.cases import ALL_CASES
+import bh.commands.cli
+from bh.plotting import offscreen
+from verification.framework.cases import ALL_CASES
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "examples" / "README.md"]
 README = PAGES[0].read_text(encoding="utf-8")
-COMMANDS = typer.main.get_command(bh.cli.app).commands
+COMMANDS = typer.main.get_command(bh.commands.cli.app).commands
 
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INDENTED = re.compile(r"^(?:    .*\n)+", re.MULTILINE)
@@ -132,7 +132,7 @@ def test_bh_commands_and_their_options_exist(capsys: pytest.CaptureFixture[str])
     assert {words[0] for words in lines} >= {"run", "verify"}
     for name, *words in lines:
         assert name in COMMANDS, f"bh {name}"
-        assert bh.cli.main([name, "--help"]) == 0
+        assert bh.commands.cli.main([name, "--help"]) == 0
         options = set(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", capsys.readouterr().out))
         assert {word for word in words if word.startswith("-")} <= options, f"bh {name}"
         if name == "verify":

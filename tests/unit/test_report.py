@@ -18,8 +18,8 @@ from meshes.errors import InputError
 from reports.build import build, one_page
 from reports.figures import Plot, svg, typeset
 from reports.words import number, seconds, share
-from verification.cases import CASES
-from verification.chapters import chapter_of
+from verification.framework.cases import CASES
+from verification.framework.chapters import chapter_of
 
 # a page for each chapter that has a case, run or not
 CHAPTER_PAGES = sorted({f"{chapter_of(name).page}.html" for name in CASES})
@@ -432,7 +432,7 @@ def test_command_says_where_the_report_is(
 ) -> None:
     import typer
 
-    import verification.run as verification
+    import verification.framework.run as verification
     from reports.command import report
 
     asked = []

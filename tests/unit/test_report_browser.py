@@ -13,7 +13,7 @@ import pytest
 
 import bh
 import meshes
-from bh import interactive
+from bh.plotting import interactive
 from reports.build import build
 from reports.pdf import browser
 from tests.unit.test_report import results, write

@@ -15,7 +15,7 @@ import pytest
 
 import bh
 import meshes
-from bh import interactive
+from bh.plotting import interactive
 from meshes.errors import InputError
 from reports.build import build, one_page
 from reports.changes import changes
@@ -23,9 +23,9 @@ from reports.claims import claims
 from reports.pdf import browser, print_report
 from reports.records import Case, CaseInfo, Check, Frames, Results, read, schema
 from tests.unit.test_report import Page, record, results, write
-from verification.cases import ALL_CASES
-from verification.chapters import CHAPTERS, OTHER, chapter_of
-from verification.run import RECORDS, run
+from verification.framework.cases import ALL_CASES
+from verification.framework.chapters import CHAPTERS, OTHER, chapter_of
+from verification.framework.run import RECORDS, run
 
 
 def case(*records: dict[str, Any]) -> Case:

@@ -8,7 +8,7 @@ import pytest
 import bh
 import meshes
 from bh.analysis.rulings import curvature, rulings
-from bh.state import Energy, State
+from bh.formulations.state import Energy, State
 from meshes import MeshError, ruled, unstructured
 from meshes.curves import sample
 from meshes.io import read_pattern

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 import bh
 import meshes
-from bh import scan
+from bh.applications import scan
 from meshes import InputError
 from meshes.errors import FileFormatError
-from verification.scan import DENSITY, NOISE, corners, folded_sector, sampled, scanned
-from verification.scan import MOTION as OF_THE_CASE
+from verification.studies.ch3.scan import DENSITY, NOISE, corners, folded_sector, sampled, scanned
+from verification.studies.ch3.scan import MOTION as OF_THE_CASE
 from verification.theory import cone
 
 Array = NDArray[np.float64]

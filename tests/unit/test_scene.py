@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import bh
-from bh.actuation import Displace, Fold, Force, Moment
-from bh.describe import ACTUATIONS as KINDS
 from bh.errors import SceneError
-from bh.model import CreaseLaw
-from bh.program import program
-from bh.scene import Outputs, load_scene, parse_scene
-from bh.scene_schema import ACTUATIONS, CreaseTable
-from bh.supports import RigidBody, Support
+from bh.loading.program import program
+from bh.model.actuations import Displace, Fold, Force, Moment
+from bh.model.model import CreaseLaw
+from bh.model.serialise import ACTUATIONS as KINDS
+from bh.model.supports import RigidBody, Support
+from bh.scene.load import Outputs, load_scene, parse_scene
+from bh.scene.tables import ACTUATIONS, CreaseTable
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENES = sorted(EXAMPLES.glob("*.toml"))
@@ -82,7 +82,7 @@ def test_miura_example_is_drawn_right():
 
 
 def test_appendix_b_says_what_the_api_says():
-    from bh.describe import fingerprint
+    from bh.model.serialise import fingerprint
     from meshes import annulus_sector, structured
 
     mesh = structured(annulus_sector(100.0, 10.0, 0.7853981633974483), along=64)

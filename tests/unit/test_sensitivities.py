@@ -15,7 +15,6 @@ import bh
 import meshes
 from bh.analysis import sensitivities
 from bh.analysis.node_sensitivities import of_nodes
-from bh.analysis.polish import polish
 from bh.analysis.sensitivities import (
     Energy,
     FoldAngle,
@@ -28,6 +27,7 @@ from bh.analysis.sensitivities import (
     of,
 )
 from bh.analysis.stiffness_probe import Probe
+from bh.applications.polish import polish
 from meshes.errors import InputError
 
 Array = NDArray[np.float64]
@@ -195,7 +195,7 @@ def test_closed_forms(formulation: str) -> None:
 
 def test_an_error_in_the_kernels_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out how the bars' stiffness changes with the design: the check above must fail."""
-    from bh.mechanics.bar_hinge_design import BarHingeDesign
+    from bh.mechanics.bars_and_hinges.derivatives import BarHingeDesign
 
     build, p = held("bars-and-hinges"), np.array(DESIGNS["held"][1])
     path = bh.trace(build(p), strategy=EXACT)

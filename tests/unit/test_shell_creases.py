@@ -12,11 +12,11 @@ import pytest
 
 import bh
 import meshes
-from bh.actuation import Displace, Fold, Moment
 from bh.errors import InputError, ModelError
-from bh.model import Model, Sheet
-from bh.path import Path
-from bh.program import program
+from bh.loading.program import program
+from bh.model.actuations import Displace, Fold, Moment
+from bh.model.model import Model, Sheet
+from bh.paths.path import Path
 from bh.solvers.continuation import LoadControl
 from fem.kirchhoff_love import Shell, follow
 from fem.loads import EdgeMoments

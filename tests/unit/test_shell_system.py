@@ -10,8 +10,8 @@ import pytest
 
 import bh
 import meshes
-from bh.model import Model, Sheet
-from bh.program import program
+from bh.loading.program import program
+from bh.model.model import Model, Sheet
 from fem import system as system_module
 from fem.assembly import build_pattern
 from fem.kirchhoff_love import LinearShell, Shell

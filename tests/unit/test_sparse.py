@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 
 import bh
 import meshes
-from bh.mechanics import pattern as patterns
+from bh.mechanics.shared import sparsity as patterns
 from bh.solvers import multifrontal, pardiso
 from bh.solvers.dissection import dissect
 from bh.solvers.factor import IndefiniteError

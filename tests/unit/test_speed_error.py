@@ -11,12 +11,12 @@ import pytest
 
 import meshes
 from bh import trace
-from verification import speed_error
-from verification.checks import Context
-from verification.measuring import measure
-from verification.pareto import Trial, cheapest, front, rate
-from verification.richardson import fitted
-from verification.speed_problems import PROBLEMS, curve
+from verification.framework.checks import Context
+from verification.framework.measuring import measure
+from verification.framework.pareto import Trial, cheapest, front, rate
+from verification.framework.richardson import fitted
+from verification.studies.solver import speed_error
+from verification.studies.solver.speed_problems import PROBLEMS, curve
 
 RACE = [
     Trial("coarse", "1", 1.0, 0.20),

@@ -15,6 +15,7 @@ import bh
 import meshes
 from bh import Model, Path, Sheet, trace
 from bh.analysis.stiffness_probe import Probe, Stiffness, sphere
+from bh.loading.program import program
 from bh.solvers.linear import linear_response
 
 Array = NDArray[np.float64]
@@ -109,7 +110,7 @@ def test_loaded_and_guided_are_solves_of_the_driver(formulation: str) -> None:
 
     def energy(*actuations: Any) -> float:
         loaded = model.step(*actuations)
-        system = form.system(loaded, bh.program.program(loaded)[-1], path[-1])
+        system = form.system(loaded, program(loaded)[-1], path[-1])
         return linear_response(system, system.start()).energy
 
     assert float(at.loaded(n)) == pytest.approx(-0.5 / energy(bh.Force([node], each=tuple(n))), rel=1e-7)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh import Displace, Fold, Force, Model, ModelError, RigidBody, Sheet, Support, trace
-from bh.supports import Prescribed, directions, free_motions, resolve, rigid_motions, select
+from bh.model.supports import Prescribed, directions, free_motions, resolve, rigid_motions, select
 from meshes import MeshError, SheetMesh
 
 Array = NDArray[np.float64]

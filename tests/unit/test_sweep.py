@@ -20,7 +20,7 @@ import pytest
 
 pytest.importorskip("xarray")
 import bh.sweep
-from bh.cli import main
+from bh.commands.cli import main
 from bh.sweep.file import load_sweep
 from bh.sweep.progress import duration, line
 
@@ -397,7 +397,7 @@ def test_warm_starts_are_given_up_where_states_differ(monkeypatch: pytest.Monkey
     task, points = pinching([1.8, 1.7, 1.6])
     models = [task.scene(points[i]).model for i in range(3)]
     monkeypatch.setattr(warm, "same", lambda *_: False)
-    from bh.tracing import trace
+    from bh.solving.follow import trace
 
     for path, model in zip(warm.line(models), models, strict=True):
         assert path[-1].points.tobytes() == trace(model)[-1].points.tobytes()

@@ -13,11 +13,11 @@ import pytest
 import bh
 import meshes
 from bh.errors import ModelError, SceneError
-from bh.path import Path
-from bh.scene import parse_scene
-from bh.symmetry import mirror
+from bh.loading.symmetry import mirror
+from bh.paths.path import Path
+from bh.scene.load import parse_scene
 from meshes.structured import Kind
-from verification.alignment import aligned
+from verification.framework.alignment import aligned
 
 SHEET = bh.Sheet(E=4000.0, nu=0.3, t=0.127)
 SECTOR = meshes.annulus_sector(100.0, 10.0, math.pi / 2)

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 import bh
-from bh.threads import _blas, one_blas_thread
-from verification.appendix_b import model
+from bh.runtime.threads import _blas, one_blas_thread
+from verification.studies.app_b.appendix_b import model
 
 
 def numbers() -> set[int]:

@@ -9,9 +9,9 @@ import pytest
 
 import meshes
 from bh import LoadControl, Model, ModelError, Sheet, trace
-from bh.actuation import Bar, Tether
-from bh.mechanics.touching import Touching
-from bh.path import Path
+from bh.mechanics.shared.contact import Touching
+from bh.model.actuations import Bar, Tether
+from bh.paths.path import Path
 
 SHEET = Sheet(E=4000.0, t=0.381)
 FORMULATIONS = ["bars-and-hinges", "consistent"]

@@ -11,9 +11,9 @@ import pytest
 import bh
 import meshes
 from bh import Model, ModelError, Sheet, Until, trace
-from bh.observables import depth_of
-from bh.scene import parse_scene
-from bh.state import State
+from bh.formulations.observables import depth_of
+from bh.formulations.state import State
+from bh.scene.load import parse_scene
 
 SHEET = Sheet(E=4000.0, t=0.381)
 FORMULATIONS = ["bars-and-hinges", "consistent"]

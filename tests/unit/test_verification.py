@@ -10,13 +10,14 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-import verification.cases as registry
+import verification.framework.cases as registry
 from meshes import InputError
-from verification import campaign, command, environment
-from verification import run as runner
-from verification.cases import ALL_CASES, CASES, LONG_CASES, case
-from verification.checks import CaseResult, Check, Context, line, plot
-from verification.run import run, write_json
+from verification.framework import command, environment
+from verification.framework import run as runner
+from verification.framework.cases import ALL_CASES, CASES, LONG_CASES, case
+from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.run import run, write_json
+from verification.studies.solver import campaign
 
 # DESIGN.md, section 2, and the outcome of the path that the value was read from
 KEYS = {
@@ -392,7 +393,7 @@ def test_command_that_holds(tmp_path: Path) -> None:
 
 def test_derivatives_case_sees_a_wrong_hessian(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A Hessian that is wrong by 1e-6 of itself, and only where the hinge is flat or closed, is found."""
-    from bh.mechanics import kinematics
+    from bh.mechanics.shared import kinematics
 
     right = kinematics.dihedral_hessians
     monkeypatch.setattr(kinematics, "dihedral_hessians", lambda x, hinges: (1.0 + 1e-6) * right(x, hinges))
@@ -404,7 +405,7 @@ def test_derivatives_case_sees_a_wrong_hessian(monkeypatch: pytest.MonkeyPatch, 
 
 def test_cone_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Bending hinges 10 % too stiff."""
-    from bh.mechanics import elements
+    from bh.mechanics.bars_and_hinges import elements
 
     right = elements.bending_hinge_stiffness
     monkeypatch.setattr(elements, "bending_hinge_stiffness", lambda *args: 1.1 * right(*args))
@@ -418,7 +419,7 @@ def test_cone_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp_p
 
 def test_strips_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Diagonals by Eq. 3.3 without the factor of Eq. 3.4 are as good in tension; hinges of half the area are not."""
-    from bh.mechanics import elements
+    from bh.mechanics.bars_and_hinges import elements
 
     right = elements.bending_hinge_stiffness
     monkeypatch.setattr(elements, "bending_hinge_stiffness", lambda E, t, L, A: right(E, t, L, 0.5 * A))

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model import Model, Sheet
+from bh.model.model import Model, Sheet
 from fem.loads import EdgeMoments
 from meshes import Arc, SheetMesh
 

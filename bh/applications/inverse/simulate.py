@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.actuation import Actuation, Pinch
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.transforms import angles, frame, relative
-from bh.model import Model, Sheet
-from bh.path import Path
-from bh.state import State
-from bh.tracing import trace
+from bh.formulations.state import State
+from bh.model.actuations import Actuation, Pinch
+from bh.model.model import Model, Sheet
+from bh.paths.path import Path
+from bh.solving.follow import trace
 from meshes import SheetMesh, parallel_creases, structured
 
 Array = NDArray[np.float64]

@@ -1,0 +1,389 @@
+"""The `bh` command. Only here is anything printed, and only here does the program exit.
+
+Exit codes: 0 reached, or done; 1 a path that ended early, or a check that failed; 2 bad input, told in one line;
+3 a fault of the program; 130 interrupted. What is heavy is imported where it is needed, so that `bh` starts fast.
+"""
+
+from __future__ import annotations
+
+import sys
+
+try:
+    import os
+    import shlex
+    import traceback
+    from collections.abc import Callable, Sequence
+    from importlib.metadata import EntryPoint, entry_points, version
+    from pathlib import Path
+    from typing import TYPE_CHECKING, Annotated, Any
+
+    import typer
+except KeyboardInterrupt:  # `main` tells of it from here on
+    sys.stderr.write("bh: interrupted\n")
+    raise SystemExit(130) from None
+
+if TYPE_CHECKING:
+    from bh.analysis.contact import Contact
+    from bh.paths.path import Path as Trace
+    from bh.scene.load import Scene
+
+COMMANDS = "bh.commands"
+ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
+    "design": "Find a crease for a target, and check it by simulation.",
+    "segments": "Make the data set of pinched segments for inverse design.",
+    "sweep": "Solve a scene for many parameters into a labelled data set.",
+    "verify": "Check the solvers against theory and published numbers.",
+    "report": "Run the verification cases and write the report page.",
+}
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line (without the program's name; by default that of the process); returns the exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in (words[: words.index("--")] if "--" in words else words)
+    if debug:  # it may stand anywhere, also behind a command
+        words.remove("--debug")
+    try:
+        code = app(args=words, prog_name="bh", standalone_mode=False)
+        if code == 130:  # what typer makes of a KeyboardInterrupt
+            return _fail("interrupted", 130, debug)
+        return code if isinstance(code, int) else 0
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail("interrupted", 130, debug)
+    except _InterruptedError as error:
+        return _fail(f"interrupted; {error}", 130, debug)
+    except BrokenPipeError:  # whoever read the output has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        return _explain(error, debug)
+
+
+class _InterruptedError(Exception):
+    """A KeyboardInterrupt with what there is to say about it."""
+
+
+def _explain(error: Exception, debug: bool) -> int:
+    from bh.errors import InputError
+
+    if isinstance(error, InputError):
+        return _fail(str(error), 2, debug)
+    if hasattr(error, "format_message"):  # how typer tells a wrong command line
+        command = getattr(getattr(error, "ctx", None), "command_path", "bh")
+        return _fail(f"{error.format_message().rstrip('.')}; see '{command} --help'", 2, debug)
+    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return _fail(f"{what} (a fault of the program, please report it; --debug shows where)", 3, debug)
+
+
+def _fail(message: str, code: int, debug: bool) -> int:
+    if debug:
+        traceback.print_exc()
+    typer.echo("bh: " + " ".join(message.split()), err=True)
+    return code
+
+
+# --- commands -----------------------------------------------------------------------------------------------
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"bh {version('curved-crease-workbench')}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _options(
+    context: typer.Context,
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit."),
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show where an error comes from.")] = False,
+) -> None:
+    """Bar-and-hinge simulation of sheets folded along curved creases."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command()
+def run(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Output folder; default SCENE-out.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the states in the folder.")] = False,
+    pictures: Annotated[bool, typer.Option("--pictures", help="Draw the folded sheet (PNG).")] = False,
+    vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+) -> None:
+    """Solve a scene into a folder: path.bh and result.json."""
+    from bh.commands.run import UNFINISHED, extras, holds_states, solve
+    from bh.errors import InputError
+    from bh.scene.load import load_scene
+
+    loaded = load_scene(scene)
+    folder = Path(f"{loaded.name}-out") if output is None else output
+    try:
+        path, names, before, contact = solve(loaded, folder, resume=resume, progress=not quiet)
+    except KeyboardInterrupt:
+        again = shlex.join(["bh", "run", str(scene), "-o", str(folder), "--resume"])
+        raise _InterruptedError(
+            f"go on with: {again}" if holds_states(folder) else "nothing is kept"
+        ) from None
+    if before and not quiet:
+        typer.echo(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
+    written = [folder / name for name in names]
+    for name, write in extras(path, loaded, folder, pictures, vtu).items():
+        try:
+            write()
+        except (InputError, ImportError, OSError) as error:
+            raise InputError(
+                f"the result is in '{folder}', but {name} could not be written: {error}"
+            ) from error
+        written.append(folder / name)
+    if not quiet:
+        _summary(path, loaded, written, contact)
+    if path.outcome == "reached" and path.accuracy is not None and not path.accuracy.met:
+        typer.echo(f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}", err=True)
+        raise typer.Exit(1)
+    if path.outcome != "reached":
+        why = f" ({path.reason})" if path.reason else ""
+        kept = "; the finished result of an earlier run is kept" if names == UNFINISHED else ""
+        typer.echo(
+            f"bh: {scene}: step {len(path.steps)} of {len(loaded.model.steps)} ended early: {path.outcome}{why}; "
+            f"what was reached is in '{written[1]}'{kept}",
+            err=True,
+        )
+        raise typer.Exit(1)
+
+
+@app.command()
+def view(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="A path file, or the output folder of a run.")],
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw to a file; no window.")
+    ] = None,
+    vtu: Annotated[
+        Path | None, typer.Option("--vtu", metavar="DIR", help="Write all states for ParaView; no window.")
+    ] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option("--animation", metavar="FILE.gif", help="All states as .gif or .mp4; no window."),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option("--html", metavar="FILE.html", help="All states to turn in a browser; no window."),
+    ] = None,
+    state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
+) -> None:
+    """Show a state of a solved path, or draw it to a file."""
+    from bh.commands.run import path_file
+    from bh.errors import InputError
+    from bh.paths.path import Path as Trace
+
+    file = path_file(path) if path.is_dir() else path
+    solved = Trace.load(file)
+    if not -len(solved) <= state < len(solved):
+        raise InputError(f"--state {state}: '{file}' has the states 0 to {len(solved) - 1}; -1 is the last")
+    import bh.plotting
+
+    if vtu is not None:
+        typer.echo(f"wrote {bh.plotting.export_series(solved, vtu)}")
+    if picture is not None:
+        bh.plotting.picture(solved[state], picture)
+        typer.echo(f"wrote {picture}")
+    if animation is not None:
+        typer.echo(f"wrote {bh.plotting.animation(solved, animation)}")
+    if html is not None:
+        import bh.plotting.interactive
+
+        typer.echo(f"wrote {bh.plotting.interactive.view(solved, title=path.name).save(html)}")
+    if picture is vtu is animation is html is None:
+        try:
+            bh.plotting.show(solved[state])
+        except InputError as error:
+            again = shlex.join(["bh", "view", str(path), "--picture", "sheet.png"])
+            raise InputError(f"{error}, or {again}") from error
+
+
+@app.command()
+def export(
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="A scene (flat), or a path or run's folder (folded).")
+    ],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What to write; its suffix is the format.")],
+    state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
+    facets: Annotated[bool, typer.Option("--facets", help="Also the edges of the mesh (SVG, DXF).")] = False,
+) -> None:
+    """Write a flat pattern or a folded sheet for other programs."""
+    from bh.errors import InputError
+    from bh.paths.export import write_flat, write_state
+
+    if source.suffix.lower() == ".toml":
+        from bh.scene.load import load_scene
+
+        done = write_flat(file, load_scene(source).model.mesh, facets)
+    else:
+        from bh.commands.run import path_file
+        from bh.paths.path import Path as Trace
+
+        solved = Trace.load(path_file(source) if source.is_dir() else source)
+        if not -len(solved) <= state < len(solved):
+            raise InputError(
+                f"--state {state}: '{source}' has the states 0 to {len(solved) - 1}; -1 is the last"
+            )
+        last = state % len(solved)
+        if file.suffix.lower() in (".svg", ".dxf"):
+            done = write_flat(file, solved.model.mesh, facets)
+        else:
+            done = write_state(file, [solved[k] for k in range(last + 1)], source.stem)
+    typer.echo(f"wrote {done}")
+
+
+@app.command()
+def init(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scene to write.")] = Path("scene.toml"),
+    drawing: Annotated[
+        Path | None, typer.Option("--drawing", metavar="FILE", help="An SVG or DXF crease pattern to fold.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
+) -> None:
+    """Write a commented example scene."""
+    from bh.errors import InputError
+    from bh.scene.example import example
+    from meshes.io.export import replacing
+
+    if file.exists() and not force:
+        raise InputError(f"'{file}' is there already; name another file, or add --force")
+    if drawing is not None:  # a scene looks for its files from its own folder
+        drawing = Path(os.path.relpath(drawing, file.parent))
+    text = example(drawing, file.parent)
+    with replacing(file) as draft:
+        draft.write_text(text, encoding="utf-8")
+    typer.echo(f"wrote {file}; next: bh check {shlex.quote(str(file))}")
+
+
+@app.command()
+def check(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).")],
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="PNG, SVG or PDF to draw; default SCENE-check.png."),
+    ] = None,
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
+) -> None:
+    """Check a scene, say what it is, and draw its flat pattern."""
+    from bh.scene.load import load_scene
+    from bh.scene.report import draw, report
+
+    loaded = load_scene(scene)
+    for line in report(loaded):
+        typer.echo(line)
+    if not no_picture:
+        typer.echo(f"wrote {draw(loaded, picture or Path(f'{loaded.name}-check.png'))}")
+
+
+@app.command()
+def schema(
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write to a file; default the screen."),
+    ] = None,
+) -> None:
+    """Print the JSON schema of scenes, for editors."""
+    import json
+
+    from bh.scene.json_schema import schema as scene_schema
+    from meshes.io.export import replacing
+
+    text = json.dumps(scene_schema(), indent=2) + "\n"
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    with replacing(output) as draft:
+        draft.write_text(text, encoding="utf-8")
+    typer.echo(f"wrote {output}; name it in the first line of a scene: #:schema {output}")
+
+
+@app.command()
+def formulations() -> None:
+    """List the formulations that a scene can name."""
+    from bh.formulations.registry import names
+
+    for name in names():
+        typer.echo(name)
+
+
+def _add_commands() -> None:
+    """Commands of other packages, by the entry-point group; none of them is imported before it is called."""
+    for entry in entry_points(group=COMMANDS):
+        settings = {
+            "ignore_unknown_options": True,
+            "allow_extra_args": True,
+            "allow_interspersed_args": False,
+        }
+        about = ABOUT.get(entry.name, f"From the package {entry.value.split('.')[0]}.")
+        app.command(entry.name, help=about, add_help_option=False, context_settings=settings)(_proxy(entry))
+
+
+def _proxy(entry: EntryPoint) -> Callable[[typer.Context], Any]:
+    def call(context: typer.Context) -> Any:
+        from bh.errors import InputError
+
+        try:
+            function = entry.load()
+        except (ImportError, AttributeError) as error:
+            raise InputError(
+                f"command '{entry.name}' is not available ({error}); install {entry.value}"
+            ) from error
+        own = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+        own.command(entry.name)(function)
+        code = own(args=context.args, prog_name=f"bh {entry.name}", standalone_mode=False)
+        raise typer.Exit(code if isinstance(code, int) else 0)
+
+    return call
+
+
+_add_commands()
+
+
+def _summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact | None) -> None:
+    from math import degrees
+
+    from bh.formulations.registry import takes_nu
+
+    energy, last = path[-1].energy, path[-1]
+    typer.echo(
+        f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
+        f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
+    )
+    if path.accuracy is not None:
+        typer.echo(str(path.accuracy))
+    for remark in path.remarks[:6]:
+        typer.echo(remark)
+    model = path.model
+    if model.sheet.nu != 0.0 and not takes_nu(model.formulation):
+        typer.echo(f"{model.formulation} take Poisson's ratio as 0, not as nu = {model.sheet.nu:g}")
+    typer.echo(
+        f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
+        f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
+    )
+    creases = model.mesh.creases
+    for crease in creases[:6]:
+        a = last.fold_angle(crease)
+        typer.echo(
+            f"fold angle of {crease}: {a.mean():.4f} rad ({degrees(a.mean()):.1f} degrees), "
+            f"{a.min():.4f} to {a.max():.4f}"
+        )
+    if len(creases) > 6:
+        typer.echo(f"and {len(creases) - 6} more creases")
+    if contact is None:
+        typer.echo("self-contact: none")
+    else:
+        typer.echo(f"self-contact (reported, not prevented), first in {contact}")
+    typer.echo("files: " + " ".join(str(file) for file in written))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,284 @@
+"""`bh design`: from a target file to a crease, its pattern to cut and its simulated shape (docs/inverse_design.md)."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from bh.applications.inverse.fit import fit_curve, move_tip
+from bh.applications.inverse.problems import CURVES, Design
+from bh.applications.inverse.reach import Library, Reach
+from bh.applications.inverse.segments import DesignError
+from bh.applications.inverse.simulate import Simulated, simulate
+from bh.applications.inverse.surrogate import Surrogate, read, shipped
+from bh.errors import InputError
+from bh.paths.provenance import versions
+from bh.scene.reading import Table, check_keys, one_line, read_table, read_toml
+from bh.scene.tables import Vector
+from meshes import parallel_creases
+from meshes.curves import arc_lengths, interpolated
+from meshes.io import write_pattern
+from meshes.io.export import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+class TargetTable(Table):
+    """What is asked for: exactly one of the three."""
+
+    point: Vector | None = Field(None, description="three coordinates [x, y, z] in mm")
+    curve: str | None = Field(
+        None, description=f"the name of a CSV file of points x, y in mm, or one of {', '.join(CURVES)}"
+    )
+    move_tip: bool = Field(
+        False, description="true: the end moves as far as it can when the crease is pinched"
+    )
+
+    @model_validator(mode="after")
+    def one_target(self) -> TargetTable:
+        if (self.point is not None) + (self.curve is not None) + self.move_tip != 1:
+            raise ValueError("needs exactly one of point, curve and move_tip = true")
+        return self
+
+
+class SearchTable(Table):
+    segments: Annotated[int, Field(ge=1, le=8)] = Field(
+        4, description="the largest number of segments, 1 to 8"
+    )
+    tolerance: Annotated[float, Field(gt=0.0)] = Field(1.0, description="of a point, mm, a positive number")
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
+    data: str | None = Field(
+        None, description="the name of a data set of `bh segments`, from the folder of this file"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A design with its simulated strip, and what it was judged by.
+
+    Attributes:
+        measure: name, value and unit of what was asked for, by the surrogate and by the simulation of the strip.
+        goal: (k, 3) point or curve to be drawn beside it, mm.
+    """
+
+    design: Design
+    strip: Simulated
+    measure: dict[str, tuple[float, str]]
+    goal: Array
+
+
+def solve(file: str | Path) -> Answer:
+    """The design that a target file asks for.
+
+    Raises:
+        DesignError: the file asks for what cannot be, or the target is not reached; one line.
+    """
+    file = Path(file)
+    try:
+        data = read_toml(file.read_text(encoding="utf-8-sig"))
+        check_keys("", data, ("target", "search"))
+        if "target" not in data:
+            raise DesignError("target is missing; add a table [target] with point, curve or move_tip")
+        target = read_table(TargetTable, data["target"], "target")
+        search = read_table(SearchTable, data.get("search", {}), "search")
+        surrogate = shipped() if search.data is None else read(file.parent / search.data)
+        if target.point is not None:
+            return _point(target.point, search, surrogate)
+        if target.curve is not None:
+            return _curve(target.curve, search, file.parent, surrogate)
+        return _tip(search, surrogate)
+    except InputError as error:
+        raise DesignError(one_line(f"{file}: {error}")) from error
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise DesignError(
+            one_line(f"the target file '{file}' cannot be read ({why}); check the name")
+        ) from error
+
+
+def _point(point: list[float], search: SearchTable, surrogate: Surrogate) -> Answer:
+    books = tuple(Library(surrogate, n, seed=search.seed) for n in range(1, search.segments + 1))
+    found = Reach(most=search.segments, tolerance=search.tolerance, seed=search.seed, libraries=books)(point)
+    assert found.simulated is not None
+    measure = {
+        "distance by interpolation": (found.missed, "mm"),
+        "distance of the simulated strip": (found.missed_simulated, "mm"),
+        "clears itself in space": (float(found.clear), "1 yes, 0 no"),
+    }
+    return Answer(found.design, found.simulated, measure, np.array([point], dtype=float))
+
+
+def _curve(name: str, search: SearchTable, folder: Path, surrogate: Surrogate) -> Answer:
+    curve = CURVES[name] if name in CURVES else read_curve(folder / name)
+    problem, top = fit_curve(curve, search.segments, seed=search.seed)[-1]
+    design = problem.design(top.x)
+    strip = simulate(*design.lists(), surrogate.setting)
+    at = np.linspace(0.0, 1.0, problem.samples)
+    crease = strip.crease()
+    s = arc_lengths(crease)
+    points = interpolated(at * s[-1], s, crease)
+    goal = np.column_stack((problem.goal, np.zeros(problem.samples)))
+    measure = {
+        "mean distance by the arcs": (top.value * problem.size, "mm"),
+        "mean distance of the simulated strip": (float(np.linalg.norm(points - goal, axis=1).mean()), "mm"),
+        "length of the curve": (problem.size, "mm"),
+    }
+    return Answer(design, strip, measure, goal)
+
+
+def _tip(search: SearchTable, surrogate: Surrogate) -> Answer:
+    problem, top = move_tip(search.segments, seed=search.seed, surrogate=surrogate)[-1]
+    design = problem.design(top.x, top.on)
+    k0, length, _ = design.lists()
+    strip, before = (
+        simulate(*design.lists(), surrogate.setting),
+        simulate(k0, length, [False] * design.n, surrogate.setting),
+    )
+    measure = {
+        "movement of the tip by interpolation": (-top.value, "mm"),
+        "movement of the tip of the simulated strip": (float(np.linalg.norm(strip.t - before.t)), "mm"),
+    }
+    return Answer(design, strip, measure, before.t[None])
+
+
+def read_curve(file: str | Path) -> Array:
+    """(k, 2) points of a CSV file with two columns x, y in mm; a first row of names may be there.
+
+    Raises:
+        DesignError: it cannot be read, or does not begin at the origin.
+    """
+    try:
+        with Path(file).open(newline="", encoding="utf-8-sig") as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise DesignError(f"the curve '{file}' cannot be read ({why}); check the name") from error
+    try:
+        float(rows[0][0])
+    except (ValueError, IndexError):
+        rows = rows[1:]
+    try:
+        points = np.array([[float(x), float(y)] for x, y in rows])
+    except ValueError as error:
+        raise DesignError(f"the curve '{file}' needs rows of two numbers x, y in mm ({error})") from error
+    if len(points) < 2 or np.hypot(*points[0]) > 1e-3 * np.ptp(points, axis=0).max():
+        raise DesignError(
+            f"the curve '{file}' must have two points or more and begin at the origin, where the crease does"
+        )
+    return points
+
+
+def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Path]:
+    """Write pattern.svg, pattern.dxf, path.bh, design.png and design.json; returns the files.
+
+    Raises:
+        DesignError: the folder cannot be written.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        k0, length, _ = answer.design.lists()
+        pattern = parallel_creases(k0, length, 5.0)
+        files = [
+            folder / name for name in ("pattern.svg", "pattern.dxf", "path.bh", "design.png", "design.json")
+        ]
+        write_pattern(files[0], pattern)
+        write_pattern(files[1], pattern)
+        answer.strip.path.save(files[2])
+        with replacing(files[3]) as draft:
+            picture(answer).savefig(draft, format="png", dpi=110, metadata={"Software": None})
+        about = {
+            "segments": answer.design.rows(),
+            "total_length_mm": answer.design.total,
+            "end_mm": answer.strip.t.tolist(),
+            "measures": {
+                name: {"value": value, "unit": unit} for name, (value, unit) in answer.measure.items()
+            },
+            "data": data,
+            "versions": versions(),
+        }
+        with replacing(files[4]) as draft:
+            draft.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise DesignError(
+            f"cannot write to '{folder}' ({error.strerror}); choose another folder with -o"
+        ) from error
+    return files
+
+
+def picture(answer: Answer) -> Figure:
+    """The flat pattern with its pinches, and the folded strip from above and from the side with the target."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13.0, 4.6), layout="constrained")
+    flat, above, side = figure.subplots(1, 3)
+    mesh, state = answer.strip.path.model.mesh, answer.strip.path[-1]
+    crease = mesh.points[mesh.nodes("crease:crease")]
+    for name in ("edge:inner", "edge:outer", "edge:start", "edge:end"):
+        flat.plot(*mesh.points[mesh.nodes(name), :2].T, color="0.4", lw=1.0)
+    flat.plot(*crease[:, :2].T, color="C0", lw=1.5, label="crease")
+    knots = np.concatenate(([0.0], np.cumsum(answer.design.length)))
+    at = np.rint(knots / knots[-1] * (len(crease) - 1)).astype(int)
+    flat.plot(*crease[at, :2].T, "k.", ms=6, label="ends of segments")
+    middle = np.rint(
+        (0.5 * (knots[1:] + knots[:-1]))[answer.design.pinched] / knots[-1] * (len(crease) - 1)
+    ).astype(int)
+    if len(middle):
+        flat.plot(*crease[middle, :2].T, "v", color="C3", ms=9, label="pinches")
+    flat.set(title="pattern", xlabel="x, mm", ylabel="y, mm", aspect="equal")
+    origin, frame = state.points[mesh.nodes("crease:crease")[0]], _start(answer)
+    x = (state.points - origin) @ frame
+    for ax, (i, j), title in ((above, (0, 1), "folded, from above"), (side, (0, 2), "folded, from the side")):
+        for name, colour in (("edge:inner", "0.5"), ("edge:outer", "0.5"), ("crease:crease", "C0")):
+            ax.plot(*x[mesh.nodes(name)][:, [i, j]].T, color=colour, lw=1.0)
+        style = "*" if len(answer.goal) == 1 else "-"
+        ax.plot(answer.goal[:, i], answer.goal[:, j], style, color="C3", ms=11, label="target")
+        ax.set(title=title, xlabel="xyz"[i] + ", mm", ylabel="xyz"[j] + ", mm", aspect="equal")
+        ax.margins(0.08)
+    flat.legend(fontsize=8)
+    above.legend(fontsize=8)
+    return figure
+
+
+def _start(answer: Answer) -> Array:
+    from bh.applications.inverse.simulate import frames
+
+    return frames(answer.strip.path[-1])[0][1]
+
+
+def design(
+    target: Annotated[Path, typer.Argument(metavar="TARGET", help="Target file (TOML).")],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Output folder; default TARGET-design."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+) -> int:
+    """Find a crease for a target, and check it by simulation."""
+    answer = solve(target)
+    folder = Path(f"{target.stem}-design") if output is None else output
+    files = write(answer, folder)
+    if not quiet:
+        for row in answer.design.rows():
+            state = "pinched" if row["pinched"] else "not pinched"
+            typer.echo(f"segment: k0 {row['k0']:+.6f} /mm, length {row['length']:.2f} mm, {state}")
+        for name, (value, unit) in answer.measure.items():
+            typer.echo(f"{name}: {value:.4g} {unit}")
+        turn = math.degrees(float(np.abs(answer.design.k0 * answer.design.length).sum()))
+        typer.echo(
+            f"total length {answer.design.total:.1f} mm, the flat crease turns by {turn:.0f} degrees in all"
+        )
+        typer.echo("files: " + " ".join(str(file) for file in files))
+    return 0

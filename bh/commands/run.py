@@ -1,0 +1,318 @@
+"""A scene solved into a folder: `path.bh` with every accepted state, `result.json`, and what else is asked for.
+
+A folder that holds a finished result keeps it until another run has reached its end, too: until then that run
+writes `path-unfinished.bh`, and `result-unfinished.json` if it ends early.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bh.analysis.contact import Contact, first_contact
+from bh.errors import InputError
+from bh.model.model import Model
+from bh.model.serialise import fingerprint
+from bh.paths.export import FOLDED, write_flat, write_state
+from bh.paths.path import Path as Trace
+from bh.paths.storage import PathFile, reading
+from bh.runtime.progress import ProgressMeter
+from bh.scene.load import Scene
+from bh.solving.follow import trace
+from meshes.io.export import replacing
+
+FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
+
+
+class Solved(NamedTuple):
+    """A path, the names of its files, whether it had been finished before, and its first self-contact if any."""
+
+    path: Trace
+    names: tuple[str, str]
+    before: bool
+    contact: Contact | None
+
+
+def solve(
+    scene: Scene, folder: Path, *, resume: bool = False, progress: bool | ProgressMeter = False
+) -> Solved:
+    """Trace a scene into a folder, which is made if need be.
+
+    Pictures, series and FOLD files that `bh run` has written there of other states are removed.
+
+    Args:
+        resume: go on from the states in the folder.
+        progress: as for `bh.trace`.
+
+    Raises:
+        InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
+            described; a folder that was made for the run is taken away again if nothing came of it.
+    """
+    names = _names(folder, scene.model, resume)
+    made = _make(folder)
+    file = folder / names[0]
+    before = resume and _is_whole(file, scene.model)
+    if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
+        (folder / names[1]).unlink(missing_ok=True)
+    try:
+        path = trace(
+            scene.model, progress=progress, file=file, resume=resume, accuracy=scene.accuracy,
+            symmetry=scene.symmetry,
+        )  # fmt: skip
+    except (InputError, KeyboardInterrupt):
+        if not resume and not holds_states(file):
+            _take_back(file, made)
+        raise
+    clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
+    if path.outcome == "reached":
+        if names == UNFINISHED:
+            _move(file, folder / FINISHED[0])
+        names = FINISHED
+    contact = first_contact(path)
+    text = json.dumps(result(path, scene, contact), indent=2, allow_nan=False) + "\n"
+    with replacing(folder / names[1]) as draft:
+        draft.write_text(text, encoding="utf-8")
+    if not before:
+        remove_extras(folder, "-unfinished" if names == UNFINISHED else "")
+    if names == FINISHED and clear:
+        for name in UNFINISHED:
+            (folder / name).unlink(missing_ok=True)
+        remove_extras(folder, "-unfinished")
+    return Solved(path, names, before, contact)
+
+
+def _is_whole(file: Path, model: Model) -> bool:
+    """True if all steps of the model are reached in a path file."""
+    with contextlib.closing(PathFile.open(file)) as stored, reading(file):
+        outcomes = [outcome for outcome, *_ in stored.steps().values()]
+    return outcomes == ["reached"] * len(model.steps)
+
+
+def path_file(folder: Path) -> Path:
+    """The path file in the output folder of a run.
+
+    Raises:
+        InputError: there is none.
+    """
+    for name, _ in (FINISHED, UNFINISHED):
+        if (folder / name).is_file():
+            return folder / name
+    raise InputError(f"there is no {FINISHED[0]} in '{folder}'; give the output folder of `bh run`")
+
+
+def holds_states(folder_or_file: Path) -> bool:
+    """True if a path file (or one in a folder) has a state to go on from."""
+    files = [folder_or_file]
+    if folder_or_file.is_dir():
+        files = [folder_or_file / name for name, _ in (UNFINISHED, FINISHED)]
+    for file in files:
+        with (
+            contextlib.suppress(InputError),
+            contextlib.closing(PathFile.open(file)) as stored,
+            reading(file),
+        ):
+            if next(stored.states(), None) is not None:
+                return True
+    return False
+
+
+def _names(folder: Path, model: Model, resume: bool) -> tuple[str, str]:
+    """Names of the path and the result that a run writes.
+
+    Raises:
+        InputError: there is nothing to resume.
+    """
+    if not resume:
+        return UNFINISHED if _is_finished(folder) else FINISHED
+    found = [names for names in (UNFINISHED, FINISHED) if (folder / names[0]).is_file()]
+    if not found:
+        raise InputError(f"there is no {FINISHED[0]} in '{folder}' to go on from; run without --resume")
+    wanted = fingerprint(model)
+    for names in found:
+        place = folder / names[0]
+        with contextlib.closing(PathFile.open(place)) as file, reading(place):
+            if file.meta()["provenance"]["input"] == wanted:
+                return names
+    return found[0]  # of another scene, as `trace` will say
+
+
+def _is_finished(folder: Path) -> bool:
+    try:
+        result = json.loads((folder / FINISHED[1]).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(result, dict) and result.get("outcome") == "reached"
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make the folder and what is missing above it; returns what was made, the deepest last.
+
+    Raises:
+        InputError: it cannot be made or written to; then nothing is left behind.
+    """
+    made: list[Path] = []
+    try:
+        for place in (*reversed(folder.parents), folder):
+            if not place.exists():
+                place.mkdir()
+                made.append(place)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (OSError, ValueError) as error:
+        _take_back(None, made)
+        why = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"the output folder '{folder}' cannot be written ({why}); choose another with -o"
+        ) from error
+    return made
+
+
+def _take_back(file: Path | None, made: Sequence[Path]) -> None:
+    """Remove a file and the folders that were made for it, as far as nothing else is in them."""
+    with contextlib.suppress(OSError):
+        if file is not None:
+            file.unlink(missing_ok=True)
+        for place in reversed(made):
+            place.rmdir()
+
+
+def _move(file: Path, place: Path) -> None:
+    # a journal that a killed run left there belongs to the file that goes
+    place.with_name(place.name + "-journal").unlink(missing_ok=True)
+    os.replace(file, place)
+
+
+def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, Any]:
+    """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact."""
+    model = path.model
+    mesh, last = model.mesh, path[-1]
+    folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
+    steps = []
+    for number in range(len(model.steps)):
+        records = [record for record in path.records if record.step == number]
+        tried = number < len(path.steps)
+        steps.append(
+            {
+                "outcome": path.steps[number].outcome if tried else "not tried",
+                "reason": path.steps[number].reason if tried else "an earlier step ended early",
+                "states": len(records),
+                "iterations": sum(record.iterations for record in records),
+            }
+        )
+    return {
+        "outcome": path.outcome,
+        "reason": path.reason,
+        "stable": path.stable,
+        "remarks": path.remarks,
+        "critical_points": [
+            {
+                "step": step,
+                "kind": c.kind,
+                "lambda": c.lam,
+                "error": c.error,
+                "negative_modes": list(c.negative),
+            }
+            for step, c in path.critical_points
+        ],
+        "energy": {kind: _number(value) for kind, value in last.energy.as_dict().items()},
+        "lock_energy": _number(last.energy.lock),
+        "fold_angle": {
+            crease: {"mean": _number(a.mean()), "min": _number(a.min()), "max": _number(a.max())}
+            for crease, a in folds.items()
+            if len(a)
+        },
+        "self_contact": _contact(path, contact),
+        "steps": steps,
+        "iterations": path.iterations,
+        "wall_time_s": path.wall_time_s,
+        "unknowns": path.unknowns,
+        "mesh": {
+            "nodes": len(mesh.points),
+            "triangles": len(mesh.triangles),
+            "aspect_ratio": _number(mesh.aspect_ratio),
+        },
+        "formulation": model.formulation,
+        "accuracy": path.accuracy.as_dict() if path.accuracy is not None else None,
+        "versions": path.provenance["versions"],
+        "input": path.provenance["input"],
+        "scene": str(scene.source),
+    }
+
+
+def _contact(path: Trace, contact: Contact | None) -> dict[str, Any]:
+    """Whether the sheet passes through itself, and where first; of very many triangle pairs the first hundred."""
+    found: dict[str, Any] = {"found": contact is not None, "states": len(path)}
+    if contact is not None:
+        found |= {
+            "about": "reported, not prevented: from this state on the sheet passes through itself",
+            "state": contact.state,
+            "step": contact.step,
+            "lambda": contact.lam,
+            "panels": [list(pair) for pair in contact.panels],
+            "triangle_pairs": len(contact.triangles),
+            "triangles": contact.triangles[:100].tolist(),
+        }
+    return found
+
+
+def _number(value: float) -> float | None:
+    """A number that JSON can hold; there is none for nan."""
+    return float(value) if abs(value) < float("inf") else None
+
+
+def remove_extras(folder: Path, mark: str) -> None:
+    """Remove what `extras` has written for another run, as far as it can be removed; nothing else."""
+    with contextlib.suppress(OSError):
+        for name in (f"folded{mark}.png", f"path{mark}.pvd", *(f"folded{mark}{suffix}" for suffix in FOLDED)):
+            (folder / name).unlink(missing_ok=True)
+        for file in (folder / f"path{mark}").glob("[0-9][0-9][0-9][0-9]*.vtu"):
+            file.unlink()
+        if (folder / f"path{mark}").is_dir():
+            (folder / f"path{mark}").rmdir()
+
+
+def extras(
+    path: Trace, scene: Scene, folder: Path, pictures: bool, vtu: bool
+) -> dict[str, Callable[[], Any]]:
+    """What is written on request beside the result, by name (marked where a finished result is kept)."""
+    mark = "-unfinished" if path.outcome != "reached" and _is_finished(folder) else ""
+
+    def draw() -> None:
+        from bh.plotting import picture
+
+        picture(path[-1], folder / f"folded{mark}.png")
+
+    def series() -> None:
+        from bh.plotting import export_series
+
+        export_series(path, folder, f"path{mark}")
+
+    def fold() -> None:
+        from meshes.io import write_fold
+
+        mesh, last = path.model.mesh, path[-1]
+        angles = np.zeros(len(mesh.topology.edges))
+        angles[mesh.topology.hinge_edges] = np.pi - last.dihedral_angles
+        frame = ("folded", last.points, angles)
+        write_fold(folder / f"folded{mark}.fold", mesh, frames=[frame], title=scene.name)
+
+    wanted = {
+        f"folded{mark}.png": (draw, pictures or scene.outputs.pictures),
+        f"path{mark}.pvd": (series, vtu or scene.outputs.vtu),
+        f"folded{mark}.fold": (fold, scene.outputs.fold),
+    }
+    files: dict[str, Callable[[], Any]] = {name: write for name, (write, asked) in wanted.items() if asked}
+    for suffix in scene.outputs.folded:
+        name = f"folded{mark}.{suffix}"
+        files[name] = partial(write_state, folder / name, [path[-1]], scene.name)
+    for suffix in scene.outputs.flat:
+        files[f"flat.{suffix}"] = partial(write_flat, folder / f"flat.{suffix}", scene.model.mesh)
+    return files

@@ -1,0 +1,53 @@
+"""Compile (or load from the cache) every kernel, so that a user's first run does not wait: `python -m bh.commands.warm_up`."""
+
+from __future__ import annotations
+
+import math
+
+import meshes
+from bh.analysis.contact import candidates
+from bh.analysis.triangles import intersecting
+from bh.formulations.registry import names
+from bh.model.model import Model, Sheet
+from bh.paths.path import Path
+from bh.solvers.linear import linear_response
+from bh.solving.follow import trace
+
+
+def warm_up() -> None:
+    """Fold a tiny sheet in every way that has kernels of its own, in every formulation that is installed."""
+    mesh = meshes.structured(meshes.annulus_sector(10.0, 1.0, 0.3), along=2)
+    for formulation in names():
+        path = _fold(Model(mesh, Sheet(E=1.0, t=0.1), formulation=formulation))
+    clamped = Model(mesh, Sheet(E=1.0, t=0.1), formulation="consistent").support(
+        "edge:start", "xyz", clamp=True
+    )
+    trace(clamped.fold("crease", rest=3.0, Lstar=1.0))
+    intersecting(path[-1].points, mesh.triangles, candidates(path[-1].points, mesh.triangles), 1e-9)
+    wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
+    system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0))._system(0)
+    now = system.evaluate(system.start(), 0.0)
+    matrix = system.tangent(system.start(), 0.0, now.forces)
+    matrix @ matrix.factorise().solve(now.residual)
+
+
+def _fold(sheet: Model) -> Path:
+    path = trace(sheet.fold("crease", to=math.pi - 0.1))
+    trace(
+        sheet.support("edge:start", "xyz")
+        .support("edge:end", [[0.0, 1.0, 1.0]])
+        .fold("crease", rest=3.0, Lstar=1.0)
+    )
+    system = path._system(0)
+    linear_response(system, path.records[0].q)
+    displaced = (
+        sheet.support("edge:start", "xyz").support("edge:inner", "z").displace("corner:outer-end", "z", 0.01)
+    )
+    system = trace(displaced)._system(0)
+    system.control_rate(system.start(), 0.0)
+    return path
+
+
+if __name__ == "__main__":
+    warm_up()
+    print("kernels are compiled and cached")

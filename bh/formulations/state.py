@@ -1,0 +1,118 @@
+"""One equilibrium state of a sheet, as the user reads it. The same names for every formulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.loading.load_step import crease_hinges
+from meshes import SheetMesh
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Elastic energy by kind, N mm (Eq. 3.1): bars, bending hinges, spring creases.
+
+    Attributes:
+        lock: what the locks of hinges hold that are about to close (`Model.hinge_lock`), zero otherwise. It is no part
+            of the theory and of none of the others, but of what the actuation has done as work:
+            work = change of (total + lock).
+    """
+
+    stretching: float
+    bending: float
+    folding: float
+    lock: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Elastic energy of the sheet without the locks, N mm (Eq. 3.1)."""
+        return self.stretching + self.bending + self.folding
+
+    def as_dict(self) -> dict[str, float]:
+        """Elastic energies by kind and their total, N mm."""
+        return {
+            "stretching": self.stretching,
+            "bending": self.bending,
+            "folding": self.folding,
+            "total": self.total,
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class State:
+    """A solved state.
+
+    Attributes:
+        mesh: the stress-free sheet.
+        step: index of the step, from 0; `lam` its control parameter in [0, 1].
+        points: (n, 3) node positions, mm.
+        energy: elastic energies, N mm.
+        dihedral_angles: (m,) at every hinge of `mesh.topology.hinges`, rad in [0, 2 pi]; a closed one reads 0 or 2 pi.
+        energy_density: by kind ("stretching", "bending", "folding") energy an area of each triangle, N mm / mm^2.
+        reactions: (n, 3) forces that supports exert on the sheet, N; zero at free nodes.
+        crease_moments: (m,) moment a length carried by each crease hinge, N mm / mm, nan off creases; positive
+            where it works to open the dihedral angle below the sheet against the crease. Near closed with what the
+            lock carries (`Model.hinge_lock`).
+        pressing: force of every `Bar` of the step on the sheet, (3,), N, by its name.
+        stable: True if the tangent is positive definite there (False: not, None: not known).
+    """
+
+    mesh: SheetMesh
+    step: int
+    lam: float
+    points: Array
+    energy: Energy
+    dihedral_angles: Array
+    energy_density: Mapping[str, Array]
+    reactions: Array
+    crease_moments: Array
+    stable: bool | None = None
+    pressing: Mapping[str, Array] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """One line: "State(step 0, lambda 1, energy 0.0534 N mm, stable)"."""
+        stable = {True: ", stable", False: ", not stable", None: ""}[self.stable]
+        return f"State(step {self.step}, lambda {self.lam:.4g}, energy {self.energy.total:.4g} N mm{stable})"
+
+    def dihedral(self, crease: str) -> Array:
+        """Dihedral angles along a crease, one an edge in order, rad."""
+        return self.dihedral_angles[crease_hinges(self.mesh, crease)]
+
+    def fold_angle(self, crease: str) -> Array:
+        """Fold angles pi - phi along a crease, one an edge in order, rad; mountain positive."""
+        return np.pi - self.dihedral(crease)
+
+    def crease_moment(self, crease: str) -> Array:
+        """Moment a length along a crease, one an edge in order, N mm / mm."""
+        return self.crease_moments[crease_hinges(self.mesh, crease)]
+
+    def crease_points(self, crease: str) -> Array:
+        """(k, 3) deformed nodes along a crease, in order, mm."""
+        return self.points[self.mesh.nodes(f"crease:{crease}")]
+
+    def displacement(self, at: str = "all") -> Array:
+        """(k, 3) displacements of the nodes of a place, mm."""
+        nodes = self.mesh.nodes(at)
+        return self.points[nodes] - self.mesh.points[nodes]
+
+    def reaction(self, at: str = "all") -> Array:
+        """(3,) resultant of the reactions at a place, N."""
+        total: Array = self.reactions[self.mesh.nodes(at)].sum(axis=0)
+        return total
+
+    def nodal_energy_density(self, kind: str) -> Array:
+        """(n,) energy density of a kind, averaged from the triangles to nodes by area, N mm / mm^2."""
+        mesh = self.mesh
+        density = self.energy_density[kind]
+        weight = np.zeros(len(mesh.points))
+        value = np.zeros(len(mesh.points))
+        for corner in range(3):
+            np.add.at(weight, mesh.triangles[:, corner], mesh.areas)
+            np.add.at(value, mesh.triangles[:, corner], mesh.areas * density)
+        return value / weight

@@ -1,0 +1,1 @@
+"""The source's formulation: independent bars and hinges."""

@@ -1,0 +1,120 @@
+"""Element arrays of a sheet of bars and hinges for one step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.loading.load_step import StepProgram
+from bh.mechanics.bars_and_hinges.stiffness import (
+    bending_hinge_stiffness,
+    folding_hinge_stiffness,
+    sheet_bars,
+)
+from bh.mechanics.shared.hinge_lock import ZONE, lock_terms, until_closed
+from bh.mechanics.shared.kinematics import dihedral_angles
+from bh.model.actuations import Ramp
+from bh.model.laws import HELD, SHEET, SPRING
+from bh.model.model import Model
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+PENALTY = 300.0  # of a held crease, in parts of E t h^2 with h the height of its wings
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Element arrays of one step. Hinges are ordered: bending, spring creases, held creases.
+
+    `source` (h,) is the row of `mesh.topology.hinges` of each hinge, `lock` (h,) the stiffness of its lock. Held
+    creases have no stiffness (their moment is a multiplier); `penalty` (held,) is their weight in the tangent,
+    N mm / rad.
+    """
+
+    bars: Ints
+    bar_length: Array
+    bar_stiffness: Array
+    hinges: Ints
+    source: Ints
+    hinge_stiffness: Array
+    lock: Array
+    rest: Ramp
+    couple: Ramp
+    bending: int
+    spring: int
+    held: int
+    penalty: Array
+    green: bool = False
+
+
+def sheet_elements(model: Model, program: StepProgram, held_start: Array, moment_start: Array) -> Elements:
+    """Element stiffness of a model in one step; `held_start` and `moment_start` (m,) are what it begins with.
+
+    Dihedral angles (rad) and total moments (N mm) of all hinges; moments are zero off creases.
+    """
+    mesh, sheet = model.mesh, model.sheet
+    topology = mesh.topology
+    points = mesh.points
+    edge_vector = points[topology.edges[:, 1]] - points[topology.edges[:, 0]]
+    lengths = np.linalg.norm(edge_vector, axis=1)
+    sides = topology.edge_triangles
+    areas = mesh.areas[sides[:, 0]] + np.where(sides[:, 1] >= 0, mesh.areas[sides[:, 1]], 0.0)
+    k_bar = sheet_bars(sheet.E, sheet.t, lengths, areas, mesh.spans)
+
+    hinge_length, hinge_area = lengths[topology.hinge_edges], areas[topology.hinge_edges]
+    groups = [np.flatnonzero(program.law == law) for law in (SHEET, SPRING, HELD)]
+    source = np.concatenate(groups)
+    reference = dihedral_angles(points, topology.hinges)
+    k_bend = bending_hinge_stiffness(sheet.E, sheet.t, hinge_length, hinge_area)
+    k_fold = folding_hinge_stiffness(program.stiffness, hinge_length)
+    if model.stiffness is not None:
+        k_bar = model.stiffness.bars
+        k_bend = k_fold = model.stiffness.hinges
+    # augmentation well above what the bars give a wing
+    gamma = PENALTY * sheet.E * sheet.t * (0.5 * hinge_area / hinge_length) ** 2
+    stiffness = np.select([program.law == SHEET, program.law == SPRING], [k_bend, k_fold], 0.0)
+    lock = _lock_stiffness(model, program, stiffness, k_bend, reference)
+    imposed = program.held_angles(held_start)
+    law = program.law[source]
+
+    def ramp(bend: Array, spring: Array, held: Array) -> Array:
+        return np.where(law == SHEET, bend[source], np.where(law == SPRING, spring[source], held[source]))
+
+    # a released crease begins with the moment that it has; what its lock and its couple take of it is not the spring's
+    of_spring = moment_start - lock_terms(held_start, lock)[:, 1] - program.moment.start * hinge_length
+    rest_from = np.where(
+        np.isnan(program.rest.start), held_start - of_spring / _nonzero(k_fold), program.rest.start
+    )
+    rest = Ramp(ramp(reference, rest_from, imposed.start), ramp(reference, program.rest.end, imposed.end))
+    scale = np.where(law == HELD, 0.0, hinge_length[source])
+    couple = Ramp(program.moment.start[source] * scale, program.moment.end[source] * scale)
+    return Elements(
+        bars=topology.edges, bar_length=lengths, bar_stiffness=k_bar,
+        hinges=np.ascontiguousarray(topology.hinges[source]), source=source,
+        hinge_stiffness=stiffness[source], lock=lock[source], rest=rest, couple=couple,
+        bending=len(groups[0]), spring=len(groups[1]), held=len(groups[2]), penalty=gamma[groups[2]],
+        green=model.stiffness is not None and model.stiffness.green,
+    )  # fmt: skip
+
+
+def _lock_stiffness(
+    model: Model, program: StepProgram, stiffness: Array, sheet: Array, reference: Array
+) -> Array:
+    """(m,) stiffness of the locks, N mm / rad: the hinge's own, or the sheet's at that edge where it is larger.
+
+    So a soft crease stops as hard as the sheet beside it. `sheet` (m,) is Eq. 3.11 for all edges; where stiffness is
+    given, the mean of all hinges stands for it. Held creases follow their angle exactly and have none, and neither
+    have hinges that are made closed (their `reference` angle, rad, lies in the zone).
+    """
+    if not model.hinge_lock or len(stiffness) == 0:
+        return np.zeros_like(stiffness)
+    if model.stiffness is not None:
+        sheet = np.full_like(stiffness, model.stiffness.hinges.mean())
+    without = (program.law == HELD) | (until_closed(reference) < ZONE)
+    return np.where(without, 0.0, np.maximum(stiffness, sheet))
+
+
+def _nonzero(stiffness: Array) -> Array:
+    return np.where(stiffness == 0.0, np.inf, stiffness)

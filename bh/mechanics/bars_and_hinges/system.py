@@ -1,0 +1,305 @@
+"""The system of bars and hinges for one step: energy, residual and tangent as functions of the unknowns."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from bh.formulations.state import State
+from bh.loading.load_step import StepProgram
+from bh.mechanics.bars_and_hinges.derivatives import BarHingeDesign
+from bh.mechanics.bars_and_hinges.elements import sheet_elements
+from bh.mechanics.shared.assembly import (
+    Pattern,
+    build_pattern,
+    nodal_forces,
+    predicted_forces,
+    tangent_times,
+    tangent_values,
+)
+from bh.mechanics.shared.base_system import SupportedSheet
+from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
+from bh.model.model import Model
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
+from bh.solvers.system import Evaluation
+from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.loading.symmetry import Mirror
+
+Array = NDArray[np.float64]
+COMPLIANCE = 1e-9  # of a held crease, in parts of 1 / gamma
+ROUNDING = 8.0 * np.finfo(float).eps
+
+
+class BarsAndHingesSystem(SupportedSheet):
+    """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then held moments (N mm).
+
+    With a `plane` it is that of the half of a symmetric sheet (`bh.mechanics.shared.mirrored`).
+    """
+
+    def __init__(
+        self, model: Model, program: StepProgram, start: State | None, plane: Mirror | None = None
+    ) -> None:
+        mesh = model.mesh
+        if len(program.constraints.clamped):
+            raise ModelError(
+                "bars and hinges have no slope at an edge to clamp; take formulation consistent, or hold the next row"
+            )
+        self.reference = mesh.points
+        start_points = mesh.points if start is None else start.points
+        held_start = dihedral_angles(start_points, mesh.topology.hinges)
+        edges = mesh.points[mesh.topology.hinges[:, 1:3]]
+        moments = np.zeros(len(held_start)) if start is None else np.nan_to_num(start.crease_moments)
+        moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+        self.elements = sheet_elements(model, program, held_start, moments)
+        if plane is not None:
+            from bh.mechanics.shared.mirrored import half_elements, half_program
+
+            self.elements = half_elements(self.elements, plane)
+            program, moments = half_program(program, plane), plane.hinge_weight * moments
+        super().__init__(model, program, start, plane)
+        self.primal = self.moving
+        self.size = self.primal + self.elements.held
+        self._bar_scale = model.sheet.E * model.sheet.t
+        self._moments_start = moments
+        self._d_bar = np.empty((len(self.elements.bars), 3))
+        self._g_hinge = np.empty((len(self.elements.hinges), 12))
+        self._k_hinge = np.empty(len(self.elements.hinges))  # with the locks, as of the last tangent
+
+    # ------------------------------------------------------------------------------- unknowns and positions
+
+    @cached_property
+    def energy_scale(self) -> float:
+        return 0.5 * float(self.elements.hinge_stiffness.sum())
+
+    def start(self) -> Array:
+        """Unknowns of the state that the step begins with."""
+        q = np.zeros(self.size)
+        q[: self.primal] = self.displacements.start()
+        if self.elements.held:
+            q[self.primal :] = self._moments_start[self.elements.source[-self.elements.held :]]
+        return q
+
+    @cached_property
+    def hinge_lengths(self) -> Array:
+        ends = self.reference[self.elements.hinges[:, 1:3]]
+        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+    # ------------------------------------------------------------------------------- the System protocol
+
+    def evaluate(self, q: Array, lam: float) -> Evaluation:
+        x = self.positions(q, lam)
+        energy, size, f, forces, turn = self.internal_forces(x, q, lam)
+        load = (1.0 - lam) * self.force.start + lam * self.force.end
+        energy -= float(np.vdot(load, x - self.reference))
+        f -= load
+        if self.touching is not None:
+            energy += self.touching.forces(x, lam, f)
+        residual = np.empty(self.size)
+        residual[: self.primal] = self.displacements.components(f)
+        gap = penalty = 0.0
+        if self.elements.held:
+            missed = turn[-self.elements.held :]
+            residual[self.primal :] = missed - self._compliance * q[self.primal :]
+            energy -= 0.5 * float(self._compliance @ q[self.primal :] ** 2)
+            penalty = 0.5 * float(self.elements.penalty @ missed**2)
+            # a held angle is to be met to 1e-12 rad: what is left of it, times the stiffness of the bars, is a moment
+            gap = 1e4 * max(float(np.abs(residual[self.primal :]).max()) - ROUNDING, 0.0)
+            # the compliance is no excuse for an angle that is not met
+            gap = max(gap, 10.0 * float(np.abs(missed).max()))
+        return Evaluation(energy, residual, self._imbalance(residual, size, load, x, gap), forces, penalty)
+
+    def _imbalance(self, residual: Array, size: float, load: Array, x: Array, gap: float) -> float:
+        largest = float(np.abs(residual[: self.primal]).max(initial=0.0))
+        # coordinates are rounded to eps |x| and angles to eps, which the stiffest elements turn into forces that
+        # nobody can balance
+        floor = ROUNDING * (self._stiffest_bar * float(np.abs(x).max()) + self._stiffest_hinge)
+        if largest <= floor:
+            return gap
+        size = max(size, float(np.abs(load).max(initial=0.0)), 1e-300)
+        return max((largest - floor) / size, gap)
+
+    @cached_property
+    def _stiffest_bar(self) -> float:
+        return float(self.elements.bar_stiffness.max())
+
+    @cached_property
+    def _stiffest_hinge(self) -> float:
+        """Largest stiffness over height of a wing, N / rad."""
+        heights = 2.0 * self.mesh.areas.min() / self.hinge_lengths if len(self.hinge_lengths) else np.ones(1)
+        return float((self.elements.hinge_stiffness / heights).max(initial=0.0))
+
+    def internal_forces(self, x: Array, q: Array, lam: float) -> tuple[float, float, Array, Array, Array]:
+        """Energy, typical element force, nodal forces (n, 3), element forces (bars, then hinges) and turns (h,), rad.
+
+        The turn of a hinge is its dihedral angle less the one at rest.
+        """
+        e = self.elements
+        f = np.zeros_like(x)
+        turn = np.empty(len(e.hinges))
+        forces = np.empty(len(e.bars) + len(e.hinges))
+        energy, size = nodal_forces(
+            x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, e.hinge_stiffness, e.lock,
+            e.rest.at(lam), self.couple(q, lam), f, forces[: len(e.bars)], forces[len(e.bars) :], turn,
+        )  # fmt: skip
+        return energy, size, f, forces, turn
+
+    def couple(self, q: Array, lam: float) -> Array:
+        """(h,) couples on the hinges, N mm: applied moments, and the multipliers of held creases."""
+        couple = self.elements.couple.at(lam)
+        if self.elements.held:
+            couple[-self.elements.held :] = q[self.primal :]
+        return couple
+
+    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+        e, pattern = self.elements, self._pattern
+        bars = len(e.bars)
+        x = self.positions(q, lam)
+        data = np.zeros(pattern.size)
+        tangent_values(
+            x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0],
+            e.hinges, self._augmented_stiffness, e.lock, forces[bars:], pattern.slots[1],
+            self.constraints.frame_of, self.constraints.frames, data, self._d_bar, self._g_hinge, self._k_hinge,
+        )  # fmt: skip
+        matrix: Matrix
+        if self.touching is not None:
+            self.touching.tangent(
+                x, lam, self.constraints.frame_of, self.constraints.frames, pattern.slots[-1], data
+            )
+        if self.constraints.rigid_body:
+            Z = self.displacements.rigid(x)
+            ground = self._ground(Z, data)
+            matrix = FreeBodyMatrix(pattern.matrix(data), Z, *ground, self.displacements.weight)
+        else:
+            matrix = pattern.matrix(data)
+        if not e.held:
+            return matrix
+        return MultiplierMatrix(matrix, self._constraint_rows(), e.penalty, self._compliance)
+
+    def predicted_forces(self, forces: Array, dq: Array) -> Array:
+        e = self.elements
+        bars = len(e.bars)
+        out = np.empty_like(forces)
+        predicted_forces(
+            e.bars, e.bar_stiffness, forces[:bars], self._d_bar, e.hinges, self._k_hinge, forces[bars:],
+            self._g_hinge, self.displacements.vectors(dq[: self.primal]), out[:bars], out[bars:],
+        )  # fmt: skip
+        if e.held:
+            out[-e.held :] = forces[-e.held :] + dq[self.primal :]
+        return out
+
+    def control_rate(self, q: Array, lam: float) -> Array:
+        e = self.elements
+        x = self.positions(q, lam)
+        _, _, _, forces, _ = self.internal_forces(x, q, lam)
+        g = dihedral_gradients(x, e.hinges)
+        moment_rate = e.couple.rate - e.hinge_stiffness * e.rest.rate
+        out = -self.force.rate.copy()
+        np.add.at(out, e.hinges, (moment_rate[:, None] * g).reshape(-1, 4, 3))
+        moving = self.displacements.prescribed_motion
+        if moving.any():
+            out += self._tangent_times(x, moving, forces)
+        if self.touching is not None:
+            self.touching.force_rates(x, moving, lam, 1.0, out)
+        rate = np.empty(self.size)
+        rate[: self.primal] = self.displacements.components(out)
+        if e.held:
+            turn = np.einsum("hpc,hpc->h", g.reshape(-1, 4, 3), moving[e.hinges]) - e.rest.rate
+            rate[self.primal :] = turn[-e.held :]
+        return rate
+
+    def power(self, q: Array, lam: float) -> float:
+        e = self.elements
+        x = self.positions(q, lam)
+        _, _, f, _, turn = self.internal_forces(x, q, lam)
+        moment = e.hinge_stiffness * turn + self.couple(q, lam)  # without the lock, which knows no rest angle
+        total = float(e.couple.rate @ turn - moment @ e.rest.rate)
+        total -= float(np.vdot(self.force.rate, x - self.reference))
+        if self.touching is not None:
+            total += self.touching.power(x, lam)
+            self.touching.forces(x, lam, f)
+        return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
+
+    def control_stiffness(self, q: Array, lam: float) -> float:
+        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        e = self.elements
+        x = self.positions(q, lam)
+        total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
+        moving = self.displacements.prescribed_motion
+        if moving.any():
+            _, _, _, forces, _ = self.internal_forces(x, q, lam)
+            out = self._tangent_times(x, moving, forces)
+            g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
+            turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
+            total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
+            total += 2.0 * float((e.couple.rate - e.hinge_stiffness * e.rest.rate) @ turn)
+        return total if self.touching is None else total + self.touching.control_stiffness(x, lam)
+
+    def design(self, q: Array, lam: float) -> BarHingeDesign:
+        """Derivatives with respect to element data at a state (`bh.sensitivities`)."""
+        return BarHingeDesign(self, q, lam)
+
+    def _tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
+        """Tangent of all elements times v (n, 3), in global axes and with no support left out."""
+        e, bars = self.elements, len(self.elements.bars)
+        out = np.zeros_like(x)
+        tangent_times(
+            x, v, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars],
+            e.hinges, e.hinge_stiffness, e.lock, forces[bars:], out,
+        )  # fmt: skip
+        return out
+
+    # ------------------------------------------------------------------------------- pattern, grounding, constraints
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        groups: tuple[Ints, ...] = (self.elements.bars, self.elements.hinges)
+        if self.constraints.rigid_body:
+            groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
+        if self.touching is not None:
+            groups += (self.mesh.triangles,)
+        number, groups = self.displacements.pattern_nodes(groups)
+        return build_pattern(number, groups, self.reference)
+
+    @cached_property
+    def _compliance(self) -> Array:
+        """Compliance of held creases, rad / (N mm): far below rounding of the angles at ordinary moments.
+
+        Where panels are rigid, a straight crease can carry moments that balance each other at no cost; it picks the
+        smallest ones.
+        """
+        return COMPLIANCE / self.elements.penalty
+
+    @cached_property
+    def _augmented_stiffness(self) -> Array:
+        e = self.elements
+        return np.concatenate((e.hinge_stiffness[: len(e.hinges) - e.held], e.penalty))
+
+    @cached_property
+    def _held_columns(self) -> Ints:
+        return self.displacements.number[self.elements.hinges[-self.elements.held :]].reshape(-1, 12)
+
+    def _constraint_rows(self) -> ConstraintRows:
+        g = self._g_hinge[-self.elements.held :]
+        if len(self.displacements.turned):
+            index = self.constraints.frame_of[self.elements.hinges[-self.elements.held :]]
+            axes = np.where((index >= 0)[..., None, None], self.constraints.frames[index], np.eye(3))
+            g = np.einsum("hpij,hpj->hpi", axes, g.reshape(-1, 4, 3)).reshape(-1, 12)
+        return ConstraintRows(g.copy(), self._held_columns, self.primal)
+
+    def _ground(self, Z: Array, data: Array) -> tuple[Ints, Array]:
+        """Add a stiffness against the rigid motions of one triangle; returns its unknowns and its matrix."""
+        number = self.displacements.ground_numbers
+        block = self.displacements.grounding(Z, self._bar_scale)
+        slots = self._pattern.slots[2][0]
+        values = block[np.tril_indices(9)]
+        keep = slots >= 0
+        np.add.at(data, slots[keep], values[keep])
+        inside = number >= 0
+        return number[inside], block[np.ix_(inside, inside)]

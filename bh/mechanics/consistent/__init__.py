@@ -1,0 +1,1 @@
+"""The consistent formulation: coupled bars and coupled hinges, which converge to Kirchhoff-Love theory."""

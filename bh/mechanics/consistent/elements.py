@@ -1,0 +1,272 @@
+"""Element arrays of the consistent formulation in one step: triangles, patches, edge rotations, crease springs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from bh.loading.load_step import StepProgram
+from bh.materials import Constant, LinearElastic, Material
+from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
+from bh.mechanics.consistent.bending import Bending
+from bh.mechanics.consistent.kernels import OWN, TURN
+from bh.mechanics.consistent.membrane import Measure, smoothed_strain
+from bh.mechanics.consistent.patches import (
+    Patches,
+    bending_matrices,
+    curvature_maps,
+    patches,
+    triangle_frames,
+)
+from bh.mechanics.consistent.stretching import Stretching
+from bh.mechanics.shared.hinge_lock import ZONE, until_closed
+from bh.mechanics.shared.kinematics import dihedral_angles
+from bh.model.actuations import Ramp
+from bh.model.laws import HELD, SHEET, SPRING
+from bh.model.model import Model
+from bh.solvers.matrices import reverse_cuthill_mckee
+from meshes import SheetMesh
+from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.loading.symmetry import Mirror
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+LINEAR = LinearElastic()
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentElements:
+    """Element arrays of one step: t triangles, c patches with a angles, h spring hinges.
+
+    Attributes:
+        members: (t,) which triangles of the mesh these are; triangles: (t, 3) nodes; edge k is opposite corner k.
+        heights: (t, 3) of the triangles on their edges in the stress-free sheet, mm.
+        stretching: cells of the membrane and their law; `bending` patches and theirs.
+        B_triangle: (t, 3, 3) energy of bending of a triangle by the angles at its edges, N mm.
+        patches: matrices and angles of the patches.
+        quad, ghost, place, rotation, column: of the angles, see `bh.mechanics.consistent.kernels`.
+        rest: (c, a) rest dihedral angles of TURN angles, rad.
+        nodes: (c, p) nodes of the matrix of a patch, then -1; `width` (c,) its number of rows, rotations included.
+        springs: (h,) rows of `mesh.topology.hinges`; `hinges` (h, 4) their nodes, `turns` (h, 2) their rotations.
+        spring_stiffness: (h,) N mm / rad; spring_rest, couple: (h,) rest angles (rad) and applied couples (N mm).
+        held: (m,) held dihedral angles at every hinge, rad; nan where it is not held.
+        lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at held ones.
+        rotations: how many there are.
+    """
+
+    members: Ints
+    triangles: Ints
+    heights: Array
+    stretching: Stretching
+    bending: Bending
+    B_triangle: Array
+    patches: Patches
+    quad: Ints
+    ghost: Array
+    place: Ints
+    rotation: Ints
+    column: Ints
+    rest: Ramp
+    nodes: Ints
+    width: Ints
+    springs: Ints
+    hinges: Ints
+    turns: Ints
+    spring_stiffness: Array
+    spring_rest: Ramp
+    couple: Ramp
+    held: Ramp
+    lock: Array
+    rotations: int
+
+
+def consistent_elements(
+    model: Model,
+    program: StepProgram,
+    held_start: Array,
+    moment_start: Array,
+    plane: Mirror | None = None,
+    measure: Measure = smoothed_strain,
+    material: Material = LINEAR,
+) -> ConsistentElements:
+    """Element arrays of a model in one step; `held_start` and `moment_start` (m,) are what its creases begin with.
+
+    Dihedral angles (rad) and total moments (N mm) of all hinges. With a `plane` they are those of the half of a
+    symmetric sheet (`bh.mechanics.shared.mirrored`). `measure` is what measures the strain of the `material`.
+
+    Raises:
+        ModelError: given element stiffness, or a couple on a crease that is no spring.
+    """
+    if model.stiffness is not None:
+        raise ModelError("given bar and hinge stiffness is of bars-and-hinges only; use that formulation")
+    mesh, sheet, law = model.mesh, model.sheet, program.law
+    _check_moments(mesh, program)
+    topology = mesh.topology
+    edges, areas = triangle_frames(mesh.points, mesh.triangles)
+    maps, of_curvature = curvature_maps(edges, areas), material.bending(sheet)
+    B = bending_matrices(maps, areas, of_curvature.moduli(np.zeros((1, 3)))[0])
+    clamped = np.zeros(len(topology.edges), dtype=bool)
+    clamped[topology.find_edges(program.constraints.clamped)] = True
+    spring = law == SPRING
+    part = None if plane is None else plane.triangle_weight
+    condense = isinstance(of_curvature, Constant)
+    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part, condense=condense)
+    if plane is not None:
+        from bh.mechanics.consistent.half import half_consistent, half_patches
+
+        joined = half_patches(joined, spring, plane)
+    rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
+    part_area = areas if part is None else part * areas
+    membrane, law_of_strain = measure(mesh, creased(mesh, law)), material.stretching(sheet)
+    quad, ghost = _quads(mesh, joined)
+    nodes, place = _rows(joined, quad)
+    has = rotation >= 0
+    in_nodes = 3 * (nodes >= 0).sum(axis=1)
+    column = np.where(has, in_nodes[:, None] + np.cumsum(has, axis=1) - 1, -1)
+    width = in_nodes + has.sum(axis=1)
+    # local axes are turned in blocks of three rows: there must be as many nodes, be they none
+    nodes = np.pad(nodes, ((0, 0), (0, -(-int(width.max()) // 3) - nodes.shape[1])), constant_values=-1)
+
+    reference = dihedral_angles(mesh.points, topology.hinges)
+    held = program.held_angles(held_start)
+    rest = [
+        np.append(np.where(law == HELD, at, reference), np.pi)[joined.hinge] for at in (held.start, held.end)
+    ]
+    springs = np.flatnonzero(spring)
+    ends = mesh.points[topology.hinges[:, 1:3]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    k_fold = folding_hinge_stiffness(program.stiffness, length)[springs]
+    couple = Ramp((program.moment.start * length)[springs], (program.moment.end * length)[springs])
+    # a released crease goes on with its moment, of which the couple carries its part
+    carried = moment_start[springs] - couple.start
+    begin = held_start[springs] - carried / np.where(k_fold == 0.0, np.inf, k_fold)
+    begin = np.where(np.isnan(program.rest.start[springs]), begin, program.rest.start[springs])
+    whole = ConsistentElements(
+        members=np.arange(len(mesh.triangles)), triangles=mesh.triangles,
+        heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2), stretching=Stretching(membrane, law_of_strain),
+        bending=Bending(joined, of_curvature, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
+        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
+        width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
+        spring_stiffness=k_fold, spring_rest=Ramp(begin, program.rest.end[springs]),
+        couple=couple,
+        held=Ramp(*(np.where(law == HELD, at, np.nan) for at in (held.start, held.end))),
+        lock=lock_stiffness(model, program), rotations=rotations,
+    )  # fmt: skip
+    return whole if plane is None else half_consistent(whole, plane)
+
+
+def creased(mesh: SheetMesh, law: Ints) -> Bools:
+    """(m,) hinges that are drawn as creases or fold in this step: the strain may jump there, whatever a step does."""
+    topology = mesh.topology
+    out = law != SHEET
+    for name in mesh.creases:
+        hinge = topology.edge_hinges[topology.find_edges(mesh.crease_edges(name))]
+        out[hinge[hinge >= 0]] = True
+    return out
+
+
+def lock_stiffness(model: Model, program: StepProgram) -> Array:
+    """(m,) stiffness of the locks, N mm / rad: the spring's own or that of uncreased sheet (Eq. 3.11), the larger one.
+
+    Held creases follow their angle and have none, nor have hinges that are made closed.
+    """
+    mesh, topology = model.mesh, model.mesh.topology
+    if not model.hinge_lock or len(topology.hinges) == 0:
+        return np.zeros(len(topology.hinges))
+    ends = mesh.points[topology.hinges[:, 1:3]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    areas = mesh.areas[topology.edge_triangles[topology.hinge_edges]].sum(axis=1)
+    sheet = bending_hinge_stiffness(model.sheet.E, model.sheet.t, length, areas)
+    spring = np.where(program.law == SPRING, folding_hinge_stiffness(program.stiffness, length), 0.0)
+    without = (program.law == HELD) | (until_closed(dihedral_angles(mesh.points, topology.hinges)) < ZONE)
+    return np.where(without, 0.0, np.maximum(spring, sheet))
+
+
+def _check_moments(mesh: SheetMesh, program: StepProgram) -> None:
+    """Opposite couples on the two sides of an uncreased sheet do no work: its sides turn together."""
+    idle = (program.law == SHEET) & ((program.moment.start != 0.0) | (program.moment.end != 0.0))
+    if idle.any():
+        edge = mesh.topology.hinges[int(np.argmax(idle)), 1:3].tolist()
+        raise ModelError(
+            f"the moment at edge {edge} acts on a crease that is ordinary sheet, which cannot fold; "
+            "give the crease a stiffness or Lstar"
+        )
+
+
+def triangle_ranks(mesh: SheetMesh) -> Array:
+    """(t,) mean place of the corners in a narrow order of the nodes."""
+    hinges = mesh.topology.hinges
+    pairs = [(i, j) for i in range(4) for j in range(i)]
+    rows = np.concatenate([mesh.triangles[:, 0], *(hinges[:, i] for i, _ in pairs)])
+    columns = np.concatenate([mesh.triangles[:, 1], *(hinges[:, j] for _, j in pairs)])
+    order, _ = reverse_cuthill_mckee(rows, columns, len(mesh.points))
+    position = np.empty(len(order))
+    position[order] = np.arange(len(order))
+    return np.asarray(position[mesh.triangles].mean(axis=1))
+
+
+def _number_rotations(
+    mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None
+) -> tuple[Ints, Ints, int]:
+    """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
+
+    There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that keeps
+    its own; but one for a spring in the plane
+    of a symmetric sheet, and none for what lies outside of its half.
+    """
+    count = np.ones(len(spring), dtype=np.int64)
+    two_sided = spring.copy()
+    if plane is not None:
+        two_sided &= ~plane.hinge_inside
+        count[plane.hinge_weight == 0.0] = 0
+    count[two_sided & (count > 0)] = 2
+    count[joined.hinge[joined.inner]] = 0
+    first = np.cumsum(count) - count
+    both = np.column_stack((first, first + two_sided))
+    triangles = mesh.topology.edge_triangles[mesh.topology.hinge_edges, 0]
+    side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
+    has = (joined.hinge >= 0) & ~joined.inner
+    rotation = np.where(has, both[joined.hinge, side], -1)
+    free = (joined.hinge < 0) & (joined.kind == OWN)
+    rotation[free] = count.sum() + np.arange(free.sum())
+    return rotation, both, int(count.sum() + free.sum())
+
+
+def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
+    """Nodes (c, a, 4) of TURN angles, and ghosts (c, a, 3) of clamps: where the sheet would go on, mm."""
+    quad = np.zeros((*joined.kind.shape, 4), dtype=np.int64)
+    ghost = np.zeros((*joined.kind.shape, 3))
+    turning = (joined.kind == TURN) & (joined.hinge >= 0)
+    quad[turning] = mesh.topology.hinges[joined.hinge[turning]]
+    clamp = (joined.kind == TURN) & (joined.hinge < 0)
+    triangle, k = joined.half_edge[clamp] // 3, joined.half_edge[clamp] % 3
+    # corner, its opposite edge counter-clockwise, and a ghost that moves with the edge
+    corners = np.column_stack((k, (k + 1) % 3, (k + 2) % 3, (k + 1) % 3))
+    quad[clamp] = np.take_along_axis(mesh.triangles[triangle], corners, axis=1)
+    points = mesh.points[quad[clamp]]
+    normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    ghost[clamp] = np.cross(points[:, 2] - points[:, 1], normal)
+    return quad, ghost
+
+
+def _rows(joined: Patches, quad: Ints) -> tuple[Ints, Ints]:
+    """Nodes (c, p) that the angles of a patch depend on, then -1; and the place (c, a, 4) of each quad among them."""
+    count = len(quad)
+    past = int(quad.max()) + 1
+    used = np.where((joined.kind == TURN)[..., None], quad, past).reshape(count, -1)
+    ordered = np.sort(used, axis=1)
+    fresh = np.diff(ordered, axis=1, prepend=-1) > 0
+    slot = np.cumsum(fresh, axis=1) - 1
+    nodes = np.full(used.shape, past, dtype=np.int64)
+    row, at = np.nonzero(fresh)
+    nodes[row, slot[row, at]] = ordered[row, at]
+    nodes = nodes[:, : max(int((nodes < past).sum(axis=1).max()), 1)]
+    place = (used[:, :, None] == nodes[:, None, :]).argmax(axis=2)
+    return np.where(nodes < past, nodes, -1), place.reshape(quad.shape)

@@ -1,0 +1,128 @@
+"""The consistent formulation: triangles of coupled bars and coupled hinges, which converge to Kirchhoff-Love theory.
+
+Energy: 1/2 A t E:C:E of the constant Green strain E of three edges, with plane stress of any Poisson's ratio; and
+1/2 A D ((1 - nu) kappa:kappa + nu tr(kappa)^2) with kappa = (1/A) sum_e L_e theta_e mu_e (x) mu_e of three angles
+between the triangle and the sheet's tangent plane at its edges. docs/formulation.md derives it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.formulations.state import Energy, State
+from bh.loading.load_step import StepProgram
+from bh.materials import Material
+from bh.mechanics.bars_and_hinges.formulation import to_triangles
+from bh.mechanics.consistent.elements import LINEAR
+from bh.mechanics.consistent.kernels import TURN
+from bh.mechanics.consistent.membrane import Measure, constant_strain, smoothed_strain
+from bh.mechanics.consistent.system import ConsistentSystem
+from bh.mechanics.shared.kinematics import dihedral_angles
+from bh.model.model import Model
+from bh.model.refinement import Refinement
+
+if TYPE_CHECKING:
+    from bh.loading.symmetry import Mirror
+
+Array = NDArray[np.float64]
+
+
+class Consistent:
+    """Formulation "consistent"."""
+
+    name = "consistent"
+    takes_nu = True
+    refinement: Refinement | None = Refinement(
+        "staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9
+    )
+
+    def __init__(self, measure: Measure = smoothed_strain, material: Material = LINEAR) -> None:
+        """What measures the strain of the sheet, and its material (E, nu and t are the sheet's)."""
+        self.measure, self.material = measure, material
+
+    def system(self, model: Model, program: StepProgram, start: State | None) -> ConsistentSystem:
+        """The system of one step that begins at `start` (None: the stress-free sheet)."""
+        return ConsistentSystem(model, program, start, None, self.measure, self.material)
+
+    def half(
+        self, model: Model, program: StepProgram, start: State | None, plane: Mirror
+    ) -> ConsistentSystem:
+        """The system of the kept half of a symmetric sheet; `start` is a state of the whole."""
+        return ConsistentSystem(model, program, start, plane, self.measure, self.material)
+
+    def whole(
+        self, whole: ConsistentSystem, half: ConsistentSystem, plane: Mirror, q: Array, lam: float
+    ) -> Array:
+        """Unknowns of the whole sheet from those of its half; rotations follow from the positions."""
+        return _unknowns(whole, half.positions(q, lam), lam)
+
+    def part(
+        self, whole: ConsistentSystem, half: ConsistentSystem, plane: Mirror, q: Array, lam: float
+    ) -> Array:
+        """Unknowns of the half from those of the whole sheet."""
+        return _unknowns(half, whole.positions(q, lam), lam)
+
+    def observe(
+        self,
+        model: Model,
+        system: ConsistentSystem,
+        q: Array,
+        lam: float,
+        step: int = 0,
+        stable: bool | None = None,
+    ) -> State:
+        """Everything that can be read from the unknowns `q` at `lam`.
+
+        Dihedral angles of creases are those between the tangent planes of the sheet at both sides; elsewhere, where
+        the sheet is smooth, they are those between the triangles.
+        """
+        e, mesh = system.elements, system.mesh
+        topology = mesh.topology
+        x = system.positions(q, lam)
+        now = system.internal(x, q[system.moving :], lam)
+        _, M, S, L = system.split(now.forces)
+        stretching, bending = system.stretching_by_triangle(x), system.bending_by_triangle(now.theta)
+        folding = 0.5 * e.spring_stiffness * now.turns**2
+
+        angles = dihedral_angles(x, topology.hinges)
+        held = ~np.isnan(e.held.end)
+        angles[held] = e.held.at(lam)[held]
+        angles[e.springs] = e.spring_rest.at(lam) + now.turns
+        moments = np.full(len(angles), np.nan)
+        ends = mesh.points[topology.hinges[:, 1:3]]
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        moments[e.springs] = (S - e.couple.at(lam) + L[e.springs]) / lengths[e.springs]
+        turning = (e.patches.kind == TURN) & (e.patches.hinge >= 0)
+        by_hinge = np.zeros(len(angles))
+        by_hinge[e.patches.hinge[turning]] = M[turning]
+        moments[held] = (by_hinge / lengths)[held]
+        return State(
+            mesh=mesh, step=step, lam=lam, points=x,
+            energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock),
+            dihedral_angles=angles,
+            energy_density={
+                "stretching": stretching / mesh.areas,
+                "bending": bending / mesh.areas,
+                "folding": to_triangles(model, folding, topology.hinge_edges[e.springs]),
+            },
+            reactions=system.displacements.reactions(now.f - system.force.at(lam)),
+            crease_moments=moments, stable=stable,
+            pressing={} if system.touching is None else system.touching.pressing(x, lam),
+        )  # fmt: skip
+
+
+class ConstantStrain(Consistent):
+    """The same with constant-strain triangles: the member that `linear-shell` of `fem` is the twin of."""
+
+    name = "consistent-constant"
+    refinement = None
+
+    def __init__(self, material: Material = LINEAR) -> None:
+        super().__init__(constant_strain, material)
+
+
+def _unknowns(system: ConsistentSystem, x: Array, lam: float) -> Array:
+    return np.concatenate((system.displacements.unknowns(x), system.rotations_at(x, lam)))

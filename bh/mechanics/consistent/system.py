@@ -1,0 +1,384 @@
+"""The system of the consistent formulation for one step: energy, residual and tangent as functions of the unknowns."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from bh.formulations.state import State
+from bh.loading.load_step import StepProgram
+from bh.materials import Material
+from bh.mechanics.consistent import kernels, setup
+from bh.mechanics.consistent.derivatives import ConsistentDesign
+from bh.mechanics.consistent.elements import LINEAR, consistent_elements, lock_stiffness
+from bh.mechanics.consistent.membrane import Measure, smoothed_strain
+from bh.mechanics.consistent.sparsity import rotation_pattern
+from bh.mechanics.shared import penetration as closings
+from bh.mechanics.shared.base_system import SupportedSheet
+from bh.mechanics.shared.hinge_lock import lock_terms
+from bh.mechanics.shared.kinematics import dihedral_angles
+from bh.mechanics.shared.sparsity import Pattern
+from bh.model.model import Model
+from bh.solvers.matrices import FreeBodyMatrix, Matrix
+from bh.solvers.system import Evaluation
+from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from bh.loading.symmetry import Mirror
+
+Array = NDArray[np.float64]
+ROUNDING = 8.0 * np.finfo(float).eps
+ITERATIONS = 30  # for the rotations of least energy with a law of bending that is not linear
+
+
+class ElementForces(NamedTuple):
+    """Bar forces N (b,), N/mm; moments of patches M (c, a), spring creases S (h,) and locks L (m,), N mm."""
+
+    N: Array
+    M: Array
+    S: Array
+    L: Array
+
+
+class Internal(NamedTuple):
+    """Energies (N mm), their gradients to positions f (n, 3) and rotations r (r,), and element forces.
+
+    `stretching` and `bending` are the whole, `springs` that of the springs and their couples,
+    `lock` that of locks.
+    `size` is a typical element force (N), `theta` (c, a) are the angles of the patches and `turns` (h,) what the
+    springs have turned (rad).
+    """
+
+    stretching: float
+    bending: float
+    springs: float
+    lock: float
+    size: float
+    f: Array
+    r: Array
+    forces: Array
+    theta: Array
+    turns: Array
+
+
+class ConsistentSystem(SupportedSheet):
+    """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then edge rotations (rad)."""
+
+    def __init__(
+        self,
+        model: Model,
+        program: StepProgram,
+        start: State | None,
+        plane: Mirror | None = None,
+        measure: Measure = smoothed_strain,
+        material: Material = LINEAR,
+    ) -> None:
+        of_half = program
+        if plane is not None:
+            from bh.mechanics.shared.mirrored import half_program
+
+            of_half = half_program(program, plane)
+        super().__init__(model, of_half, start, plane)
+        mesh = self.mesh
+        self.hinges = hinges = mesh.topology.hinges
+        start_points = mesh.points if start is None else start.points
+        reference = dihedral_angles(mesh.points, hinges)
+        ends = mesh.points[hinges[:, 1:3]]
+        moments = np.zeros(len(hinges)) if start is None else np.nan_to_num(start.crease_moments)
+        moments *= np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        # a released crease begins with the moment that it has; what its lock takes of it is not the spring's
+        moments -= lock_terms(dihedral_angles(start_points, hinges), lock_stiffness(model, program))[:, 1]
+        # a crease that was ordinary sheet up to here is smooth, whatever its triangles do
+        angles = (
+            reference
+            if start is None
+            else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
+        )
+        self.elements = consistent_elements(model, program, angles, moments, plane, measure, material)
+        self.size = self.primal = self.moving + self.elements.rotations
+        self._scale = model.sheet.E * model.sheet.t
+        self._start_points = start_points
+        self._tangent_at, self._tangent_B = mesh.points, self.elements.patches.B
+        self._closing = False
+        self._frame_of = np.append(self.constraints.frame_of, -1)
+
+    # ------------------------------------------------------------------------------- unknowns and positions
+
+    @cached_property
+    def energy_scale(self) -> float:
+        e = self.elements
+        return 0.5 * float(np.trace(e.B_triangle, axis1=1, axis2=2).sum() + e.spring_stiffness.sum())
+
+    def start(self) -> Array:
+        """Unknowns of the state that the step begins with; the rotations are those of least energy there."""
+        q = np.zeros(self.size)
+        q[: self.moving] = self.displacements.start()
+        q[self.moving :] = self.rotations_at(self._start_points, 0.0)
+        return q
+
+    def rotations_at(self, x: Array, lam: float) -> Array:
+        """(rotations,) of least energy at positions x (n, 3)."""
+        alpha = np.zeros(self.size - self.moving)
+        now = self.internal(x, alpha, lam)
+        if self.elements.bending.constant:
+            return np.asarray(-self._rotation_factor.solve(now.r)) if now.r.any() else now.r
+        for _ in range(ITERATIONS):
+            if np.abs(now.r).max(initial=0.0) <= 1e-12 * self._stiffest[1]:
+                return alpha
+            B = self.elements.bending.stiffness(now.theta)
+            alpha = alpha - sp.linalg.splu(self.rotation_stiffness(B)).solve(now.r)
+            now = self.internal(x, alpha, lam)
+        raise ModelError(
+            "no rotations of least energy at these positions: the law of bending is not convex there"
+        )
+
+    @cached_property
+    def _rotation_factor(self) -> Any:
+        return sp.linalg.splu(self.rotation_stiffness(self.elements.patches.B))
+
+    def rotation_stiffness(self, B: Array) -> sp.csc_matrix:
+        """Hessian of the energy in the rotations alone, with stiffnesses B (c, a, a) of the patches."""
+        e, joined = self.elements, self.elements.patches
+        most = B.size + 4 * len(e.springs)
+        rows, columns, values = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
+        used = setup.rotation_matrix(
+            e.rotation, joined.kind, B, e.turns, e.spring_stiffness, rows, columns, values
+        )
+        entries = (values[:used], (rows[:used], columns[:used]))
+        return sp.csc_matrix(entries, shape=(e.rotations, e.rotations))
+
+    @cached_property
+    def _counts(self) -> tuple[int, int, int, int]:
+        e = self.elements
+        return len(e.stretching.membrane.bars), e.rotation.size, len(e.springs), len(e.lock)
+
+    def split(self, forces: Array) -> ElementForces:
+        """Element forces as they belong together."""
+        t, c, h, _ = self._counts
+        M = forces[t : t + c].reshape(self.elements.rotation.shape)
+        return ElementForces(forces[:t], M, forces[t + c : t + c + h], forces[t + c + h :])
+
+    # ------------------------------------------------------------------------------- the System protocol
+
+    def internal(self, x: Array, alpha: Array, lam: float) -> Internal:
+        """Energies, gradient and element forces at positions x and rotations alpha."""
+        e = self.elements
+        f, r = np.zeros_like(x), np.zeros(e.rotations)
+        forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
+        turns = np.empty(len(e.springs))
+        N, M, S, L = self.split(forces)
+        stretching, size = e.stretching.forces(x, f, N)
+        bending, more, closing = e.bending.forces(x, alpha, e.rest.at(lam), f, r, M, theta)
+        rest, couple = e.spring_rest.at(lam), e.couple.at(lam)
+        springs, most, too = kernels.spring_forces(
+            x, alpha, e.hinges, e.spring_stiffness, rest, couple, e.turns, f, r, S, turns
+        )
+        L[:] = 0.0
+        lock = closings.lock_forces(x, self.hinges, e.lock, f, L) if closing or too else 0.0
+        size = float(np.sqrt((size + more + most) / (len(forces) - len(L))))
+        return Internal(stretching, bending, springs, lock, size, f, r, forces, theta, turns)
+
+    def stretching_by_triangle(self, x: Array) -> Array:
+        """(t,) energy of stretching, N mm, of the triangles of the mesh at positions x."""
+        topology = self.mesh.topology
+        beside = topology.edge_triangles[topology.hinge_edges]
+        return self.elements.stretching.by_triangle(x, len(self.mesh.triangles), beside)
+
+    def bending_by_triangle(self, theta: Array) -> Array:
+        """(t,) energy of bending, N mm, for the angles (c, a) of the patches."""
+        return self.elements.bending.by_triangle(theta, self.elements.B_triangle)
+
+    def evaluate(self, q: Array, lam: float) -> Evaluation:
+        x = self.positions(q, lam)
+        now = self.internal(x, q[self.moving :], lam)
+        load = self.force.at(lam)
+        touched = 0.0 if self.touching is None else self.touching.forces(x, lam, now.f)
+        energy = (
+            now.stretching
+            + now.bending
+            + now.springs
+            + now.lock
+            + touched
+            - float(np.vdot(load, x - self.mesh.points))
+        )
+        residual = np.concatenate((self.displacements.components(now.f - load), now.r))
+        return Evaluation(energy, residual, self._imbalance(residual, now.size, load, x), now.forces)
+
+    def _imbalance(self, residual: Array, size: float, load: Array, x: Array) -> float:
+        largest = float(np.abs(residual[: self.moving]).max(initial=0.0))
+        turning = float(np.abs(residual[self.moving :] / self._heights).max(initial=0.0))
+        # coordinates are rounded to eps |x| and angles to eps, which the stiffest elements turn into forces that
+        # nobody can balance
+        stretch, bend = self._stiffest
+        floor = ROUNDING * (stretch * float(np.abs(x).max()) + bend)
+        size = max(size, float(np.abs(load).max(initial=0.0)), 1e-300)
+        return max(largest - floor, turning - floor, 0.0) / size
+
+    @cached_property
+    def _heights(self) -> Array:
+        """(rotations,) height of a triangle on the edge of each rotation, mm: what turns a moment into a force."""
+        e = self.elements
+        height = np.ones((len(self.mesh.triangles), 3))
+        height[e.members] = e.heights
+        out = np.ones(e.rotations)
+        used = e.rotation >= 0
+        out[e.rotation[used]] = height.ravel()[e.patches.half_edge[used]]
+        return out
+
+    @cached_property
+    def _stiffest(self) -> tuple[float, float]:
+        """Largest stiffness of an edge, N/mm, and of a hinge over the height of its wing, N / rad."""
+        e = self.elements
+        bend = (np.einsum("tkk->tk", e.B_triangle) / e.heights).max()
+        spring = (e.spring_stiffness / e.heights.min()).max(initial=0.0)
+        return e.stretching.largest, float(max(bend, spring))
+
+    def tangent(self, q: Array, lam: float, forces: Array) -> Matrix:
+        e, joined, pattern = self.elements, self.elements.patches, self._pattern
+        x = self.positions(q, lam)
+        N, M, S, L = self.split(forces)
+        data = np.zeros(pattern.size)
+        axes = (self._frame_of, self.constraints.frames)
+        e.stretching.tangent(x, N, *axes, pattern.slots[0], pattern.slots[3], data)
+        B = joined.B
+        if not e.bending.constant:
+            B = e.bending.stiffness(e.bending.angles(x, q[self.moving :], e.rest.at(lam)))
+        closing = kernels.bending_tangent(
+            x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, B, M, e.nodes, *axes,
+            pattern.slots[1], data,
+        )  # fmt: skip
+        closing |= kernels.spring_tangent(
+            x, e.hinges, e.spring_stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
+        )
+        if self.touching is not None:
+            self.touching.tangent(x, lam, *axes, pattern.slots[0], data)
+        if closing or L.any():
+            closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
+        self._closing = bool(closing)
+        self._tangent_at, self._tangent_B = x, B
+        if not self.constraints.rigid_body:
+            return pattern.matrix(data)
+        rigid = self.displacements.rigid(x)
+        Z = np.vstack((rigid, np.zeros((self.size - self.moving, rigid.shape[1]))))
+        block = self.displacements.grounding(rigid, self._scale)
+        slots, number = pattern.slots[4][0], self.displacements.ground_numbers
+        np.add.at(data, slots[slots >= 0], block[np.tril_indices(9)][slots >= 0])
+        inside = number >= 0
+        weight = self.displacements.weight
+        if weight is not None:
+            weight = np.concatenate((weight, np.ones(self.size - self.moving)))
+        return FreeBodyMatrix(pattern.matrix(data), Z, number[inside], block[np.ix_(inside, inside)], weight)
+
+    @cached_property
+    def _spring_nodes(self) -> Ints:
+        """(h, 5) nodes of a spring, and -1 for the block of its rotations."""
+        return np.pad(self.elements.hinges, ((0, 0), (0, 1)), constant_values=-1)
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
+        return rotation_pattern(self.mesh, self.elements, self.displacements, ground)
+
+    def predicted_forces(self, forces: Array, dq: Array) -> Array:
+        v = self.vectors(dq)
+        rates, _ = self._force_rates(
+            self._tangent_at, v, dq[self.moving :], self._tangent_B, self._closing, controlled=False
+        )
+        return forces + rates
+
+    def _force_rates(
+        self, x: Array, v: Array, w: Array, B: Array, closing: bool, controlled: bool
+    ) -> tuple[Array, Array]:
+        """Rates of the element forces and of the springs' turns for velocities v (n, 3) and w (rotations,) at x.
+
+        B (c, a, a) are the stiffnesses of the patches there. `controlled` adds what rest angles and couples do while lambda grows at the rate 1; without `closing` there are
+        no locks.
+        """
+        e, by = self.elements, float(controlled)
+        rates, turns = np.empty(sum(self._counts)), np.empty(len(e.springs))
+        N, M, S, L = self.split(rates)
+        e.stretching.rates(x, v, N)
+        joined = e.patches
+        kernels.bending_rates(x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, B, M)
+        kernels.spring_rates(
+            x,
+            v,
+            w,
+            e.hinges,
+            e.spring_stiffness,
+            by * e.spring_rest.rate,
+            by * e.couple.rate,
+            e.turns,
+            S,
+            turns,
+        )
+        L[:] = 0.0
+        if closing:
+            closings.lock_rates(x, v, self.hinges, e.lock, L)
+        return rates, turns
+
+    def _gradient_rates(self, q: Array, lam: float) -> tuple[Array, Array, float]:
+        """Rates with lambda at fixed q of the gradient: f (n, 3) and r; and the second derivative of the energy.
+
+        All of elements only, without dead forces.
+        """
+        e = self.elements
+        x = self.positions(q, lam)
+        now = self.internal(x, q[self.moving :], lam)
+        v = self.displacements.prescribed_motion
+        B = e.bending.stiffness(now.theta)
+        rates, turns = self._force_rates(x, v, np.zeros(e.rotations), B, closing=False, controlled=True)
+        f, r = np.zeros_like(x), np.zeros(e.rotations)
+        (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
+        e.stretching.force_rates(x, v, N, dN, f)
+        kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, M, dM, f, r)
+        kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
+        if L.any():
+            closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
+        if self.touching is not None:
+            self.touching.force_rates(x, v, lam, 1.0, f)
+        second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
+        return f, r, second
+
+    def _rest_work(self, M: Array, S: Array) -> float:
+        """Moments times the rates of the rest angles."""
+        e = self.elements
+        turning = e.patches.kind == kernels.TURN
+        return float(np.vdot(M[turning], e.rest.rate[turning])) + float(S @ e.spring_rest.rate)
+
+    def control_rate(self, q: Array, lam: float) -> Array:
+        f, r, _ = self._gradient_rates(q, lam)
+        return np.concatenate((self.displacements.components(f - self.force.rate), r))
+
+    def power(self, q: Array, lam: float) -> float:
+        x = self.positions(q, lam)
+        now = self.internal(x, q[self.moving :], lam)
+        _, M, S, _ = self.split(now.forces)
+        total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
+        total -= float(np.vdot(self.force.rate, x - self.mesh.points))
+        if self.touching is not None:
+            total += self.touching.power(x, lam)
+            self.touching.forces(x, lam, now.f)
+        unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
+        return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
+
+    def control_stiffness(self, q: Array, lam: float) -> float:
+        """d^2 energy / d lambda^2 at fixed q, N mm."""
+        v = self.displacements.prescribed_motion
+        more = 0.0 if self.touching is None else self.touching.control_stiffness(self.positions(q, lam), lam)
+        return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more
+
+    def design(self, q: Array, lam: float) -> ConsistentDesign:
+        """Derivatives with respect to element data at a state (`bh.sensitivities`).
+
+        Raises:
+            ModelError: the material is not linear.
+        """
+        if not (self.elements.stretching.constant and self.elements.bending.constant):
+            raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
+        return ConsistentDesign(self, q, lam)

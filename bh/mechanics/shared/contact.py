@@ -1,0 +1,243 @@
+"""Rigid bars that a sheet touches without friction, and soft springs to where its nodes were. Compiled.
+
+A bar is a rounded rectangle along an axis. With g the distance of a point of the sheet from its surface (mm, negative
+inside), d its `gap` and k its stiffness (N/mm for every mm of edge of the mesh), the potential a length is
+
+    k (d - g)^3 / (6 d)               for 0 < g < d
+    k (d^2 / 6 - d g / 2 + g^2 / 2)   for g <= 0
+
+and nothing beyond: a smooth barrier with two continuous derivatives, whose force grows to k d / 2 where the surfaces
+meet. Only pressing is possible. Points are spread evenly over all edges of the mesh, so that the edge of a bar may lie
+anywhere between nodes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bh.mechanics.shared.assembly import add_lower, rotate
+from bh.mechanics.shared.kinematics import OPTIONS
+from bh.mechanics.shared.sparsity import Slots
+from bh.model.actuations import Bar, Tether
+from bh.model.supports import select
+from meshes import SheetMesh
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+POINTS = 4  # on every edge
+
+
+class Touching:
+    """The bars and tethers of one step on a mesh; positions x are (n, 3), mm."""
+
+    def __init__(self, mesh: SheetMesh, items: tuple[Bar | Tether, ...], start: Array) -> None:
+        self.triangles = mesh.triangles
+        self.bars = tuple(item for item in items if isinstance(item, Bar))
+        topology = mesh.topology
+        lengths = np.linalg.norm(np.diff(mesh.points[topology.edges], axis=1)[:, 0], axis=1)
+        owner = topology.edge_triangles[:, 0]
+        corners = mesh.triangles[owner]
+        part = (np.arange(POINTS) + 0.5) / POINTS
+        ends = [(corners == topology.edges[:, [k]]).astype(float) for k in range(2)]
+        weights = (1.0 - part)[:, None, None] * ends[0] + part[:, None, None] * ends[1]
+        self.owner: Ints = np.tile(owner, POINTS)
+        self.weights: Array = np.ascontiguousarray(weights.reshape(-1, 3))
+        self.share: Array = np.tile(lengths / POINTS, POINTS)
+        self.spring = np.zeros_like(mesh.points)
+        for item in items:
+            if isinstance(item, Tether):
+                nodes = select(mesh, item.at)
+                self.spring[nodes] += np.asarray(item.total, dtype=float) / len(nodes)
+        self.anchor = start
+        # a triangle for every node, and which of its corners the node is
+        self.home = np.zeros((len(start), 2), dtype=np.int64)
+        for corner in range(3):
+            self.home[mesh.triangles[:, corner], 0] = np.arange(len(mesh.triangles))
+            self.home[mesh.triangles[:, corner], 1] = corner
+        self._shape = np.array([[b.half[0], b.half[1], b.radius, b.stiffness, b.gap] for b in self.bars])
+        self._shape = self._shape.reshape(-1, 5)
+        self._axes = np.array([(b.across, b.up) for b in self.bars]).reshape(-1, 2, 3)
+        self._from = np.array([b.at for b in self.bars], dtype=float).reshape(-1, 3)
+        self.velocity: Array = np.array([b.by for b in self.bars], dtype=float).reshape(-1, 3)
+
+    def _centres(self, lam: float) -> Array:
+        return self._from + lam * self.velocity
+
+    def forces(self, x: Array, lam: float, f: Array) -> float:
+        """Adds the gradient to f (n, 3), N, and returns the energy, N mm."""
+        moved = x - self.anchor
+        f += self.spring * moved
+        total = np.zeros((len(self.bars), 3))
+        energy = _forces(
+            x, self.triangles, self.owner, self.weights, self.share, self._centres(lam), self._axes,
+            self._shape, f, total,
+        )  # fmt: skip
+        return float(energy + 0.5 * np.vdot(self.spring, moved**2))
+
+    def pressing(self, x: Array, lam: float) -> dict[str, Array]:
+        """(3,) force of every bar on the sheet, N."""
+        total = np.zeros((len(self.bars), 3))
+        _forces(
+            x, self.triangles, self.owner, self.weights, self.share, self._centres(lam), self._axes,
+            self._shape, np.zeros_like(x), total,
+        )  # fmt: skip
+        return {bar.name: -force for bar, force in zip(self.bars, total, strict=True)}
+
+    def tangent(self, x: Array, lam: float, frame_of: Ints, frames: Array, slots: Slots, data: Array) -> None:
+        """Adds the Hessian; `slots` are those of the triangles."""
+        _tangent(
+            x, self.triangles, self.owner, self.weights, self.share, self._centres(lam), self._axes,
+            self._shape, self.home, self.spring, frame_of, frames, slots, data,
+        )  # fmt: skip
+
+    def force_rates(self, x: Array, v: Array, lam: float, moving: float, out: Array) -> None:
+        """Adds the rate of the gradient for velocities v (n, 3) and bars that move at `moving` times their speed."""
+        out += self.spring * v
+        _force_rates(
+            x, v, self.triangles, self.owner, self.weights, self.share, self._centres(lam),
+            moving * self.velocity, self._axes, self._shape, out,
+        )  # fmt: skip
+
+    def power(self, x: Array, lam: float) -> float:
+        """d energy / d lambda at fixed x, N mm: work of the moving bars on the sheet."""
+        return float(
+            sum(force @ bar.by for force, bar in zip(self.pressing(x, lam).values(), self.bars, strict=True))
+        )
+
+    def control_stiffness(self, x: Array, lam: float) -> float:
+        """d^2 energy / d lambda^2 at fixed x, N mm."""
+        ahead = 1e-6
+        return (self.power(x, lam + ahead) - self.power(x, lam - ahead)) / (2.0 * ahead)
+
+
+@njit(inline="always", **OPTIONS)
+def _measure(p, centre, axes, shape, n, H):  # type: ignore[no-untyped-def]
+    """Distance g of a point from the surface of a bar, its gradient n (3,) and Hessian H (3, 3)."""
+    s = z = 0.0
+    for c in range(3):
+        s += (p[c] - centre[c]) * axes[0, c]
+        z += (p[c] - centre[c]) * axes[1, c]
+    qs, qz = abs(s) - shape[0], abs(z) - shape[1]
+    for c in range(3):
+        n[c] = 0.0
+        for e in range(3):
+            H[c, e] = 0.0
+    sign_s, sign_z = math.copysign(1.0, s), math.copysign(1.0, z)
+    if qs > 0.0 and qz > 0.0:
+        length = math.hypot(qs, qz)
+        g = length - shape[2]
+        if g >= shape[4]:
+            return g
+        a, b = sign_s * qs / length, sign_z * qz / length
+        for c in range(3):
+            n[c] = a * axes[0, c] + b * axes[1, c]
+        # (1 - n n) / length in the plane of the section: t t / length with t across the normal
+        for c in range(3):
+            tc = -b * axes[0, c] + a * axes[1, c]
+            for e in range(3):
+                te = -b * axes[0, e] + a * axes[1, e]
+                H[c, e] = tc * te / length
+        return g
+    if qs > qz:
+        for c in range(3):
+            n[c] = sign_s * axes[0, c]
+        return qs - shape[2]
+    for c in range(3):
+        n[c] = sign_z * axes[1, c]
+    return qz - shape[2]
+
+
+@njit(inline="always", **OPTIONS)
+def _law(g, k, d):  # type: ignore[no-untyped-def]
+    """Energy a length and its derivatives by g."""
+    if g > 0.0:
+        left = d - g
+        return k * left**3 / (6.0 * d), -k * left * left / (2.0 * d), k * left / d
+    return k * (d * d / 6.0 - 0.5 * d * g + 0.5 * g * g), -k * (0.5 * d - g), k
+
+
+@njit(inline="always", **OPTIONS)
+def _place(x, corners, weights, p):  # type: ignore[no-untyped-def]
+    for c in range(3):
+        p[c] = 0.0
+        for i in range(3):
+            p[c] += weights[i] * x[corners[i], c]
+
+
+@njit(**OPTIONS)
+def _forces(x, triangles, owner, weights, share, centres, axes, shape, f, total):  # type: ignore[no-untyped-def]
+    p, n, H = np.empty(3), np.empty(3), np.empty((3, 3))
+    energy = 0.0
+    for k in range(len(owner)):
+        corners = triangles[owner[k]]
+        _place(x, corners, weights[k], p)
+        for b in range(len(centres)):
+            g = _measure(p, centres[b], axes[b], shape[b], n, H)
+            if g >= shape[b, 4]:
+                continue
+            value, slope, _ = _law(g, shape[b, 3], shape[b, 4])
+            energy += share[k] * value
+            for c in range(3):
+                force = share[k] * slope * n[c]
+                total[b, c] += force
+                for i in range(3):
+                    f[corners[i], c] += weights[k, i] * force
+    return energy
+
+
+@njit(**OPTIONS)
+def _tangent(x, triangles, owner, weights, share, centres, axes, shape, home, spring, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]  # fmt: skip
+    p, n, H = np.empty(3), np.empty(3), np.empty((3, 3))
+    K = np.zeros((9, 9))
+    for k in range(len(owner)):
+        corners = triangles[owner[k]]
+        _place(x, corners, weights[k], p)
+        for b in range(len(centres)):
+            g = _measure(p, centres[b], axes[b], shape[b], n, H)
+            if g >= shape[b, 4]:
+                continue
+            _, slope, second = _law(g, shape[b, 3], shape[b, 4])
+            for i in range(3):
+                for j in range(3):
+                    w = share[k] * weights[k, i] * weights[k, j]
+                    for c in range(3):
+                        for e in range(3):
+                            K[3 * i + c, 3 * j + e] = w * (second * n[c] * n[e] + slope * H[c, e])
+            if len(frames) > 0:
+                rotate(K, corners, frame_of, frames)
+            add_lower(K, 9, slots[owner[k]], data)
+    for v in range(len(home)):
+        if spring[v, 0] + spring[v, 1] + spring[v, 2] > 0.0:
+            K[:] = 0.0
+            for c in range(3):
+                K[3 * home[v, 1] + c, 3 * home[v, 1] + c] = spring[v, c]
+            if len(frames) > 0:
+                rotate(K, triangles[home[v, 0]], frame_of, frames)
+            add_lower(K, 9, slots[home[v, 0]], data)
+
+
+@njit(**OPTIONS)
+def _force_rates(x, v, triangles, owner, weights, share, centres, velocity, axes, shape, out):  # type: ignore[no-untyped-def]  # fmt: skip
+    p, u, n, H = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
+    for k in range(len(owner)):
+        corners = triangles[owner[k]]
+        _place(x, corners, weights[k], p)
+        for b in range(len(centres)):
+            g = _measure(p, centres[b], axes[b], shape[b], n, H)
+            if g >= shape[b, 4]:
+                continue
+            _place(v, corners, weights[k], u)
+            _, slope, second = _law(g, shape[b, 3], shape[b, 4])
+            closing = 0.0
+            for c in range(3):
+                closing += n[c] * (u[c] - velocity[b, c])
+            for c in range(3):
+                rate = second * closing * n[c]
+                for e in range(3):
+                    rate += slope * H[c, e] * (u[e] - velocity[b, e])
+                for i in range(3):
+                    out[corners[i], c] += share[k] * weights[k, i] * rate

@@ -1,0 +1,116 @@
+"""Hinges that close: their locks as elements of their own, and what to say of panels that meet. mm, N, rad.
+
+Off the zone of `hinge_lock` a lock is nothing, so these passes run only where some hinge is in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bh.loading.load_step import hinge_name
+from bh.mechanics.shared.assembly import add_lower, add_product, rotate
+from bh.mechanics.shared.hinge_lock import ZONE, in_zone, lock, until_closed
+from bh.mechanics.shared.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
+from meshes import SheetMesh
+
+Array = NDArray[np.float64]
+LARGEST_TURN = 1.3  # rad that any hinge may turn in one increment before the driver mistrusts it
+
+
+@njit(**OPTIONS)
+def lock_forces(x, hinges, k, f, L):  # type: ignore[no-untyped-def]
+    """Energy of the locks (N mm); adds its gradient to f (n, 3) and writes the moments L (m,), N mm."""
+    g = np.empty(12)
+    energy = 0.0
+    for h in range(len(hinges)):
+        L[h] = 0.0
+        if k[h] == 0.0:
+            continue
+        geometry = hinge_geometry(x, hinges[h], g)
+        if in_zone(geometry[0]):
+            more, L[h], _ = lock(geometry[0], k[h])
+            energy += more
+            for p in range(12):
+                f[hinges[h, p // 3], p % 3] += L[h] * g[p]
+    return energy
+
+
+@njit(inline="always", **OPTIONS)
+def _lock_matrix(x, hinge, k, moment, g, H):  # type: ignore[no-untyped-def]
+    """Tangent of one lock into the lower triangle of H (12, 12); False where there is nothing."""
+    geometry = hinge_geometry(x, hinge, g)
+    if k == 0.0 or not (in_zone(geometry[0]) or moment != 0.0):
+        return False
+    stiffness = lock(geometry[0], k)[2] if in_zone(geometry[0]) else 0.0
+    for p in range(12):
+        for q in range(p + 1):
+            H[p, q] = stiffness * g[p] * g[q]
+    add_hinge_hessian(geometry, moment, H)
+    return True
+
+
+@njit(**OPTIONS)
+def lock_tangent(x, hinges, k, L, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]
+    """Add the tangent of the locks with moments L to `data`."""
+    g, H = np.empty(12), np.zeros((12, 12))
+    for h in range(len(hinges)):
+        if _lock_matrix(x, hinges[h], k[h], L[h], g, H):
+            if len(frames) > 0:
+                rotate(H, hinges[h], frame_of, frames)
+            add_lower(H, 12, slots[h], data)
+
+
+@njit(**OPTIONS)
+def lock_rates(x, v, hinges, k, out):  # type: ignore[no-untyped-def]
+    """Rates of the moments (m,) for velocities v (n, 3)."""
+    g = np.empty(12)
+    for h in range(len(hinges)):
+        out[h] = 0.0
+        geometry = hinge_geometry(x, hinges[h], g)
+        if k[h] > 0.0 and in_zone(geometry[0]):
+            turn = 0.0
+            for p in range(12):
+                turn += g[p] * v[hinges[h, p // 3], p % 3]
+            out[h] = lock(geometry[0], k[h])[2] * turn
+
+
+@njit(**OPTIONS)
+def lock_force_rates(x, v, hinges, k, L, f):  # type: ignore[no-untyped-def]
+    """Add the rate of the gradient of the locks for velocities v (n, 3) to f (n, 3)."""
+    g, H = np.empty(12), np.zeros((12, 12))
+    for h in range(len(hinges)):
+        if _lock_matrix(x, hinges[h], k[h], L[h], g, H):
+            add_product(H, hinges[h], v, f)
+
+
+def crossing(mesh: SheetMesh, before: Array, after: Array) -> str:
+    """Which panels passed through each other between dihedral angles (m,) of two states, or an empty string.
+
+    Angles are known modulo a turn; a hinge passed 0 or 2 pi where the way through closed is the shorter one.
+    """
+    jump = np.abs(after - before)
+    if jump.max(initial=0.0) <= np.pi:
+        return ""
+    return f"the panels at {hinge_name(mesh, int(np.argmax(jump)))} would pass through each other"
+
+
+def objection(mesh: SheetMesh, before: Array, after: Array) -> str:
+    """Why an increment between dihedral angles (m,) of two states is not to be trusted, or an empty string."""
+    turn = float(np.abs(after - before).max(initial=0.0))
+    far = f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
+    return crossing(mesh, before, after) or far
+
+
+def touching(mesh: SheetMesh, angles: Array, reference: Array, asked: NDArray[np.bool_]) -> str:
+    """Which panels have met at a hinge (within the zone of closed), or an empty string.
+
+    Only `asked` (m,) hinges count, and of them those that are not made closed (`reference` angles).
+    """
+    left = np.where(asked & (until_closed(reference) >= ZONE), until_closed(angles), np.inf)
+    if left.min(initial=np.inf) >= ZONE:
+        return ""
+    nearest = int(np.argmin(left))
+    where = hinge_name(mesh, nearest)
+    return f"the panels at {where} touch ({np.degrees(left[nearest]):.2g} degrees from closed)"

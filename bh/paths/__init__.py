@@ -1,0 +1,1 @@
+"""Equilibrium paths: their states, files, provenance and exports."""

@@ -1,0 +1,103 @@
+"""Folded states and flat patterns for other programs, by the suffix of the file. mm but for glTF, which has metres."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import InputError
+from meshes import SheetMesh
+
+if TYPE_CHECKING:
+    from bh.formulations.state import State
+
+FOLDED = (".fold", ".glb", ".obj", ".off", ".ply", ".stl", ".vtk", ".vtu", ".msh", ".inp")
+FLAT = (".svg", ".dxf", ".fold")
+
+
+def write_state(file: str | os.PathLike[str], states: Sequence[State], title: str = "sheet") -> FilePath:
+    """Write the last of some states of a path; a FOLD file gets all of them as frames behind the flat key frame.
+
+    .vtu, .vtk and .msh hold the displacement (mm) and the energy densities (N mm / mm^2); .glb has them as colours,
+    bending from none (dark) to the most there is.
+
+    Returns:
+        the absolute path of the file.
+
+    Raises:
+        InputError: no states, an unknown suffix, or a place that cannot be written to.
+    """
+    target, suffix = FilePath(file), FilePath(file).suffix.lower()
+    if not states:
+        raise InputError(f"there is no state to write to '{target}'; trace the model first")
+    if suffix not in FOLDED:
+        raise InputError(f"'{target}': suffix '{suffix}' is not known; use one of {', '.join(FOLDED)}")
+    last = states[-1]
+    if suffix == ".fold":
+        from meshes.io import write_fold
+
+        frames = [(_name(state), state.points, _fold_angles(state)) for state in states]
+        write_fold(target, last.mesh, frames=frames, title=title)
+    elif suffix == ".glb":
+        from meshes.io import write_gltf
+
+        write_gltf(target, last.mesh, last.points, _colours(last))
+    else:
+        from meshes.io import write_mesh
+        from meshes.io.export import FORMATS
+
+        nodes = {"displacement": last.points - last.mesh.points} if FORMATS[suffix][1] else {}
+        cells = (
+            {f"{kind}_energy_density": values for kind, values in last.energy_density.items()}
+            if nodes
+            else {}
+        )
+        write_mesh(target, last.mesh, last.points, nodes, cells)
+    return target.resolve()
+
+
+def write_flat(file: str | os.PathLike[str], mesh: SheetMesh, facets: bool = False) -> FilePath:
+    """Write the flat pattern of a mesh: .svg and .dxf have outline and creases (and `facets`), .fold the whole mesh.
+
+    Raises:
+        InputError: an unknown suffix, a mesh that is not flat, or a place that cannot be written to.
+    """
+    target, suffix = FilePath(file), FilePath(file).suffix.lower()
+    if suffix not in FLAT:
+        raise InputError(f"'{target}': suffix '{suffix}' is no flat pattern; use one of {', '.join(FLAT)}")
+    if suffix == ".fold":
+        from meshes.io import write_fold
+
+        write_fold(target, mesh)
+    else:
+        from meshes.io import write_pattern
+
+        write_pattern(target, mesh, facets=facets)
+    return target.resolve()
+
+
+def _name(state: State) -> str:
+    return f"step {state.step + 1}, lambda {state.lam:.6g}"
+
+
+def _fold_angles(state: State) -> NDArray[np.float64]:
+    """(e,) fold angles of all edges, rad, mountain positive, 0 on the boundary."""
+    topology = state.mesh.topology
+    angles = np.zeros(len(topology.edges))
+    angles[topology.hinge_edges] = np.pi - state.dihedral_angles
+    return angles
+
+
+def _colours(state: State) -> NDArray[np.uint8] | None:
+    from matplotlib import colormaps
+
+    values = state.nodal_energy_density("bending")
+    top = float(values.max(initial=0.0))
+    if top == 0.0:
+        return None
+    return np.asarray(np.round(255.0 * colormaps["viridis"](values / top)), dtype=np.uint8)

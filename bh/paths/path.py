@@ -1,0 +1,297 @@
+"""The equilibrium path of a model: solved, kept, saved, loaded and resumed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import astuple, dataclass, replace
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.formulations.observables import until_of
+from bh.formulations.registry import Formulation, formulation
+from bh.formulations.state import State
+from bh.loading.load_step import Ended, StepProgram, open_ends
+from bh.loading.program import program
+from bh.model.model import Model
+from bh.model.serialise import describe, rebuild
+from bh.paths.provenance import provenance_of
+from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
+from bh.solvers.increments import ARC, LOAD, CriticalPoint
+from meshes.mesh import count
+
+if TYPE_CHECKING:
+    from bh.formulations.symmetry_reduction import Half
+    from bh.loading.symmetry import Plane
+    from bh.solving.accuracy import Accuracy
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepOutcome:
+    """How one step ended: "reached", or why not, with one line of reason."""
+
+    outcome: str
+    reason: str = ""
+    iterations: int = 0  # of the increment that failed
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One accepted state in the solver's terms; see `bh.solvers.increments.Increment`.
+
+    `negative` counts the negative modes of the tangent, `mode` says how to go on from here, `jumped` that the state
+    lies on another branch than the one before, `critical` holds the limit and bifurcation points passed before it.
+    """
+
+    step: int
+    lam: float
+    q: Array
+    iterations: int
+    imbalance: float
+    wall_time_s: float
+    next_increment: float
+    negative: int | None = None
+    mode: str = LOAD
+    note: str = ""
+    cuts: tuple[str, ...] = ()
+    jumped: bool = False
+    critical: tuple[CriticalPoint, ...] = ()
+
+    @property
+    def stable(self) -> bool | None:
+        """True if no mode is negative, None where that was not looked at."""
+        return None if self.negative is None else self.negative == 0
+
+
+class Path:
+    """The accepted states of a model, in order, and how each step ended.
+
+    `path[i]` is the i-th `State` (read when asked for); `path[0]` is the state that the first step begins with.
+
+    Attributes:
+        accuracy: the estimate of its error, where an accuracy was asked for (`bh.Accuracy`), else None.
+    """
+
+    def __init__(
+        self, model: Model, provenance: dict[str, Any] | None = None, symmetry: Plane | None = None
+    ) -> None:
+        self.model = model
+        self.provenance = provenance or provenance_of(model)
+        self.records: list[Record] = []
+        self.steps: list[StepOutcome] = []
+        self.accuracy: Accuracy | None = None
+        self._formulation: Formulation = formulation(model.formulation)
+        self._programs: tuple[StepProgram, ...] = program(model)
+        self._halves = None
+        if symmetry is not None:
+            from bh.formulations.symmetry_reduction import Halves
+
+            self._halves = Halves(self._formulation, model, self._programs, symmetry)
+        self._systems: dict[int, Any] = {}
+        self._states: dict[int, State] = {}
+
+    # ------------------------------------------------------------------------------- reading
+
+    @property
+    def outcome(self) -> str:
+        """ "reached" if every step was; else the outcome of the first step that was not."""
+        for step in self.steps:
+            if step.outcome != "reached":
+                return step.outcome
+        return "reached" if len(self.steps) == len(self.model.steps) else "unfinished"
+
+    @property
+    def reason(self) -> str:
+        """Why the path ended early, or an empty string."""
+        return next((step.reason for step in self.steps if step.outcome != "reached"), "")
+
+    @property
+    def stable(self) -> bool | None:
+        """Is the last state stable? None where that was not looked at."""
+        self._look_at_whole()
+        return self.records[-1].stable if self.records else None
+
+    def _look_at_whole(self) -> None:
+        """Of a sheet solved by halves, count the negative modes of the last state, symmetric or not, when asked."""
+        if self._halves is not None and self.records and self.records[-1].negative is None:
+            last = self.records[-1]
+            self.records[-1] = replace(last, negative=self._halves.negative(self._system(last.step), last))
+            self._states.pop(len(self.records) - 1, None)
+
+    @property
+    def critical_points(self) -> list[tuple[int, CriticalPoint]]:
+        """(step, point) of every limit and bifurcation point that was passed, in order."""
+        return [(record.step, point) for record in self.records for point in record.critical]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What happened on the way that a reader of the last state should know, one line each."""
+        found = []
+        for step, passed in self.critical_points:
+            found.append(f"step {step + 1}: {passed.kind} point passed at lambda {passed.lam:.6g}")
+        arc = [record for record in self.records if record.note.startswith(ARC)]
+        if arc:
+            found.append(f"{count(len(arc), 'state')} found by arc length")
+        found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
+        ends = [line for step in self._programs for line in open_ends(self.model.mesh, step)]
+        found += dict.fromkeys(ends)
+        if self.accuracy is not None and not self.accuracy.met:
+            found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
+        self._look_at_whole()
+        modes = self.records[-1].negative if self.records else None
+        if modes:
+            found.append(f"the last state is not stable ({count(modes, 'negative mode')})")
+        return found + [f"{remark.code}: {remark}" for remark in self.model.remarks]
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of all increments, the one that failed included."""
+        return sum(record.iterations for record in self.records) + sum(end.iterations for end in self.steps)
+
+    @property
+    def wall_time_s(self) -> float:
+        """Time spent in the solver, s."""
+        return sum(record.wall_time_s for record in self.records)
+
+    @property
+    def unknowns(self) -> int:
+        return len(self.records[-1].q) if self.records else 0
+
+    @property
+    def lambdas(self) -> Array:
+        """(states,) step + lambda of every state: 1.25 is a quarter of the second step."""
+        return np.array([record.step + record.lam for record in self.records])
+
+    def __repr__(self) -> str:
+        """One line: "Path(reached, 6 states, 16 iterations, 1 of 1 step)"."""
+        reached = sum(step.outcome == "reached" for step in self.steps)
+        return (
+            f"Path({self.outcome}, {count(len(self), 'state')}, {count(self.iterations, 'iteration')}, "
+            f"{reached} of {count(len(self.model.steps), 'step')})"
+        )
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    @overload
+    def __getitem__(self, index: int) -> State: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[State]: ...
+
+    def __getitem__(self, index: int | slice) -> State | list[State]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        index = range(len(self))[index]
+        if index not in self._states:
+            record = self.records[index]
+            self._states[index] = self._formulation.observe(
+                self.model, self._system(record.step), record.q, record.lam, record.step, record.stable
+            )
+        return self._states[index]
+
+    def __iter__(self) -> Iterator[State]:
+        return (self[i] for i in range(len(self)))
+
+    def solved(self, index: int = -1) -> tuple[Any, Record]:
+        """The system of the step that a state belongs to, and its record: what analyses of a state begin with."""
+        record = self.records[range(len(self))[index]]
+        return self._system(record.step), record
+
+    def plot(self, **options: Any) -> Any:
+        """Show the last state as a picture; options of `bh.plotting.show`."""
+        from bh.plotting.pictures import show
+
+        return show(self[-1], **options)
+
+    # ------------------------------------------------------------------------------- files
+
+    def save(self, file: str | FilePath) -> None:
+        """Write everything to one file; see `bh.paths.storage`. Replaces an older file of that name.
+
+        Raises:
+            PathFileError: the file cannot be written.
+        """
+        target = new_file(self, FilePath(file))
+        for index, record in enumerate(self.records):
+            target.add(self._row(index, record))
+        for step, end in enumerate(self.steps):
+            target.finish_step(step, *astuple(end))
+        target.close()
+
+    @classmethod
+    def load(cls, file: str | FilePath) -> Path:
+        """Read a saved path, also one of a run that was killed.
+
+        Raises:
+            PathFileError: no such file, or not a path file.
+        """
+        source = PathFile.open(FilePath(file))
+        with closing(source), reading(FilePath(file)):
+            meta = source.meta()
+            path = cls(rebuild(meta["model"], source.arrays()), meta["provenance"])
+            for row in source.states():
+                path.records.append(_record(row))
+            ends = source.steps()
+            path.steps = [StepOutcome(*ends[step]) for step in sorted(ends)]
+        return path
+
+    def _row(self, index: int, record: Record) -> StateRow:
+        energy = self[index].energy
+        critical = tuple(
+            CriticalRow(record.step, c.kind, c.lam, c.error, c.negative, c.q, c.mode) for c in record.critical
+        )
+        return StateRow(
+            record.step, record.lam, record.iterations, record.imbalance, record.negative, record.mode, record.jumped,
+            record.wall_time_s, record.next_increment, (energy.stretching, energy.bending, energy.folding),
+            record.note, record.cuts, record.q, self[index].points, critical,
+        )  # fmt: skip
+
+    def _system(self, step: int) -> Any:
+        """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
+        if step not in self._systems:
+            if any(until_of(actuations) is not None for actuations in self.model.steps[:step]):
+                self._programs = program(self.model, self._ended(step))
+            self._systems[step] = self._formulation.system(
+                self.model, self._programs[step], self._start(step)
+            )
+        return self._systems[step]
+
+    def _half(self, step: int) -> Half | None:
+        """The half that solves a step, or None where the whole sheet is solved."""
+        if self._halves is None:
+            return None
+        return self._halves.of(step, self._system(step), self._start(step), self._ended(step))
+
+    def _start(self, step: int) -> State | None:
+        """The state that a step begins at; None is the stress-free sheet."""
+        last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
+        return None if last is None else self[last]
+
+    def _ended(self, before: int) -> dict[int, Ended]:
+        """Steps before `before` that ended early, by an `Until`."""
+        last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
+        found = {}
+        for step, index in last.items():
+            if until_of(self.model.steps[step]) is not None and self.records[index].lam < 1.0:
+                state = self[index]
+                found[step] = Ended(state.lam, state.points, state.dihedral_angles)
+        return found
+
+
+def _record(row: StateRow) -> Record:
+    return Record(
+        row.step, row.lam, row.q, row.iterations, row.imbalance, row.wall_time_s, row.next_increment,
+        negative=row.negative, mode=row.mode, note=row.note, cuts=row.cuts, jumped=row.jumped,
+        critical=tuple(CriticalPoint(c.kind, c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical),
+    )  # fmt: skip
+
+
+def new_file(path: Path, file: FilePath) -> PathFile:
+    """An empty path file for a path, which replaces an older one."""
+    data, arrays = describe(path.model)
+    return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)

@@ -1,0 +1,301 @@
+"""One file for a path: an SQLite data base, so that a state that is accepted is on disk, whole, whatever happens next.
+
+Tables: `meta` (key, JSON value), `arrays` (name, dtype, shape, data) with the model, `states` with one row for each
+accepted state (step, lambda, energies in N mm, unknowns and node positions as little-endian float64), `critical` with
+the limit and bifurcation points that were passed, `steps` with the outcome of every finished step. Any SQLite reader
+opens it; a killed run leaves a file that is complete up to its last state.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import InputError, PathFileError
+from bh.model.serialise import AnyArray
+
+Array = NDArray[np.float64]
+FORMAT = 2  # of the tables; raised with every change
+SCHEMA = """
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE arrays (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL, data BLOB NOT NULL);
+CREATE TABLE states (
+    id INTEGER PRIMARY KEY, step INTEGER NOT NULL, lambda REAL NOT NULL, iterations INTEGER NOT NULL,
+    imbalance REAL NOT NULL, negative INTEGER, mode TEXT NOT NULL, jumped INTEGER NOT NULL,
+    wall_time_s REAL NOT NULL, next_increment REAL NOT NULL,
+    stretching REAL NOT NULL, bending REAL NOT NULL, folding REAL NOT NULL,
+    note TEXT NOT NULL, cuts TEXT NOT NULL, unknowns BLOB NOT NULL, points BLOB NOT NULL);
+CREATE TABLE critical (
+    id INTEGER PRIMARY KEY, state INTEGER NOT NULL REFERENCES states (id), step INTEGER NOT NULL, kind TEXT NOT NULL,
+    lambda REAL NOT NULL, error REAL NOT NULL, negative_before INTEGER NOT NULL, negative_behind INTEGER NOT NULL,
+    unknowns BLOB NOT NULL, mode BLOB NOT NULL);
+CREATE TABLE steps (
+    step INTEGER PRIMARY KEY, outcome TEXT NOT NULL, reason TEXT NOT NULL, iterations INTEGER NOT NULL);
+"""
+
+
+class CriticalRow(NamedTuple):
+    """A limit or bifurcation point that was passed just before a state; see the columns of `critical`."""
+
+    step: int
+    kind: str
+    lam: float
+    error: float
+    negative: tuple[int, int]
+    q: Array
+    mode: Array
+
+
+class StateRow(NamedTuple):
+    """One accepted state as it is stored; see the columns of `states`."""
+
+    step: int
+    lam: float
+    iterations: int
+    imbalance: float
+    negative: int | None
+    mode: str
+    jumped: bool
+    wall_time_s: float
+    next_increment: float
+    energies: tuple[float, float, float]
+    note: str
+    cuts: tuple[str, ...]
+    q: Array
+    points: Array
+    critical: tuple[CriticalRow, ...] = ()
+
+
+class PathFile:
+    """An open path file; every `add` is one transaction."""
+
+    def __init__(self, file: FilePath, connection: sqlite3.Connection) -> None:
+        self.file, self._db = file, connection
+
+    @classmethod
+    def create(
+        cls, file: FilePath, meta: dict[str, Any], arrays: dict[str, AnyArray], replace: bool = True
+    ) -> PathFile:
+        """Begin a new file; an old one of that name is replaced once the new one has its model.
+
+        Raises:
+            PathFileError: the folder cannot be written, or the file exists and `replace` is False.
+        """
+        file = FilePath(file)
+        if file.exists() and not replace:
+            raise PathFileError(f"'{file}' exists; resume it, remove it or choose another name")
+        draft = file.with_name(file.name + ".part")
+        try:
+            for old in (draft, _journal(draft)):
+                old.unlink(missing_ok=True)
+            db = _connect(draft)
+            with db:
+                db.executescript(SCHEMA + f"PRAGMA user_version = {FORMAT};")
+                db.executemany(
+                    "INSERT INTO meta VALUES (?, ?)", [(k, json.dumps(v)) for k, v in meta.items()]
+                )
+                db.executemany(
+                    "INSERT INTO arrays VALUES (?, ?, ?, ?)",
+                    [
+                        (name, _little(a).dtype.str, json.dumps(a.shape), _little(a).tobytes())
+                        for name, a in arrays.items()
+                    ],
+                )
+            db.close()
+            # the journal of a run that was killed must not be played back into the new file
+            for journal in (_journal(draft), _journal(file)):
+                journal.unlink(missing_ok=True)
+            draft.replace(file)
+            return cls(file, _connect(file))
+        except (OSError, sqlite3.Error) as error:
+            with suppress(OSError):
+                draft.unlink(missing_ok=True)
+            raise PathFileError(
+                f"cannot write '{file}' ({error}); choose a folder that can be written"
+            ) from error
+
+    @classmethod
+    def open(cls, file: FilePath) -> PathFile:
+        """Open an existing file.
+
+        Raises:
+            PathFileError: there is none, or it is not a path file.
+        """
+        file = FilePath(file)
+        if not file.is_file():
+            raise PathFileError(f"there is no path file '{file}'; check the name")
+        with reading(file):
+            db = _connect(file)
+            db.execute("SELECT count(*) FROM states").fetchone()
+            found = db.execute("PRAGMA user_version").fetchone()[0]
+        if found != FORMAT:
+            db.close()
+            raise PathFileError(
+                f"'{file}' was written by another version (format {found}, this one reads {FORMAT}); run it again"
+            )
+        return cls(file, db)
+
+    def add(self, row: StateRow) -> None:
+        """Append one accepted state; it is on disk when this returns."""
+        values = (
+            row.step, row.lam, row.iterations, row.imbalance, row.negative, row.mode, int(row.jumped),
+            row.wall_time_s, row.next_increment, *row.energies, row.note, json.dumps(row.cuts),
+            _little(row.q).tobytes(), _little(row.points).tobytes(),
+        )  # fmt: skip
+        with self._guard():
+            state = self._db.execute(
+                "INSERT INTO states (step, lambda, iterations, imbalance, negative, mode, jumped, wall_time_s,"
+                " next_increment, stretching, bending, folding, note, cuts, unknowns, points)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                values,
+            ).lastrowid
+            self._db.executemany(
+                "INSERT INTO critical (state, step, kind, lambda, error, negative_before, negative_behind, unknowns,"
+                " mode) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                [
+                    (
+                        state,
+                        c.step,
+                        c.kind,
+                        c.lam,
+                        c.error,
+                        *c.negative,
+                        *(_little(a).tobytes() for a in (c.q, c.mode)),
+                    )
+                    for c in row.critical
+                ],
+            )
+
+    def finish_step(self, step: int, outcome: str, reason: str, iterations: int) -> None:
+        """Store how a step ended; `iterations` are those of an increment that failed."""
+        with self._guard():
+            self._db.execute(
+                "INSERT OR REPLACE INTO steps VALUES (?, ?, ?, ?)", (step, outcome, reason, iterations)
+            )
+
+    def forget_failed_steps(self) -> None:
+        """Steps that did not reach their end are tried again when a run is resumed."""
+        with self._guard():
+            self._db.execute("DELETE FROM steps WHERE outcome != 'reached'")
+
+    def meta(self) -> dict[str, Any]:
+        return {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
+
+    def arrays(self) -> dict[str, AnyArray]:
+        rows = self._db.execute("SELECT name, dtype, shape, data FROM arrays")
+        return {
+            name: np.frombuffer(data, dtype).reshape(json.loads(shape)).copy()
+            for name, dtype, shape, data in rows
+        }
+
+    def states(self) -> Iterator[StateRow]:
+        critical = self._critical()
+        rows = self._db.execute(
+            "SELECT id, step, lambda, iterations, imbalance, negative, mode, jumped, wall_time_s, next_increment,"
+            " stretching, bending, folding, note, cuts, unknowns, points FROM states ORDER BY id"
+        )
+        for (
+            row,
+            step,
+            lam,
+            its,
+            imbalance,
+            negative,
+            mode,
+            jumped,
+            wall,
+            nxt,
+            s,
+            b,
+            f,
+            note,
+            cuts,
+            q,
+            points,
+        ) in rows:
+            yield StateRow(
+                step, lam, its, imbalance, negative, mode, bool(jumped), wall, nxt, (s, b, f), note,
+                tuple(json.loads(cuts)), _floats(q), _floats(points).reshape(-1, 3), tuple(critical.get(row, ())),
+            )  # fmt: skip
+
+    def _critical(self) -> dict[int, list[CriticalRow]]:
+        """Critical points by the row of the state that they were passed before."""
+        found: dict[int, list[CriticalRow]] = {}
+        rows = self._db.execute(
+            "SELECT state, step, kind, lambda, error, negative_before, negative_behind, unknowns, mode FROM critical"
+            " ORDER BY id"
+        )
+        for state, step, kind, lam, error, before, behind, q, mode in rows:
+            row = CriticalRow(step, kind, lam, error, (before, behind), _floats(q), _floats(mode))
+            found.setdefault(state, []).append(row)
+        return found
+
+    def steps(self) -> dict[int, tuple[str, str, int]]:
+        """Outcome, reason and lost iterations of every step that ended."""
+        rows = self._db.execute("SELECT step, outcome, reason, iterations FROM steps")
+        return {step: (outcome, reason, iterations) for step, outcome, reason, iterations in rows}
+
+    def close(self) -> None:
+        with suppress(sqlite3.Error):  # takes the empty journal away; it is in nobody's way if that fails
+            self._db.execute("PRAGMA journal_mode = DELETE")
+        self._db.close()
+
+    def _guard(self) -> _Transaction:
+        return _Transaction(self._db, self.file)
+
+
+class _Transaction:
+    """A transaction whose failure is told in one line."""
+
+    def __init__(self, db: sqlite3.Connection, file: FilePath) -> None:
+        self.db, self.file = db, file
+
+    def __enter__(self) -> None:
+        self.db.__enter__()
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        try:
+            self.db.__exit__(kind, error, trace)
+        except sqlite3.Error as failed:
+            raise PathFileError(f"cannot write '{self.file}' ({failed}); is the disk full?") from failed
+        if isinstance(error, sqlite3.Error):
+            raise PathFileError(f"cannot write '{self.file}' ({error}); is the disk full?") from error
+
+
+@contextmanager
+def reading(file: FilePath) -> Iterator[None]:
+    """Damaged files are told in one line, whatever comes up while they are read."""
+    try:
+        yield
+    except InputError as error:
+        raise PathFileError(f"'{file}': {error}") from error
+    except (sqlite3.Error, KeyError, TypeError, ValueError) as error:
+        raise PathFileError(f"'{file}' is not a path file ({error}); give one that bh has written") from error
+
+
+def _journal(file: FilePath) -> FilePath:
+    return file.with_name(file.name + "-journal")
+
+
+def _connect(file: FilePath) -> sqlite3.Connection:
+    db = sqlite3.connect(file, timeout=10.0)
+    # a rollback journal survives a killed process without waiting for the disk's own cache at every state
+    db.execute("PRAGMA journal_mode = TRUNCATE")
+    db.execute("PRAGMA synchronous = OFF")
+    return db
+
+
+def _floats(data: bytes) -> Array:
+    return np.frombuffer(data, "<f8").copy()
+
+
+def _little(array: AnyArray) -> AnyArray:
+    kind = "<i8" if array.dtype.kind in "iu" else "<f8"
+    return np.ascontiguousarray(array, dtype=kind)

@@ -1,0 +1,1 @@
+"""What runs beside the physics: progress meters, threads, the cache of compiled kernels."""

@@ -1,0 +1,81 @@
+"""JSON schema of a scene, for editors that check and complete TOML while it is written (`bh schema`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from bh.scene import tables
+from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
+from bh.scene.reading import Table
+
+SINGLE: dict[str, type[Table]] = {
+    "sheet": tables.SheetTable,
+    "model": tables.ModelTable,
+    "outputs": tables.OutputsTable,
+}
+NAMED = "^[^:]+:[^:]+$"  # module:name, of the user's own
+VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+OWN = {
+    "type": "object",
+    "properties": {"kind": {"type": "string", "pattern": NAMED}},
+    "required": ["kind"],
+}
+MESHES: tuple[type[Table], ...] = (tables.MeshTable, tables.GmshTable, tables.DrawnTable)
+
+
+def schema() -> dict[str, Any]:
+    """The schema (draft 2020-12) of every table and key of a scene.
+
+    What only fits together with other values (places, widths and radii, one of two keys) is told by `bh check`.
+    """
+    found: dict[str, Any] = {}
+    patterns: list[type[Table]] = [*LIBRARY.values(), FilePattern, DrawingPattern]
+    steps = {key: _one_or_more(_table(found, kind)) for key, kind in tables.ACTUATIONS.items()}
+    steps["until"] = _table(found, tables.UntilTable)
+    scene = {
+        "pattern": {"anyOf": [*_any(found, patterns)["anyOf"], OWN]},
+        **{name: _table(found, kind) for name, kind in SINGLE.items()},
+        "mesh": _any(found, MESHES),
+        "supports": {"type": "array", "items": {"anyOf": [_table(found, tables.SupportTable), OWN]}},
+        "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
+        "symmetry": {"anyOf": [{"enum": ["x", "y"]}, VECTOR]},
+        "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},
+        "steps": {
+            "type": "array",
+            "minItems": 1,
+            "items": {
+                "type": "object",
+                "properties": steps,
+                "patternProperties": {NAMED: {"type": ["object", "array"]}},
+                "additionalProperties": False,
+                "minProperties": 1,
+            },
+        },
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "A scene of the bar-and-hinge workbench",
+        "type": "object",
+        "properties": scene,
+        "required": ["pattern", "sheet", "steps"],
+        "additionalProperties": False,
+        "$defs": dict(sorted(found.items())),
+    }
+
+
+def _table(found: dict[str, Any], kind: type[Table]) -> dict[str, Any]:
+    """A reference to the schema of a table, which is put into `found`."""
+    if kind.__name__ not in found:
+        own = kind.model_json_schema(ref_template="#/$defs/{model}")
+        found.update(own.pop("$defs", {}))
+        found[kind.__name__] = own
+    return {"$ref": f"#/$defs/{kind.__name__}"}
+
+
+def _any(found: dict[str, Any], kinds: Iterable[type[Table]]) -> dict[str, Any]:
+    return {"anyOf": [_table(found, kind) for kind in kinds]}
+
+
+def _one_or_more(item: dict[str, Any]) -> dict[str, Any]:
+    return {"anyOf": [item, {"type": "array", "items": item, "minItems": 1}]}

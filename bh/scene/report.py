@@ -1,0 +1,138 @@
+"""What a scene is before it is solved: in words, and the flat pattern drawn with its creases and supports."""
+
+from __future__ import annotations
+
+import os
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bh.errors import InputError
+from bh.model.supports import Support, select
+from bh.scene.load import Scene
+from meshes import SheetMesh
+from meshes.curves import sample
+from meshes.io.draw import LOOKS, flat_lines
+from meshes.io.export import replacing
+from meshes.mesh import count
+
+SHOWN = 12  # creases or places in a list
+
+
+def report(scene: Scene) -> list[str]:
+    """The scene in lines: sheet, mesh, creases, places, supports, steps, and what to know of them."""
+    model, mesh = scene.model, scene.model.mesh
+    size = np.ptp(mesh.points, axis=0)
+    lines = [
+        f"sheet: {size[0]:.5g} x {size[1]:.5g} mm, {mesh.areas.sum():.6g} mm^2, t = {model.sheet.t:g} mm",
+        f"mesh: {mesh!r}; {model.formulation}",
+    ]
+    for name in mesh.creases[:SHOWN]:
+        pairs = mesh.crease_edges(name)
+        length = float(np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1).sum())
+        angles = mesh.fold_angles.get(name)
+        drawn = (
+            ""
+            if angles is None or np.isnan(angles).any()
+            else f", drawn to {degrees(abs(angles).mean()):.0f} degrees"
+        )
+        lines.append(
+            f"crease {name}: {mesh.folds.get(name, 'not drawn')}, {length:.5g} mm, {count(len(pairs), 'edge')}{drawn}"
+        )
+    if len(mesh.creases) > SHOWN:
+        lines.append(f"and {len(mesh.creases) - SHOWN} more creases")
+    places = [name for name in (*mesh.corners, *mesh.edge_sets) if not name.startswith("crease:")]
+    more = f" and {len(places) - SHOWN} more" if len(places) > SHOWN else ""
+    lines.append(f"places: {', '.join(places[:SHOWN]) or 'none'}{more}")
+    for support in model.supports:
+        if isinstance(support, Support):
+            what = f"fix {support.fix}" if support.fix is not None else "clamped"
+            lines.append(f"support at {support.at}: {what}, {count(len(select(mesh, support.at)), 'node')}")
+    if not model.supports:
+        lines.append("supports: none; rigid motions are taken out, nothing is held")
+    for i, step in enumerate(model.steps):
+        lines.append(f"step {i + 1}: " + ", ".join(_words(item) for item in step))
+    return lines + [f"remark ({remark.code}): {remark}" for remark in model.remarks]
+
+
+def _words(item: Any) -> str:
+    given = {key: value for key, value in vars(item).items() if value is not None}
+    place = given.pop("crease", None) or given.pop("at", "")
+    rest = ", ".join(f"{key} = {value}" for key, value in given.items())
+    return f"{type(item).__name__.lower()} {place} ({rest})"
+
+
+def draw(scene: Scene, file: str | os.PathLike[str]) -> Path:
+    """Draw the flat pattern to a .png, .svg or .pdf file: creases by their fold, supports as marks, named places.
+
+    A sheet that is not flat is drawn as seen from +z.
+
+    Returns:
+        the absolute path of the file.
+
+    Raises:
+        InputError: another suffix, or a place that cannot be written to.
+    """
+    target = Path(file)
+    suffix = target.suffix.lower()
+    if suffix not in (".png", ".svg", ".pdf"):
+        raise InputError(f"picture '{target}' is no .png, .svg or .pdf file; name it so")
+    figure = _figure(scene)
+    with replacing(target) as temporary:
+        figure.savefig(temporary, format=suffix[1:], dpi=150)
+    return target.resolve()
+
+
+def _figure(scene: Scene) -> Any:
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    mesh = scene.model.mesh
+    size = np.ptp(mesh.points[:, :2], axis=0)
+    wide = float(np.clip(size[0] / max(size[1], 1e-12), 0.4, 2.5))
+    figure = Figure(figsize=(min(10.0, 7.0 * wide) + 0.8, min(7.0, 10.0 / wide) + 1.3), layout="constrained")
+    axes = figure.subplots()
+    seen = mesh.points[:, :2]
+    axes.add_collection(
+        LineCollection(list(seen[mesh.topology.edges]), colors="0.85", linewidths=0.5, zorder=1)
+    )
+    names = set()
+    for layer, points in _outlines(mesh):
+        colour, dashes, _ = LOOKS[layer]
+        style: Any = (0, tuple(1.2 * x for x in dashes)) if dashes else "-"
+        label = layer if layer not in names else None
+        names.add(layer)
+        axes.plot(*points.T, color=colour, linestyle=style, linewidth=1.6, label=label, zorder=3)
+    _mark_supports(axes, scene)
+    axes.set_aspect("equal")
+    axes.autoscale()
+    axes.margins(0.06)
+    axes.set(xlabel="x, mm", ylabel="y, mm")
+    nodes, triangles = count(len(mesh.points), "node"), count(len(mesh.triangles), "triangle")
+    axes.set_title(f"{scene.name}\n{nodes}, {triangles}, {mesh.kind}", fontsize=9)
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    return figure
+
+
+def _outlines(mesh: SheetMesh) -> list[tuple[str, Any]]:
+    """Layers and points (k, 2) of boundary and creases, seen from +z."""
+    if mesh.flat:
+        return [(line.layer, sample(line.curve)) for line in flat_lines(mesh) if line.layer != "facet"]
+    found = [("boundary", mesh.points[pair][:, :2]) for pair in mesh.topology.boundary]
+    for name in mesh.creases:
+        found += [
+            (mesh.folds.get(name, "flat"), mesh.points[pair][:, :2]) for pair in mesh.crease_edges(name)
+        ]
+    return found
+
+
+def _mark_supports(axes: Any, scene: Scene) -> None:
+    mesh = scene.model.mesh
+    for support, mark in zip(scene.model.supports, "^so*DvP" * len(scene.model.supports), strict=False):
+        if isinstance(support, Support):
+            at = mesh.points[select(mesh, support.at), :2]
+            what = f"{support.at if isinstance(support.at, str) else 'nodes'}: {support.fix or 'clamped'}"
+            axes.plot(*at.T, mark, color="#009e73", markersize=4.5, linestyle="none", label=what, zorder=4)

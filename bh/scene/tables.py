@@ -1,0 +1,229 @@
+"""What a scene file may hold: one class a table, one field a key, its description what is allowed there.
+
+Descriptions are what a user reads behind "give ..." in an error, so they state unit and range. Values that
+only fit or fail together with others (a place, a width too large for its radius) are checked where they are
+used.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from bh.model.pinch import Profile
+from bh.model.refinement import LEAST, MOST
+from bh.scene.reading import (
+    DENSITY,
+    LSTAR,
+    PLACE,
+    VECTOR,
+    Count,
+    Dihedral,
+    FoldAngle,
+    Length,
+    Number,
+    Place,
+    Positive,
+    Rest,
+    Stiffness,
+    Table,
+    Vector,
+)
+from meshes.structured import Kind
+
+
+class SheetTable(Table):
+    E: Positive = Field(
+        description="Young's modulus in MPa, a positive number up to 1e9 MPa (1 GPa is 1000 MPa)"
+    )
+    nu: Annotated[float, Field(gt=-1.0, le=0.5)] = Field(0.0, description="Poisson's ratio in (-1, 0.5]")
+    t: Length = Field(description="the thickness in mm, a positive number")
+
+
+class GmshTable(Table):
+    """An unstructured mesh that conforms to the creases."""
+
+    kind: Literal["gmsh"] = Field(description='"gmsh"')
+    size: Annotated[float, Field(gt=0.0)] = Field(description="the length of an edge in mm, positive")
+    near: dict[str, Annotated[float, Field(gt=0.0)]] = Field(
+        {},
+        description='shorter edges at some creases or sides in mm, such as { "crease:crease" = 1.0 }',
+    )
+    growth: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
+        0.3, description="how fast edges grow away from these, mm a mm, above 0 up to 10"
+    )
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
+
+
+class DrawnTable(Table):
+    """The faces of a drawing, cut into triangles."""
+
+    kind: Literal["drawn"] = Field(description='"drawn"')
+
+
+class MeshTable(Table):
+    kind: Kind = Field("staggered", description='"staggered", "alternating", "one-way" or "mirrored"')
+    along: Count | None = Field(None, description="a whole number of cells along the crease, from 1")
+    aspect_ratio: Annotated[float, Field(gt=0.0, le=1e4)] | None = Field(None, description=DENSITY)
+    rows: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        1, description="a whole number of rows of cells each side of a crease, from 1"
+    )
+
+    @model_validator(mode="after")
+    def one_density(self) -> MeshTable:
+        if (self.along is None) == (self.aspect_ratio is None):
+            given = "both" if self.along is not None else "neither"
+            raise ValueError(f"needs either along (cells along the crease) or aspect_ratio, but has {given}")
+        return self
+
+
+class ModelTable(Table):
+    formulation: str = Field("bars-and-hinges", description="a name that `bh formulations` lists")
+    hinge_lock: bool = Field(True, description="true or false")
+
+
+class OutputsTable(Table):
+    pictures: bool = Field(False, description="true or false")
+    vtu: bool = Field(False, description="true or false")
+    fold: bool = Field(False, description="true or false")
+    folded: list[Literal["glb", "obj", "off", "ply", "stl", "vtk", "msh", "inp"]] = Field(
+        [],
+        description='formats of the folded sheet: "glb" (glTF), "obj", "off", "ply", "stl", "vtk", "msh", "inp"',
+    )
+    flat: list[Literal["svg", "dxf", "fold"]] = Field(
+        [], description='formats of the flat pattern: "svg", "dxf" (mm, a layer a kind of line), "fold"'
+    )
+
+
+class AccuracyTable(Table):
+    """Keys of `bh.Goal`; a number alone is `within`."""
+
+    within: Annotated[float, Field(ge=LEAST, le=MOST)] = Field(
+        description=f"a relative error from {LEAST:g} to {MOST:g} (0.02 is 2 %)"
+    )
+    of: Literal["energy", "tip", "stiffness"] = Field("energy", description='"energy", "tip" or "stiffness"')
+    at: str | None = Field(None, description='the place of a tip or a stiffness, such as "corner:outer-end"')
+    direction: Vector | None = Field(None, description=VECTOR + ", of the force on a stiffness")
+
+
+class SupportTable(Table):
+    at: Place = Field(description=PLACE + ', or "rigid-body"')
+    fix: str | Vector | Annotated[list[Vector], Field(min_length=1)] | None = Field(
+        None, description='letters out of "xyz", a direction [x, y, z], or a list of directions'
+    )
+    clamp: bool = Field(False, description="true or false: also hold the slope across the edges of the place")
+
+    @model_validator(mode="after")
+    def rigid_body_fixes_nothing(self) -> SupportTable:
+        if self.at == "rigid-body" and (self.fix is not None or self.clamp):
+            raise ValueError(
+                'at = "rigid-body" takes out the motions that are left and needs neither; remove fix and clamp'
+            )
+        return self
+
+
+class CreaseTable(Table):
+    Lstar: Positive | None = Field(None, description=LSTAR)
+    stiffness: Stiffness | None = Field(None, description="a stiffness a length, N mm / (mm rad), 0 or more")
+    rest: Rest = Field(math.pi, description="a rest dihedral angle in rad from 0 to 2 pi (flat is pi)")
+
+    @model_validator(mode="after")
+    def one_stiffness(self) -> CreaseTable:
+        if (self.Lstar is None) == (self.stiffness is None):
+            raise ValueError("needs either Lstar (mm) or stiffness (N mm / (mm rad)), one of them")
+        return self
+
+
+class FoldTable(Table):
+    """Keys of `bh.Fold`; which of them go together is checked there."""
+
+    crease: str = Field(description='the name of a crease, or "all"')
+    to: Dihedral | list[Dihedral] | None = Field(
+        None, description="a dihedral angle in rad inside (0, 2 pi), flat is pi, or a list of one an edge"
+    )
+    by: FoldAngle | list[FoldAngle] | Literal["drawn"] | None = Field(
+        None, description='a fold angle in rad from -pi to pi, a list of one an edge, or "drawn"'
+    )
+    rest: Rest | list[Rest] | None = Field(
+        None, description="a rest dihedral angle in rad from 0 to 2 pi, flat is pi, or a list of one an edge"
+    )
+    Lstar: Positive | None = Field(None, description=LSTAR)
+    stiffness: Positive | None = Field(None, description="a positive stiffness a length, N mm / (mm rad)")
+
+
+class PinchTable(Table):
+    """Keys of `bh.Pinch`."""
+
+    crease: str = Field(description='the name of a crease, or "all"')
+    at: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.5, description="the middle of the zone in parts of the crease's length, 0 to 1"
+    )
+    to: Dihedral | None = Field(
+        None, description="the dihedral angle in the middle in rad inside (0, 2 pi), flat is pi"
+    )
+    by: Annotated[float, Field(gt=0.0, lt=math.pi)] | None = Field(
+        None,
+        description="a fold angle in rad inside (0, pi), mountain or valley as drawn; pi - pi / 14 without to",
+    )
+    length: Length | None = Field(
+        None, description="the length of the zone along the crease in mm; a fifth of the crease unless given"
+    )
+    how: Literal["imposed", "rest", "couple"] = Field(
+        "imposed",
+        description='"imposed", "rest" for the rest angles of the crease\'s spring, or "couple" for closing couples',
+    )
+    profile: Profile = Field("cosine", description='"cosine", or "grip" for the same angle all over the zone')
+    couple: Positive | None = Field(
+        None,
+        description='with how = "couple" the largest couple a length in the middle, a positive number in N mm / mm',
+    )
+
+
+class MomentTable(Table):
+    crease: str = Field(description='the name of a crease, or "all"')
+    to: Number = Field(description="a couple a length in N mm / mm")
+
+
+class ForceTable(Table):
+    at: Place = Field(description=PLACE)
+    each: Vector | None = Field(None, description=VECTOR + " in N, on every node of the place")
+    total: Vector | None = Field(None, description=VECTOR + " in N, shared by the nodes of the place")
+
+
+class DisplaceTable(Table):
+    at: Place = Field(description=PLACE)
+    direction: Literal["x", "y", "z"] | Vector = Field(description='"x", "y", "z" or a direction [x, y, z]')
+    by: Number = Field(description="a displacement in mm")
+
+
+class UntilTable(Table):
+    """What ends a step before its actuations are complete."""
+
+    depth: Length | None = Field(None, description="a depth of the corrugation in mm (docs/corrugations.md)")
+    observable: str | None = Field(None, description="the name of an observable, or module:function")
+    value: Number | None = Field(
+        None, description="its value at the end of the step, a number in its own unit"
+    )
+    of: str | None = Field(None, description="the crease or place that it is of")
+    tolerance: Positive = Field(
+        1e-4, description="how near the value must be met, a positive number in its unit"
+    )
+
+    @model_validator(mode="after")
+    def one_target(self) -> UntilTable:
+        if (self.depth is None) == (self.observable is None) or (self.observable is None) != (
+            self.value is None
+        ):
+            raise ValueError("needs either depth (mm), or observable and value")
+        return self
+
+
+ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable]] = {
+    "fold": FoldTable,
+    "pinch": PinchTable,
+    "moment": MomentTable,
+    "force": ForceTable,
+    "displace": DisplaceTable,
+}

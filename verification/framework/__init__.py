@@ -1,0 +1,1 @@
+"""What studies are made with: checks, cases, chapters, records, convergence, measuring."""

@@ -1,0 +1,99 @@
+"""All named cases. Adding one is adding a file of that name with a function `run`, and a line here: the commands, the
+tests and the page of its chapter in the report find it (docs/extending.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+
+from meshes.errors import InputError
+from verification.framework.checks import Case
+
+ROOMS = {"3": "ch3", "4": "ch4", "5": "ch5", "6": "ch6", "A": "app_a", "B": "app_b", "solver": "solver"}
+
+
+@dataclass(frozen=True)
+class Study:
+    """A case: the module of its name in the folder of its chapter (`ROOMS`).
+
+    Attributes:
+        chapter: key of `verification.framework.chapters.CHAPTERS`.
+        long: minutes, not seconds: run only when named, and `records` keeps a run of it.
+        part_of: the case with which `bh verify` runs it too.
+    """
+
+    name: str
+    chapter: str
+    long: bool = False
+    part_of: str | None = None
+
+    @property
+    def module(self) -> str:
+        return f"verification.studies.{ROOMS[self.chapter]}.{self.name}"
+
+
+STUDIES = (
+    Study("strips", "3"),
+    Study("shear_calibration", "3"),
+    Study("cone", "3"),
+    Study("appendix_b", "B"),
+    Study("consistent", "solver"),
+    Study("convergence", "solver"),
+    Study("fig3_6", "3"),
+    Study("fig3_8", "3", long=True),
+    Study("fig3_10", "3", long=True),
+    Study("derivatives", "solver"),
+    Study("fig3_9", "3"),
+    Study("fig3_11", "3"),
+    Study("sheets_3", "3"),
+    Study("fig5_5", "5"),
+    Study("fig5_9", "5"),
+    Study("fig5_10", "5"),
+    Study("fig5_11", "5"),
+    Study("fig5_3", "5"),
+    Study("appendix_a", "A"),
+    Study("pinch_shell", "5"),
+    Study("scan", "3"),
+    Study("hard_cases", "solver"),
+    Study("appendix_b_shell", "B", part_of="appendix_b"),
+    Study("appendix_b_cross", "B", part_of="appendix_b"),
+    Study("appendix_b_fields", "B", part_of="appendix_b"),
+    Study("appendix_b_sheets", "B", part_of="appendix_b"),
+    Study("shell_benchmarks", "solver"),
+    Study("tables4", "4"),
+    Study("speed_error", "solver", long=True),
+    Study("honesty", "solver", long=True),
+    Study("campaign", "solver", long=True),
+    Study("gradients", "solver"),
+    Study("top_down", "4"),
+    Study("bottom_up", "4"),
+    Study("three_point", "4"),
+    Study("forward", "6"),
+    Study("problem_a", "6"),
+    Study("problem_b", "6"),
+    Study("problem_c", "6", long=True),
+)
+BY_NAME = {study.name: study for study in STUDIES}
+ALL_CASES = tuple(BY_NAME)
+LONG_CASES = tuple(study.name for study in STUDIES if study.long)
+CASES = tuple(study.name for study in STUDIES if not study.long)
+
+
+def case(name: str) -> Case:
+    """The function of a named case.
+
+    Raises:
+        InputError: there is no such case; the message lists those there are.
+    """
+    if name not in BY_NAME:
+        raise InputError(f"there is no verification case '{name}'; use one of {', '.join(ALL_CASES)}")
+    found: Case = import_module(BY_NAME[name].module).run
+    return found
+
+
+def with_parts(names: Sequence[str]) -> list[str]:
+    """The names, each followed by the other parts of its study, each case once."""
+    parts = [part for name in names for part in (name, *(s.name for s in STUDIES if s.part_of == name))]
+    return list(dict.fromkeys(parts))

@@ -1,0 +1,1 @@
+"""One folder a chapter of the source, one file a study."""

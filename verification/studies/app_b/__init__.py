@@ -1,0 +1,1 @@
+"""Appendix B: shell finite elements."""

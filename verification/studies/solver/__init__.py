@@ -1,0 +1,1 @@
+"""Formulations, solver and hard cases."""

@@ -1,0 +1,254 @@
+"""Case `campaign`: random scenes with default settings; who does not reach the target must say so.
+
+Every state reached is compared with what four times finer increments give: a state whose energy is more than 2 % higher
+lies on another branch, however well it converged.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+import meshes
+from bh import Automatic, LoadControl, Model, Path, Sheet, trace
+from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.environment import environment
+
+SEED = 2026
+SCENES = 500
+QUICK_SCENES = 60
+TEST_SCENES = 12
+SOURCE = "at least 99 % of the scenes reach their target with default settings; none ends on a higher branch"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One random scene, as plain numbers (mm, rad)."""
+
+    radius: float
+    width: float
+    gap: float
+    creases: int
+    angle: float
+    thickness: float
+    Lstar: float | None
+    aspect_ratio: float
+    kind: str
+    supports: str
+    dihedral: float
+
+    def model(self) -> Model:
+        """The scene as a model; creases alternate between mountain and valley."""
+        radii = [self.radius + self.gap * i for i in range(self.creases)]
+        folds: list[Any] = ["mountain" if i % 2 == 0 else "valley" for i in range(self.creases)]
+        pattern = meshes.annulus_sector(radii, self.width, self.angle, folds)
+        mesh = meshes.structured(pattern, aspect_ratio=self.aspect_ratio, kind=self.kind)  # type: ignore[arg-type]
+        model = Model(mesh, Sheet(E=4000.0, t=self.thickness))
+        if self.supports == "corners":
+            model = model.support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+            model = model.support("corner:inner-end", "z")
+        elif self.supports == "planar crease":
+            model = model.support(f"crease:{mesh.creases[0]}", "z").support("rigid-body")
+        fold = math.pi - self.dihedral
+        return (
+            model.fold("all", by=fold) if self.Lstar is None else model.fold("all", by=fold, Lstar=self.Lstar)
+        )
+
+
+def scenes(count: int, seed: int = SEED) -> list[Scene]:
+    """Random scenes: thin sheets (t at most a twentieth of the panel width) of all sizes, creases and supports."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(count):
+        radius = 10.0 ** rng.uniform(1.3, 2.6)
+        width = radius * 10.0 ** rng.uniform(-1.5, -0.4)
+        thickness = min(10.0 ** rng.uniform(-2.0, 0.3), width / 20.0)
+        held = rng.random() < 0.4
+        found.append(
+            Scene(
+                radius=radius,
+                width=width,
+                gap=width * rng.uniform(0.5, 1.5),
+                creases=int(rng.integers(1, 6)),
+                angle=rng.uniform(0.2, 1.5 * math.pi),
+                thickness=thickness,
+                Lstar=None if held else 10.0 ** rng.uniform(-1.0, 2.7),
+                aspect_ratio=rng.uniform(2.0, 14.0),
+                kind=str(
+                    rng.choice(["staggered", "alternating", "one-way", "mirrored"], p=[0.55, 0.25, 0.1, 0.1])
+                ),
+                supports=str(rng.choice(["free", "corners", "planar crease"])),
+                dihedral=math.radians(rng.uniform(10.0, 170.0)),
+            )
+        )
+    return found
+
+
+FINE = LoadControl(
+    first_rotation=math.radians(3.75), largest_rotation=math.radians(6.75), first=0.025, largest=0.085
+)
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a scene ended, and by how much its energy exceeds that of fine increments (nan where either failed)."""
+
+    scene: Scene
+    outcome: str
+    reason: str
+    excess: float
+    iterations: int
+    unknowns: int
+    wall_time_s: float
+    stable: bool | None = None
+
+
+def play(scene: Scene, compare: bool = True) -> Result:
+    """Solve a scene with default settings, and again with four times finer increments."""
+    model = scene.model()
+    began = time.perf_counter()
+    path = trace(model)
+    spent = time.perf_counter() - began
+    excess = math.nan
+    if path.outcome == "reached" and compare:
+        fine = trace(model, strategy=Automatic(load=FINE))
+        if fine.outcome == "reached":
+            excess = _excess(path, fine)
+    return Result(
+        scene, path.outcome, path.reason, excess, path.iterations, path.unknowns, spent, path.stable
+    )
+
+
+def _excess(path: Path, fine: Path) -> float:
+    scale = max(fine[-1].energy.total, 1e-15 * path._system(0).energy_scale)
+    return (path[-1].energy.total - fine[-1].energy.total) / scale
+
+
+def _played(job: tuple[int, Scene]) -> dict[str, Any]:
+    index, scene = job
+    found = asdict(play(scene))
+    del found["scene"]
+    return {"index": index, **found}
+
+
+def play_all(found: Sequence[Scene], store: FilePath, tell: Callable[[str], None]) -> list[Result]:
+    """Play every scene on all cores; each result is in the file `store` before the next, so a killed run goes on.
+
+    The first line of the file names what its results depend on; a file of anything else is begun anew.
+    """
+    key = json.dumps({"seed": SEED, "scenes": len(found), **environment()})
+    lines = store.read_text(encoding="utf-8").splitlines() if store.is_file() else []
+    if not lines or lines[0] != key or "with changes" in key:
+        lines = [key]
+        store.write_text(key + "\n", encoding="utf-8")
+    done = {item["index"]: item for item in map(_parsed, lines[1:]) if item}
+    jobs = [(index, scene) for index, scene in enumerate(found) if index not in done]
+    if done:
+        tell(f"campaign: {len(done)} of {len(found)} scenes are known from a run that was cut short")
+    with (
+        ProcessPoolExecutor(max_workers=os.cpu_count(), mp_context=get_context("spawn")) as pool,
+        store.open("a", encoding="utf-8") as file,
+    ):
+        futures = [pool.submit(_played, job) for job in jobs]
+        try:
+            for future in as_completed(futures):
+                item = future.result()
+                file.write(json.dumps(item) + "\n")
+                file.flush()
+                done[item["index"]] = item
+                if len(done) % 20 == 0:
+                    tell(f"campaign: {len(done)} of {len(found)} scenes")
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)  # a killed run does not play all others first
+            raise
+    results = []
+    for index, scene in enumerate(found):
+        values = {name: value for name, value in done[index].items() if name != "index"}
+        results.append(Result(scene, **values))
+    return results
+
+
+def _parsed(line: str) -> dict[str, Any] | None:
+    try:
+        item = json.loads(line)
+    except ValueError:  # the line at which the run was killed
+        return None
+    return item if isinstance(item, dict) else None
+
+
+def run(context: Context) -> CaseResult:
+    """The whole campaign."""
+    count = QUICK_SCENES if context.quick else SCENES
+    store = context.folder / f"campaign-{count}.jsonl"
+    found = play_all(scenes(count), store, context.tell)
+    result = judged(found)
+    store.unlink()
+    return result
+
+
+def judged(found: Sequence[Result]) -> CaseResult:
+    """The case from the results of its scenes."""
+    result = CaseResult(
+        name="campaign",
+        title=f"{len(found)} random scenes",
+        question="Does every scene reach its target with default settings, on the branch that fine steps find?",
+        source=SOURCE,
+    )
+    reached = [r for r in found if r.outcome == "reached"]
+    higher = [r for r in reached if r.excess > 0.02]
+    unknown = [r for r in reached if math.isnan(r.excess)]
+    params = {"scenes": len(found), "seed": SEED}
+
+    def add(
+        what: str, value: float, reference: float | None, tolerance: float | None, unit: str = ""
+    ) -> None:
+        source = SOURCE if tolerance is not None else "measured"
+        result.checks.append(Check("campaign", what, params, value, unit, reference, source, tolerance))
+
+    add("share that fails to reach its target", 1.0 - len(reached) / len(found), 0.0, 0.01)
+    add("states on a higher branch (over 2 %)", float(len(higher)), 0.0, 0.0)
+    add("states that fine increments did not reach, so not compared", float(len(unknown)), None, None)
+    add("end states that are not stable", float(sum(r.stable is False for r in reached)), None, None)
+    for q in (50, 95, 100):
+        add(
+            f"iterations, {q}th percentile",
+            float(np.percentile([r.iterations for r in reached], q)),
+            None,
+            None,
+        )
+    for q in (50, 95, 100):
+        add(
+            f"wall time, {q}th percentile",
+            float(np.percentile([r.wall_time_s for r in reached], q)),
+            None,
+            None,
+            "s",
+        )
+    groups = {
+        "reached": reached,
+        "not reached": [r for r in found if r.outcome != "reached"],
+    }
+    series = [
+        line(name, [r.unknowns for r in group], [r.wall_time_s for r in group], "points")
+        for name, group in groups.items()
+    ]
+    result.plots.append(
+        plot("campaign-time", "Run time over size", "unknowns", "wall time, s", series,
+             "Every scene from flat to its target, default settings, one thread each, all cores busy.", log="xy")
+    )  # fmt: skip
+    for r in found:
+        if r.outcome != "reached":
+            result.notes.append(f"Not reached: {r.scene}: {r.outcome}, {r.reason}.")
+        elif r.excess > 0.02:
+            result.notes.append(f"Higher branch by {100 * r.excess:.1f} %: {r.scene}.")
+    return result
