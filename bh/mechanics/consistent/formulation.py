@@ -1,6 +1,6 @@
 """The consistent formulation: triangles of coupled bars and coupled hinges, which converge to Kirchhoff-Love theory.
 
-Energy: 1/2 A t E:C:E of the constant Green strain E of three edges, with plane stress of any Poisson's ratio; and
+Energy: 1/2 A t E:C:E of Green's strain E, smoothed over the edges of triangles, with plane stress of any Poisson's ratio; and
 1/2 A D ((1 - nu) kappa:kappa + nu tr(kappa)^2) with kappa = (1/A) sum_e L_e theta_e mu_e (x) mu_e of three angles
 between the triangle and the sheet's tangent plane at its edges. docs/formulation.md derives it.
 """
