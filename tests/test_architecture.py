@@ -46,7 +46,8 @@ TOP = (
 # so that a part can be closed against itself too (the description does not know `bh.path`, ...).
 RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("meshes", ("meshes",)),
-    ("bh.mechanics", ("meshes", *DESCRIPTION, "bh.mechanics", *PROTOCOL)),
+    ("bh.materials", ("bh.model.model", "bh.materials")),
+    ("bh.mechanics", ("meshes", *DESCRIPTION, "bh.materials", "bh.mechanics", *PROTOCOL)),
     ("bh.solvers", ("meshes", "bh.solvers")),
     *((module, ("meshes", *DESCRIPTION)) for module in DESCRIPTION),
     # `path.plot()` and `bh.trace(..., accuracy=...)` are the user's words; what they need is loaded when it is called

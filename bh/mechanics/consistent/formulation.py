@@ -36,7 +36,7 @@ class Consistent:
     name = "consistent"
     takes_nu = True
     refinement: Refinement | None = Refinement(
-        "staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9
+        "staggered", ((1.0, 0.17), (2.0, 0.065), (4.0, 0.017), (8.0, 0.0042)), 8.0, 1.9
     )
 
     def __init__(self, measure: Measure = smoothed_strain, material: Material = LINEAR) -> None:
