@@ -168,7 +168,7 @@ def creased(mesh: SheetMesh, law: Ints) -> Bools:
     for name in mesh.creases:
         hinge = topology.edge_hinges[topology.find_edges(mesh.crease_edges(name))]
         out[hinge[hinge >= 0]] = True
-    return out
+    return np.asarray(out)
 
 
 def lock_stiffness(model: Model, program: StepProgram) -> Array:
