@@ -167,6 +167,17 @@ def test_the_type_checker_names_a_missing_member(tmp_path: FilePath) -> None:
     assert "observe" in said
 
 
+@pytest.mark.usefixtures("mine")
+def test_rubber() -> None:
+    """A strip at one and a half times its length: mu t / 2 (l^2 + 2 / l - 3) an area."""
+    mesh = meshes.structured(meshes.strip(10.0, 2.0), along=10, rows=2)
+    model = bh.Model(mesh, bh.Sheet(E=3.0, nu=0.5, t=0.2), formulation="mine:RubberSheet").support("all", "z")
+    model = model.support("edge:start", "x").support("corner:inner-start", "y")
+    path = bh.trace(model.displace("edge:end", "x", 5.0))
+    assert path.outcome == "reached"
+    assert path[-1].energy.total == pytest.approx(0.5 * 0.2 * (1.5**2 + 2.0 / 1.5 - 3.0) * 20.0, rel=1e-8)
+
+
 def test_study(mine: ModuleType, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "verification.studies.ch3.mine", mine)
     monkeypatch.setitem(cases.BY_NAME, "mine", cases.Study("mine", "3"))

@@ -1,7 +1,8 @@
 """How the consistent formulation depends on the design: the counterpart of `bars_and_hinges.derivatives`.
 
-Triangles have gamma_k = (l_k^2 - L_k^2) / 2 and the energy 1/2 gamma.K.gamma, patches angles theta (phi - rest less the
-rotations) and 1/2 theta.B.theta, spring creases 1/2 k turn^2. With velocities v of the nodes and w of the rotations,
+Bars have gamma = (l^2 - L^2) / 2 and cells the energy 1/2 gamma.K.gamma of theirs, patches angles theta (phi - rest
+less the rotations) and 1/2 theta.B.theta, spring creases 1/2 k turn^2. With velocities v of the nodes and w of the
+rotations,
 
     r . (v, w) = sum gamma'.K.gamma + sum theta'.B.theta + sum (k turn + couple) turn' + lock m(phi) phi' - load . v.
 """
@@ -16,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.mechanics.consistent import kernels
+from bh.mechanics.consistent.membrane import Cells
+from bh.mechanics.consistent.membrane_kernels import bar_rates, cell_forces
 from bh.mechanics.shared import penetration as closings
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients, dihedral_hessians
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Data = dict[str, Array]
 CLAMPED = "sensitivities to geometry do not know clamped edges; hold their nodes, or keep the geometry"
+CELLS = ("K of triangles", "K of edges")
 
 
 class ConsistentDerivatives:
@@ -48,10 +52,8 @@ class ConsistentDerivatives:
         self.x = system.positions(q, lam)
         self.now = system.internal(self.x, self.alpha, lam)
         self.N, self.M, self.S, self.L = system.split(self.now.forces)
-        # edge k of a triangle is opposite its corner k
-        self.ends = np.stack((np.roll(e.triangles, -1, axis=1), np.roll(e.triangles, -2, axis=1)), axis=2)
-        self.d = self.x[self.ends[..., 1]] - self.x[self.ends[..., 0]]
-        self.gamma = 0.5 * ((self.d**2).sum(axis=2) - e.rest_square)
+        self.membrane = e.stretching.membrane
+        self.gamma = e.stretching.gamma(self.x)
         self.turning = e.patches.kind == kernels.TURN
         self.unit_lock = lock_terms(dihedral_angles(self.x, system.hinges), np.ones(len(system.hinges)))
 
@@ -64,8 +66,8 @@ class ConsistentDerivatives:
         e, lam = self.system.elements, self.lam
         return {
             "places": self.system.displacements.reactions(self.x),
-            "rest_square": e.rest_square,
-            "K": e.K,
+            "rest_square": self.membrane.rest_square,
+            **dict(zip(CELLS, e.stretching.stiffness(self.x), strict=True)),
             "B": e.patches.B,
             "rest": np.where(self.turning, e.rest.at(lam), 0.0),
             "ghost": e.ghost,
@@ -84,8 +86,7 @@ class ConsistentDerivatives:
         e, x, alpha = self.system.elements, self.x, self.alpha
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         if "stretching" in kinds:
-            N, energy = np.empty_like(self.N), np.empty(len(e.triangles))
-            kernels.stretching_forces(x, e.triangles, e.rest_square, e.K, f, N, energy)
+            e.stretching.forces(x, f, np.empty_like(self.N))
         if "bending" in kinds:
             rest, M, theta = e.rest.at(self.lam), np.empty_like(self.M), np.empty_like(self.M)
             kernels.bending_forces(
@@ -117,10 +118,10 @@ class ConsistentDerivatives:
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the rotations, along v (n, 3) and w."""
         system, e, x = self.system, self.system.elements, self.x
-        rates, _ = system.force_rates(x, v, w, closing=bool(self.L.any()), controlled=False)
+        rates, _ = system.force_rates(x, v, w, e.patches.B, closing=bool(self.L.any()), controlled=False)
         dN, dM, dS, _ = system.split(rates)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
-        kernels.stretching_force_rates(x, v, e.triangles, self.N, dN, f)
+        e.stretching.force_rates(x, v, self.N, dN, f)
         kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, self.M, dM, f, r)
         kernels.spring_force_rates(x, v, e.hinges, e.turns, self.S, dS, f, r)
         if self.L.any():
@@ -134,12 +135,11 @@ class ConsistentDerivatives:
         inside = np.where((joined.members >= 0)[..., None], e.triangles[joined.members], -1)
         patch = inside.reshape(len(inside), 1, 1, -1)
         count = joined.kind.shape[1]
-        triangle = e.triangles[:, None, :]
         of_spring = dict.fromkeys(("spring_stiffness", "spring_rest", "couple"), e.hinges)
         return {
             "places": own,
-            "rest_square": triangle.repeat(3, axis=1),
-            "K": triangle[:, None].repeat(3, axis=1).repeat(3, axis=2),
+            "rest_square": self.membrane.bars,
+            **{name: _spread(cells) for name, cells in zip(CELLS, self.membrane.cells, strict=True)},
             "B": patch.repeat(count, axis=1).repeat(count, axis=2),
             "lock": self.system.hinges,
             **of_spring,
@@ -161,8 +161,8 @@ class ConsistentDerivatives:
         gamma1, theta1, turn1 = self._rates(v, w)
         _, _, phi_hinge1, _ = self._angles(v)
         return {
-            "rest_square": -0.5 * np.einsum("tkl,tl->tk", e.K, gamma1),
-            "K": gamma1[:, :, None] * self.gamma[:, None, :],
+            "rest_square": -0.5 * self._forces(gamma1),
+            **self._products(gamma1, self.gamma),
             "B": theta1[:, :, None] * self.now.theta[:, None, :],
             "rest": np.where(self.turning, -np.einsum("cab,cb->ca", e.patches.B, theta1), 0.0),
             "spring_stiffness": self.now.turns * turn1,
@@ -178,7 +178,7 @@ class ConsistentDerivatives:
         e, theta, turns = self.system.elements, self.now.theta, self.now.turns
         return {
             "rest_square": -0.5 * stretch * self.N,
-            "K": 0.5 * stretch * self.gamma[:, :, None] * self.gamma[:, None, :],
+            **self._products(0.5 * stretch * self.gamma, self.gamma),
             "B": 0.5 * bend * theta[:, :, None] * theta[:, None, :],
             "rest": np.where(self.turning, -bend * self.M, 0.0),
             "spring_stiffness": 0.5 * fold * turns**2,
@@ -189,12 +189,14 @@ class ConsistentDerivatives:
         """Derivatives of the second variation (v, w) . K (v, w) to the data, at fixed positions and rotations."""
         e = self.system.elements
         gamma1, theta1, turn1 = self._rates(v, w)
-        gamma2 = ((v[self.ends[..., 1]] - v[self.ends[..., 0]]) ** 2).sum(axis=2)
+        ends = v[self.membrane.bars]
+        gamma2 = ((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1)
         theta2, _, phi1, phi2 = self._angles(v)
         spring2 = phi2[e.springs]
+        two = self._products(gamma2, self.gamma)
         return {
-            "rest_square": -0.5 * np.einsum("tkl,tl->tk", e.K, gamma2),
-            "K": gamma1[:, :, None] * gamma1[:, None, :] + gamma2[:, :, None] * self.gamma[:, None, :],
+            "rest_square": -0.5 * self._forces(gamma2),
+            **{name: one + two[name] for name, one in self._products(gamma1, gamma1).items()},
             "B": theta1[:, :, None] * theta1[:, None, :] + theta2[:, :, None] * self.now.theta[:, None, :],
             "rest": np.where(self.turning, -np.einsum("cab,cb->ca", e.patches.B, theta2), 0.0),
             "spring_stiffness": turn1**2 + self.now.turns * spring2,
@@ -204,14 +206,28 @@ class ConsistentDerivatives:
         }
 
     def _rates(self, v: Array, w: Array) -> tuple[Array, Array, Array]:
-        """Rates of gamma (t, 3), theta (c, a) and the turns of the springs (h,)."""
+        """Rates of gamma (b,), theta (c, a) and the turns of the springs (h,)."""
         e = self.system.elements
-        gamma1 = np.einsum("tkc,tkc->tk", self.d, v[self.ends[..., 1]] - v[self.ends[..., 0]])
+        gamma1 = np.empty(len(self.membrane.bars))
+        bar_rates(self.x, v, self.membrane.bars, gamma1)
         own = np.where(e.rotation >= 0, np.append(w, 0.0)[e.rotation], 0.0)
         _, phi1, phi_hinge1, _ = self._angles(v)
         theta1 = np.where(self.turning, phi1 - own, own)
         turn1 = phi_hinge1[e.springs] - w[e.turns].sum(axis=1)
         return gamma1, theta1, turn1
+
+    def _forces(self, gamma: Array) -> Array:
+        """(b,) sums over the cells of K gamma."""
+        out = np.empty(len(gamma))
+        three, five = self.membrane.cells
+        K = self.system.elements.stretching.stiffness(self.x)
+        cell_forces(three.bars, K[0], five.bars, K[1], gamma, out)
+        return out
+
+    def _products(self, one: Array, two: Array) -> Data:
+        """Derivatives of one.K.two to the K of both kinds of cells, for values of all bars."""
+        cells = zip(CELLS, self.membrane.cells, strict=True)
+        return {name: one[c.bars][:, :, None] * two[c.bars][:, None, :] for name, c in cells}
 
     def _angles(self, v: Array) -> tuple[Array, Array, Array, Array]:
         """Second and first rates of the turns of patches (c, a), first and second ones of all hinges (m,)."""
@@ -233,3 +249,9 @@ class ConsistentDerivatives:
             hessians = dihedral_hessians(corners.reshape(-1, 3), rows)
             second[clamp] = np.einsum("hi,hij,hj->h", moving, hessians, moving)
         return second, first, phi1, phi2
+
+
+def _spread(cells: Cells) -> Ints:
+    """(c, k, k, p) nodes that the entries of a cell's K depend on."""
+    count, most = cells.bars.shape
+    return np.broadcast_to(cells.nodes[:, None, None, :], (count, most, most, cells.nodes.shape[1]))

@@ -10,15 +10,19 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
+from bh.materials import Constant, LinearElastic, Material
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
-from bh.mechanics.consistent.kernels import TURN
+from bh.mechanics.consistent.bending import Bending
+from bh.mechanics.consistent.kernels import OWN, TURN
+from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.patches import (
     Patches,
     bending_matrices,
+    curvature_maps,
     patches,
-    stretching_matrices,
     triangle_frames,
 )
+from bh.mechanics.consistent.stretching import Stretching
 from bh.mechanics.shared.hinge_lock import ZONE, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+LINEAR = LinearElastic()
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +46,8 @@ class ConsistentElements:
 
     Attributes:
         members: (t,) which triangles of the mesh these are; triangles: (t, 3) nodes; edge k is opposite corner k.
-        rest_square: (t, 3) squares of the edges' lengths in the stress-free sheet, mm^2.
-        K: (t, 3, 3) energy of stretching 1/2 gamma.K.gamma, N / mm^3.
+        heights: (t, 3) of the triangles on their edges in the stress-free sheet, mm.
+        stretching: cells of the membrane and their law; `bending` patches and theirs.
         B_triangle: (t, 3, 3) energy of bending of a triangle by the angles at its edges, N mm.
         patches: matrices and angles of the patches.
         quad, ghost, place, rotation, column: of the angles, see `bh.mechanics.consistent.kernels`.
@@ -57,8 +62,9 @@ class ConsistentElements:
 
     members: Ints
     triangles: Ints
-    rest_square: Array
-    K: Array
+    heights: Array
+    stretching: Stretching
+    bending: Bending
     B_triangle: Array
     patches: Patches
     quad: Ints
@@ -86,11 +92,13 @@ def consistent_elements(
     prescribed_start: Array,
     moment_start: Array,
     plane: Mirror | None = None,
+    measure: Measure = smoothed_strain,
+    material: Material = LINEAR,
 ) -> ConsistentElements:
     """Element arrays of a model in one step; `prescribed_start` and `moment_start` (m,) are what creases begin with.
 
     Dihedral angles (rad) and total moments (N mm) of all hinges. With a `plane` they are those of the half of a
-    symmetric sheet (`bh.mechanics.shared.mirrored`).
+    symmetric sheet (`bh.mechanics.shared.mirrored`). `measure` is what measures the strain of the `material`.
 
     Raises:
         ModelError: given element stiffness, or a couple on a crease that is no spring.
@@ -101,17 +109,21 @@ def consistent_elements(
     _check_moments(mesh, load_step)
     topology = mesh.topology
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
-    B = bending_matrices(edges, areas, sheet.bending_stiffness(), sheet.nu)
+    maps, of_curvature = curvature_maps(edges, areas), material.bending(sheet)
+    B = bending_matrices(maps, areas, of_curvature.moduli(np.zeros((1, 3)))[0])
     clamped = np.zeros(len(topology.edges), dtype=bool)
     clamped[topology.find_edges(load_step.constraints.clamped)] = True
     spring = law == SPRING
     part = None if plane is None else plane.triangle_weight
-    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part)
+    condense = isinstance(of_curvature, Constant)
+    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part, condense=condense)
     if plane is not None:
         from bh.mechanics.consistent.half import half_patches
 
         joined = half_patches(joined, spring, plane)
     rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
+    part_area = areas if part is None else part * areas
+    membrane, law_of_strain = measure(mesh, creased(mesh, law)), material.stretching(sheet)
     quad, ghost = _quads(mesh, joined)
     nodes, place = _rows(joined, quad)
     has = rotation >= 0
@@ -137,8 +149,9 @@ def consistent_elements(
     begin = prescribed_start[springs] - carried / np.where(k_fold == 0.0, np.inf, k_fold)
     begin = np.where(np.isnan(load_step.rest.start[springs]), begin, load_step.rest.start[springs])
     whole = ConsistentElements(
-        members=np.arange(len(mesh.triangles)), triangles=mesh.triangles, rest_square=(edges**2).sum(axis=2),
-        K=stretching_matrices(edges, areas, sheet.E, sheet.t, sheet.nu), B_triangle=B, patches=joined,
+        members=np.arange(len(mesh.triangles)), triangles=mesh.triangles,
+        heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2), stretching=Stretching(membrane, law_of_strain),
+        bending=Bending(joined, of_curvature, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
         quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
         width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=Ramp(begin, load_step.rest.end[springs]),
@@ -147,6 +160,16 @@ def consistent_elements(
         lock=lock_stiffness(model, load_step), rotations=rotations,
     )  # fmt: skip
     return whole if plane is None else _half(whole, plane)
+
+
+def creased(mesh: SheetMesh, law: Ints) -> Bools:
+    """(m,) hinges that are drawn as creases or fold in this step: the strain may jump there, whatever a step does."""
+    topology = mesh.topology
+    out = law != SHEET
+    for name in mesh.creases:
+        hinge = topology.edge_hinges[topology.find_edges(mesh.crease_edges(name))]
+        out[hinge[hinge >= 0]] = True
+    return np.asarray(out)
 
 
 def lock_stiffness(model: Model, load_step: LoadStep) -> Array:
@@ -196,7 +219,8 @@ def _number_rotations(
 ) -> tuple[Ints, Ints, int]:
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
 
-    There is one for each hinge between two patches, and two for each spring crease; but one for a spring in the plane
+    There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that
+    keeps its own; but one for a spring in the plane
     of a symmetric sheet, and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
@@ -211,7 +235,10 @@ def _number_rotations(
     triangles = mesh.topology.edge_triangles[mesh.topology.hinge_edges, 0]
     side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
     has = (joined.hinge >= 0) & ~joined.inner
-    return np.where(has, both[joined.hinge, side], -1), both, int(count.sum())
+    rotation = np.where(has, both[joined.hinge, side], -1)
+    free = (joined.hinge < 0) & (joined.kind == OWN)
+    rotation[free] = count.sum() + np.arange(free.sum())
+    return rotation, both, int(count.sum() + free.sum())
 
 
 def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
@@ -252,12 +279,13 @@ def _half(e: ConsistentElements, plane: Mirror) -> ConsistentElements:
     """Triangles, springs and locks of the half; patches and rotations are those of the half already."""
     weight = plane.triangle_weight
     triangle = weight > 0.0
+    membrane = e.stretching.membrane.weighted(weight, plane.hinge_weight)
     by = plane.hinge_weight[e.springs]
     spring = by > 0.0
     by = by[spring]
     return replace(
         e, members=e.members[triangle], triangles=np.ascontiguousarray(e.triangles[triangle]),
-        rest_square=e.rest_square[triangle], K=(weight[:, None, None] * e.K)[triangle],
+        heights=e.heights[triangle], stretching=Stretching(membrane, e.stretching.law),
         B_triangle=(weight[:, None, None] * e.B_triangle)[triangle], springs=e.springs[spring],
         hinges=np.ascontiguousarray(e.hinges[spring]), turns=e.turns[spring],
         spring_stiffness=by * e.spring_stiffness[spring],

@@ -1,8 +1,8 @@
 """The consistent formulation: triangles of coupled bars and coupled hinges, which converge to Kirchhoff-Love theory.
 
-Energy: 1/2 A t E:C:E of the constant Green strain E of three edges, with plane stress of any Poisson's ratio; and
-1/2 A D ((1 - nu) kappa:kappa + nu tr(kappa)^2) with kappa = (1/A) sum_e L_e theta_e mu_e (x) mu_e of three angles
-between the triangle and the sheet's tangent plane at its edges. docs/formulation.md derives it.
+Energy: 1/2 A t E:C:E of Green's strain E, smoothed over the edges of triangles, with plane stress of any Poisson's
+ratio; and 1/2 A D ((1 - nu) kappa:kappa + nu tr(kappa)^2) with kappa = (1/A) sum_e L_e theta_e mu_e (x) mu_e of three
+angles between the triangle and the sheet's tangent plane at its edges. docs/formulation.md derives it.
 """
 
 from __future__ import annotations
@@ -12,12 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.formulations.remarks import Remark
 from bh.formulations.state import Energy, State
 from bh.loading.load_step import LoadStep
+from bh.materials import Material
 from bh.mechanics.consistent import remarks
 from bh.mechanics.consistent.derivatives import ConsistentDerivatives
+from bh.mechanics.consistent.elements import LINEAR
 from bh.mechanics.consistent.kernels import TURN
+from bh.mechanics.consistent.membrane import Measure, constant_strain, smoothed_strain
 from bh.mechanics.consistent.system import ConsistentSystem
 from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.kinematics import dihedral_angles
@@ -35,15 +39,21 @@ class Consistent:
 
     name = "consistent"
     takes_nu = True
-    refinement = Refinement("staggered", ((1.0, 0.17), (2.0, 0.06), (4.0, 0.007), (8.0, 0.0035)), 8.0, 1.9)
+    refinement: Refinement | None = Refinement(
+        "staggered", ((1.0, 0.17), (2.0, 0.065), (4.0, 0.017), (8.0, 0.0042)), 8.0, 1.9
+    )
+
+    def __init__(self, measure: Measure = smoothed_strain, material: Material = LINEAR) -> None:
+        """What measures the strain of the sheet, and its material (E, nu and t are the sheet's)."""
+        self.measure, self.material = measure, material
 
     def system(self, model: Model, load_step: LoadStep, start: State | None) -> ConsistentSystem:
         """The system of one step that begins at `start` (None: the stress-free sheet)."""
-        return ConsistentSystem(model, load_step, start)
+        return ConsistentSystem(model, load_step, start, None, self.measure, self.material)
 
     def half(self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror) -> ConsistentSystem:
         """The system of the kept half of a symmetric sheet; `start` is a state of the whole."""
-        return ConsistentSystem(model, load_step, start, plane)
+        return ConsistentSystem(model, load_step, start, plane, self.measure, self.material)
 
     def whole(
         self, whole: ConsistentSystem, half: ConsistentSystem, plane: Mirror, q: Array, lam: float
@@ -58,7 +68,13 @@ class Consistent:
         return _unknowns(half, whole.positions(q, lam), lam)
 
     def derivatives(self, system: ConsistentSystem, q: Array, lam: float) -> ConsistentDerivatives:
-        """Derivatives of a system by its element data at unknowns q (size,)."""
+        """Derivatives of a system by its element data at unknowns q (size,).
+
+        Raises:
+            ModelError: the material is not linear.
+        """
+        if not (system.elements.stretching.constant and system.elements.bending.constant):
+            raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
         return ConsistentDerivatives(system, q, lam)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
@@ -84,7 +100,7 @@ class Consistent:
         x = system.positions(q, lam)
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
-        stretching, bending = now.stretching, system.bending_by_triangle(now.theta)
+        stretching, bending = system.stretching_by_triangle(x), system.bending_by_triangle(now.theta)
         folding = 0.5 * e.spring_stiffness * now.turns**2
 
         angles = dihedral_angles(x, topology.hinges)
@@ -112,6 +128,16 @@ class Consistent:
             crease_moments=moments, stable=stable,
             contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
         )  # fmt: skip
+
+
+class ConstantStrain(Consistent):
+    """The same with constant-strain triangles: the member that `linear-shell` of `fem` is the twin of."""
+
+    name = "consistent-constant"
+    refinement = None
+
+    def __init__(self, material: Material = LINEAR) -> None:
+        super().__init__(constant_strain, material)
 
 
 def _unknowns(system: ConsistentSystem, x: Array, lam: float) -> Array:

@@ -34,6 +34,7 @@ def half_patches(joined: Patches, spring: Bools, plane: Mirror) -> Patches:
     inner |= inside
     share = np.where(inside, 0.5, 1.0)
     B = share[:, :, None] * B * share[:, None, :]
+    shares = joined.shares[keep] * share[:, None, :]
 
     # in a triangle that is its own image, the image of an angle is the angle at the image of the edge
     own = (weight[keep] == 0.5)[:, None] & (edge >= 0)
@@ -49,5 +50,5 @@ def half_patches(joined: Patches, spring: Bools, plane: Mirror) -> Patches:
     kind = np.where(twice, NONE, kind)
     return replace(
         joined, members=joined.members[keep], kind=kind, hinge=np.where(twice, -1, hinge),
-        half_edge=np.where(twice, -1, half_edge), inner=inner & ~twice, B=B, shares=joined.shares[keep],
+        half_edge=np.where(twice, -1, half_edge), inner=inner & ~twice, B=B, shares=shares @ fold,
     )  # fmt: skip

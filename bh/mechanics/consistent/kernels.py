@@ -1,7 +1,6 @@
 """Forces and tangent of the consistent formulation (docs/formulation.md): compiled passes over its elements.
 
-Stretching: a triangle measures three half squares of its edges, gamma_k = (l_k^2 - L_k^2) / 2 (mm^2), edge k opposite
-corner k; its energy is 1/2 gamma.K.gamma.
+Stretching is in `membrane_kernels`.
 
 Bending: a patch of one or more triangles measures angles theta (rad), its energy is 1/2 theta.B.theta. At an edge of
 the patch theta is the angle between the triangle and the sheet's tangent plane at the edge, positive as in a valley; at
@@ -30,81 +29,6 @@ from bh.mechanics.shared.kinematics import OPTIONS, add_hinge_hessian, hinge_geo
 
 NONE, OWN, TURN = 0, 1, 2
 FOUR = np.arange(4)
-
-
-# ------------------------------------------------------------------------------------------- stretching
-
-
-@njit(inline="always", **OPTIONS)
-def _edge(x, corners, k, d):  # type: ignore[no-untyped-def]
-    """Nodes of edge k, opposite corner k; writes the vector d (3,) between them and returns its square."""
-    a, b = corners[(k + 1) % 3], corners[(k + 2) % 3]
-    for i in range(3):
-        d[i] = x[b, i] - x[a, i]
-    return a, b, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-
-
-@njit(**OPTIONS)
-def stretching_forces(x, triangles, rest_square, K, f, N, energy):  # type: ignore[no-untyped-def]
-    """Sum of squared edge forces (N^2); adds the gradient of the energy to f (n, 3).
-
-    Writes N = K gamma (t, 3), N/mm, and the energies (t,), N mm.
-    """
-    d, gamma = np.empty((3, 3)), np.empty(3)
-    size = 0.0
-    for t in range(len(triangles)):
-        for k in range(3):
-            _, _, square = _edge(x, triangles[t], k, d[k])
-            gamma[k] = 0.5 * (square - rest_square[t, k])
-        total = 0.0
-        for k in range(3):
-            s = K[t, k, 0] * gamma[0] + K[t, k, 1] * gamma[1] + K[t, k, 2] * gamma[2]
-            N[t, k] = s
-            total += 0.5 * s * gamma[k]
-            size += s * s * rest_square[t, k]
-            a, b = triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
-            for i in range(3):
-                f[a, i] -= s * d[k, i]
-                f[b, i] += s * d[k, i]
-        energy[t] = total
-    return size
-
-
-@njit(**OPTIONS)
-def stretching_tangent(x, triangles, K, N, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]
-    """Add the tangent of the triangles with edge forces N to `data`."""
-    H, d, W = np.empty((9, 9)), np.empty((3, 3)), np.empty(3)
-    for t in range(len(triangles)):
-        for k in range(3):
-            _edge(x, triangles[t], k, d[k])
-        # corner p ends edge p + 1 and begins edge p + 2: gradient of gamma at p is d_(p+1) - d_(p+2)
-        for p in range(3):
-            p1, p2 = (p + 1) % 3, (p + 2) % 3
-            for q in range(p + 1):
-                q1, q2 = (q + 1) % 3, (q + 2) % 3
-                geometric = N[t, p1] + N[t, p2] if p == q else -N[t, 3 - p - q]
-                for i in range(3):
-                    for k in range(3):
-                        W[k] = K[t, k, p1] * d[p1, i] - K[t, k, p2] * d[p2, i]
-                    for j in range(i + 1 if p == q else 3):
-                        H[3 * p + i, 3 * q + j] = W[q1] * d[q1, j] - W[q2] * d[q2, j]
-                    H[3 * p + i, 3 * q + i] += geometric
-        if len(frames) > 0:
-            rotate(H, triangles[t], frame_of, frames)
-        add_lower(H, 9, slots[t], data)
-
-
-@njit(**OPTIONS)
-def stretching_rates(x, v, triangles, K, out):  # type: ignore[no-untyped-def]
-    """Rates of the edge forces (t, 3) for velocities v (n, 3)."""
-    d, dv, gamma = np.empty(3), np.empty(3), np.empty(3)
-    for t in range(len(triangles)):
-        for k in range(3):
-            _edge(x, triangles[t], k, d)
-            _edge(v, triangles[t], k, dv)
-            gamma[k] = d[0] * dv[0] + d[1] * dv[1] + d[2] * dv[2]
-        for k in range(3):
-            out[t, k] = K[t, k, 0] * gamma[0] + K[t, k, 1] * gamma[1] + K[t, k, 2] * gamma[2]
 
 
 # ------------------------------------------------------------------------------------------- bending
@@ -154,6 +78,41 @@ def bending_forces(x, alpha, kind, quad, ghost, rest, rotation, B, f, r, M, thet
                     for i in range(3):
                         f[quad[c, a, p], i] += s * g[a, 3 * p + i]
     return size, closing
+
+
+@njit(**OPTIONS)
+def bending_angles(x, alpha, kind, quad, ghost, rest, rotation, theta):  # type: ignore[no-untyped-def]
+    """Writes the angles (c, a) alone; whether a hinge is about to close."""
+    xl, g = np.empty((4, 3)), np.empty(12)
+    closing = False
+    for c in range(len(kind)):
+        for a in range(kind.shape[1]):
+            angle = alpha[rotation[c, a]] if rotation[c, a] >= 0 else 0.0
+            if kind[c, a] == TURN:
+                geometry = _turn_geometry(x, quad[c, a], ghost[c, a], xl, g)
+                angle = geometry[0] - rest[c, a] - angle
+                closing = closing or in_zone(geometry[0])
+            theta[c, a] = angle
+    return closing
+
+
+@njit(**OPTIONS)
+def bending_gradient(x, kind, quad, ghost, rotation, M, f, r):  # type: ignore[no-untyped-def]
+    """Sum of squared forces (N^2); adds the gradient of the energy to f and r for moments M (c, a) of any law."""
+    xl, g = np.empty((4, 3)), np.empty(12)
+    size = 0.0
+    for c in range(len(kind)):
+        for a in range(kind.shape[1]):
+            s = M[c, a]
+            if rotation[c, a] >= 0:
+                r[rotation[c, a]] += s if kind[c, a] == OWN else -s
+            if kind[c, a] == TURN:
+                _turn_geometry(x, quad[c, a], ghost[c, a], xl, g)
+                size += s * s * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+                for p in range(4):
+                    for i in range(3):
+                        f[quad[c, a, p], i] += s * g[3 * p + i]
+    return size
 
 
 @njit(**OPTIONS)
@@ -314,22 +273,11 @@ def spring_rates(x, v, w, hinges, stiffness, rest_rate, couple_rate, rotation, o
 
 
 @njit(**OPTIONS)
-def stretching_force_rates(x, v, triangles, N, dN, f):  # type: ignore[no-untyped-def]
-    """Add the rate of the gradient to f (n, 3): rates dN at these positions, and N where the nodes move by v (n, 3)."""
-    d, dv = np.empty(3), np.empty(3)
-    for t in range(len(triangles)):
-        for k in range(3):
-            a, b, _ = _edge(x, triangles[t], k, d)
-            _edge(v, triangles[t], k, dv)
-            for i in range(3):
-                s = dN[t, k] * d[i] + N[t, k] * dv[i]
-                f[a, i] -= s
-                f[b, i] += s
-
-
-@njit(**OPTIONS)
 def bending_force_rates(x, v, kind, quad, ghost, rotation, M, dM, f, r):  # type: ignore[no-untyped-def]
-    """The same for patches, with r (rotations,)."""
+    """Add the rate of the gradient to f (n, 3) and r (rotations,).
+
+    Rates dM at these positions, M where they move by v.
+    """
     xl, g, small = np.empty((4, 3)), np.empty(12), np.zeros((12, 12))
     for c in range(len(kind)):
         for a in range(kind.shape[1]):

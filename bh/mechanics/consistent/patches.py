@@ -30,30 +30,20 @@ def triangle_frames(points: Array, triangles: Ints) -> tuple[Array, Array]:
     )
 
 
-def stretching_matrices(edges: Array, areas: Array, E: float, t: float, nu: float) -> Array:
-    """(t, 3, 3) K of 1/2 gamma.K.gamma = 1/2 A t E:C:E in plane stress; gamma_k = e_k.E.e_k (N / mm^3).
+def curvature_maps(edges: Array, areas: Array) -> Array:
+    """(t, 3, 3) curvature (xx, yy, 2 xy) of triangles from the angles at their edges, 1 / mm.
 
-    `edges` (t, 3, 2) as of `triangle_frames`. Three edges give the three components of a constant Green strain.
+    kappa = (1/A) sum_k L_k theta_k mu_k (x) mu_k with the outward normals mu_k of the stress-free edges (t, 3, 2).
     """
     x, y = edges[..., 0], edges[..., 1]
-    strain = np.linalg.inv(np.stack((x * x, y * y, 2.0 * x * y), axis=2))  # (E_xx, E_yy, E_xy) from gamma
-    modulus = E * t / (1.0 - nu**2)
-    C = modulus * np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 2.0 * (1.0 - nu)]])
-    return areas[:, None, None] * (np.swapaxes(strain, 1, 2) @ C @ strain)
+    weight = 1.0 / (np.linalg.norm(edges, axis=2) * areas[:, None])  # L mu = (y, -x)
+    return np.stack((weight * y * y, weight * x * x, -2.0 * weight * x * y), axis=1)
 
 
-def bending_matrices(edges: Array, areas: Array, D: float, nu: float) -> Array:
-    """(t, 3, 3) B of 1/2 theta.B.theta = 1/2 A D ((1 - nu) kappa:kappa + nu tr(kappa)^2), N mm.
-
-    kappa = (1/A) sum_k L_k theta_k mu_k (x) mu_k with the outward normals mu_k of the stress-free edges.
-    """
-    lengths = np.linalg.norm(edges, axis=2)
-    tangent = edges / lengths[..., None]
-    cosine = np.einsum(
-        "tki,tli->tkl", tangent, tangent
-    )  # of the normals too, which are turned by a right angle
-    weight = lengths[:, :, None] * lengths[:, None, :] * (D / areas)[:, None, None]
-    return np.asarray(weight * ((1.0 - nu) * cosine**2 + nu))
+def bending_matrices(maps: Array, areas: Array, moduli: Array) -> Array:
+    """(t, 3, 3) B of 1/2 theta.B.theta = 1/2 A kappa.C.kappa, N mm, with moduli C (3, 3) of curvatures, N mm."""
+    B = np.swapaxes(maps, 1, 2) @ (areas[:, None, None] * moduli) @ maps
+    return np.asarray(0.5 * (B + np.swapaxes(B, 1, 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +79,7 @@ def patches(
     rank: Array,
     joined: int = JOINED,
     group: Array | None = None,
+    condense: bool = True,
 ) -> Patches:
     """Patches of a mesh.
 
@@ -101,6 +92,7 @@ def patches(
             later one measures the turn of the hinge between them, so that the band stays narrow.
         joined: rounds of joining by twos.
         group: (t,) only triangles of one group are joined, by default all.
+        condense: False keeps all rotations, of free edges too: no triangles are joined.
     """
     topology = mesh.topology
     sides = topology.edge_triangles[topology.hinge_edges]
@@ -110,7 +102,7 @@ def patches(
     if group is not None:
         order = order[group[sides[order, 0]] == group[sides[order, 1]]]
     patch_of, count = np.arange(len(B)), len(B)
-    for _ in range(joined):
+    for _ in range(joined if condense else 0):
         patch_of, count = join_pairs(sides, order, patch_of, count)
     by_patch = np.argsort(patch_of, kind="stable")
     member = np.arange(len(B)) - np.searchsorted(patch_of[by_patch], patch_of[by_patch])
@@ -128,7 +120,8 @@ def patches(
     turns = (hinge >= 0) & ~inner & ~spring[hinge] & (later != first)
     clamp = (half >= 0) & (hinge < 0) & clamped[edge]
     # an inner hinge is measured where its second triangle is; its first side has the rotation that is eliminated
-    measured = ((hinge >= 0) & ~(inner & first)) | clamp
+    free = (half >= 0) & (hinge < 0) & (not condense)
+    measured = ((hinge >= 0) & ~(inner & first)) | clamp | free
     kind = np.where(turns | clamp | (inner & ~first), TURN, np.where(measured, OWN, NONE))
 
     column = np.cumsum(measured, axis=1) - 1

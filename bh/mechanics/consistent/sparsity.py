@@ -32,15 +32,16 @@ def rotation_pattern(
     places = np.zeros((none + 1, 3))
     places[:n] = mesh.points
     has = e.rotation >= 0
-    hinges = mesh.topology.hinges
-    ends = np.vstack((hinges[e.patches.hinge[has], 1:3], np.repeat(e.hinges[:, 1:3], 2, axis=0)))
+    topology, hinges = mesh.topology, mesh.topology.hinges
+    edge = topology.triangle_edges.ravel()[e.patches.half_edge[has]]
+    ends = np.vstack((topology.edges[edge], np.repeat(e.hinges[:, 1:3], 2, axis=0)))
     at = np.concatenate((e.rotation[has], e.turns.ravel()))
     places[n + at] = mesh.points[ends].mean(axis=1)
 
     corners = e.nodes[:, (e.nodes >= 0).any(axis=0)]
     patches = np.hstack((np.where(corners >= 0, corners, none), np.where(has, n + e.rotation, none)))
     springs = np.hstack((e.hinges, n + e.turns))
-    groups: tuple[Ints, ...] = (e.triangles, patches, springs, hinges)
+    groups: tuple[Ints, ...] = (mesh.triangles, patches, springs, hinges)
     if ground is not None:
         groups += (mesh.triangles[[ground]],)
     pattern = build_pattern(table, displacements.pattern_nodes(groups)[1], places)

@@ -9,10 +9,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
+from bh.materials import Material
 from bh.mechanics.consistent import kernels, setup
-from bh.mechanics.consistent.elements import consistent_elements, lock_stiffness
+from bh.mechanics.consistent.elements import LINEAR, consistent_elements, lock_stiffness
+from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.sparsity import rotation_pattern
 from bh.mechanics.shared import penetration as closings
 from bh.mechanics.shared.base_system import SupportedSheet
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ROUNDING = 8.0 * np.finfo(float).eps
+ITERATIONS = 30  # for the rotations of least energy with a law of bending that is not linear
 
 
 class Solver(Protocol):
@@ -40,7 +44,7 @@ class Solver(Protocol):
 
 
 class ElementForces(NamedTuple):
-    """Edge forces N (t, 3), N/mm; moments of patches M (c, a), spring creases S (h,) and locks L (m,), N mm."""
+    """Bar forces N (b,), N/mm; moments of patches M (c, a), spring creases S (h,) and locks L (m,), N mm."""
 
     N: Array
     M: Array
@@ -51,13 +55,13 @@ class ElementForces(NamedTuple):
 class Internal(NamedTuple):
     """Energies (N mm), their gradients to positions f (n, 3) and rotations r (r,), and element forces.
 
-    `stretching` (t,) is that of the triangles, `bending` the whole, `springs` that of the springs and their couples,
+    `stretching` and `bending` are the whole, `springs` that of the springs and their couples,
     `lock` that of locks.
     `size` is a typical element force (N), `theta` (c, a) are the angles of the patches and `turns` (h,) what the
     springs have turned (rad).
     """
 
-    stretching: Array
+    stretching: float
     bending: float
     springs: float
     lock: float
@@ -73,7 +77,13 @@ class ConsistentSystem(SupportedSheet):
     """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then edge rotations (rad)."""
 
     def __init__(
-        self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
+        self,
+        model: Model,
+        load_step: LoadStep,
+        start: State | None,
+        plane: Mirror | None = None,
+        measure: Measure = smoothed_strain,
+        material: Material = LINEAR,
     ) -> None:
         """Elements, unknowns and supports of the step.
 
@@ -82,6 +92,8 @@ class ConsistentSystem(SupportedSheet):
             load_step: what is prescribed.
             start: the state that the step begins at; None for the stress-free sheet.
             plane: of the half, or None for the whole sheet.
+            measure: of the strain.
+            material: of the sheet.
 
         Raises:
             ModelError: supports leave nothing to move, or a load that the formulation does not take.
@@ -107,7 +119,7 @@ class ConsistentSystem(SupportedSheet):
             if start is None
             else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
         )
-        self.elements = consistent_elements(model, load_step, angles, moments, plane)
+        self.elements = consistent_elements(model, load_step, angles, moments, plane, measure, material)
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = start_points
@@ -130,21 +142,32 @@ class ConsistentSystem(SupportedSheet):
 
     def rotations_at(self, x: Array, lam: float) -> Array:
         """(rotations,) of least energy at positions x (n, 3)."""
-        r = self.internal(x, np.zeros(self.size - self.moving), lam).r
-        return np.asarray(-self._rotation_factor.solve(r)) if np.abs(r).max(initial=0.0) > 0.0 else r
+        alpha = np.zeros(self.size - self.moving)
+        now = self.internal(x, alpha, lam)
+        if self.elements.bending.constant:
+            return np.asarray(-self._rotation_factor.solve(now.r)) if now.r.any() else now.r
+        for _ in range(ITERATIONS):
+            if np.abs(now.r).max(initial=0.0) <= 1e-12 * self._stiffest[1]:
+                return alpha
+            B = self.elements.bending.stiffness(now.theta)
+            alpha = alpha - sp.linalg.splu(self.rotation_stiffness(B)).solve(now.r)
+            now = self.internal(x, alpha, lam)
+        raise ModelError(
+            "no rotations of least energy at these positions: the law of bending is not convex there"
+        )
 
     @cached_property
     def _rotation_factor(self) -> Solver:
-        factor: Solver = sp.linalg.splu(self.rotation_stiffness())
+        factor: Solver = sp.linalg.splu(self.rotation_stiffness(self.elements.patches.B))
         return factor
 
-    def rotation_stiffness(self) -> sp.csc_matrix:
-        """Hessian of the energy in the rotations alone, which does not depend on anything."""
+    def rotation_stiffness(self, B: Array) -> sp.csc_matrix:
+        """Hessian of the energy in the rotations alone, with stiffnesses B (c, a, a) of the patches."""
         e, joined = self.elements, self.elements.patches
-        most = joined.B.size + 4 * len(e.springs)
+        most = B.size + 4 * len(e.springs)
         rows, columns, values = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
         used = setup.rotation_matrix(
-            e.rotation, joined.kind, joined.B, e.turns, e.spring_stiffness, rows, columns, values
+            e.rotation, joined.kind, B, e.turns, e.spring_stiffness, rows, columns, values
         )
         entries = (values[:used], (rows[:used], columns[:used]))
         return sp.csc_matrix(entries, shape=(e.rotations, e.rotations))
@@ -152,27 +175,25 @@ class ConsistentSystem(SupportedSheet):
     @cached_property
     def _counts(self) -> tuple[int, int, int, int]:
         e = self.elements
-        return 3 * len(e.triangles), e.rotation.size, len(e.springs), len(e.lock)
+        return len(e.stretching.membrane.bars), e.rotation.size, len(e.springs), len(e.lock)
 
     def split(self, forces: Array) -> ElementForces:
         """Element forces as they belong together."""
         t, c, h, _ = self._counts
         M = forces[t : t + c].reshape(self.elements.rotation.shape)
-        return ElementForces(forces[:t].reshape(-1, 3), M, forces[t + c : t + c + h], forces[t + c + h :])
+        return ElementForces(forces[:t], M, forces[t + c : t + c + h], forces[t + c + h :])
 
     # ------------------------------------------------------------------------------- the System protocol
 
     def internal(self, x: Array, alpha: Array, lam: float) -> Internal:
         """Energies, gradient and element forces at positions x and rotations alpha."""
-        e, joined = self.elements, self.elements.patches
+        e = self.elements
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
-        stretching, turns = np.empty(len(e.triangles)), np.empty(len(e.springs))
+        turns = np.empty(len(e.springs))
         N, M, S, L = self.split(forces)
-        size = kernels.stretching_forces(x, e.triangles, e.rest_square, e.K, f, N, stretching)
-        more, closing = kernels.bending_forces(
-            x, alpha, joined.kind, e.quad, e.ghost, e.rest.at(lam), e.rotation, joined.B, f, r, M, theta
-        )
+        stretching, size = e.stretching.forces(x, f, N)
+        bending, more, closing = e.bending.forces(x, alpha, e.rest.at(lam), f, r, M, theta)
         rest, couple = e.spring_rest.at(lam), e.couple.at(lam)
         springs, most, too = kernels.spring_forces(
             x, alpha, e.hinges, e.spring_stiffness, rest, couple, e.turns, f, r, S, turns
@@ -180,18 +201,17 @@ class ConsistentSystem(SupportedSheet):
         L[:] = 0.0
         lock = closings.lock_forces(x, self.hinges, e.lock, f, L) if closing or too else 0.0
         size = float(np.sqrt((size + more + most) / (len(forces) - len(L))))
-        bending = 0.5 * float(np.vdot(M, theta))
         return Internal(stretching, bending, springs, lock, size, f, r, forces, theta, turns)
+
+    def stretching_by_triangle(self, x: Array) -> Array:
+        """(t,) energy of stretching, N mm, of the triangles of the mesh at positions x."""
+        topology = self.mesh.topology
+        beside = topology.edge_triangles[topology.hinge_edges]
+        return self.elements.stretching.by_triangle(x, len(self.mesh.triangles), beside)
 
     def bending_by_triangle(self, theta: Array) -> Array:
         """(t,) energy of bending, N mm, for the angles (c, a) of the patches."""
-        e = self.elements
-        half = np.einsum("cha,ca->ch", e.patches.shares, theta).reshape(*e.patches.members.shape, 3)
-        inside = e.patches.members >= 0
-        out = np.empty(len(e.triangles))
-        member = e.patches.members[inside]
-        out[member] = 0.5 * np.einsum("tk,tkl,tl->t", half[inside], e.B_triangle[member], half[inside])
-        return out
+        return self.elements.bending.by_triangle(theta, self.elements.B_triangle)
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         """Energy, residual (size,) and element forces (`split`) at q (size,)."""
@@ -200,7 +220,7 @@ class ConsistentSystem(SupportedSheet):
         load = self.force.at(lam)
         touched = 0.0 if self.rigid_contact is None else self.rigid_contact.forces(x, lam, now.f)
         energy = (
-            float(now.stretching.sum())
+            now.stretching
             + now.bending
             + now.springs
             + now.lock
@@ -225,7 +245,7 @@ class ConsistentSystem(SupportedSheet):
         """(rotations,) height of a triangle on the edge of each rotation, mm: what turns a moment into a force."""
         e = self.elements
         height = np.ones((len(self.mesh.triangles), 3))
-        height[e.members] = 2.0 * self.mesh.areas[e.members, None] / np.sqrt(e.rest_square)
+        height[e.members] = e.heights
         out = np.ones(e.rotations)
         used = e.rotation >= 0
         out[e.rotation[used]] = height.ravel()[e.patches.half_edge[used]]
@@ -235,11 +255,9 @@ class ConsistentSystem(SupportedSheet):
     def _stiffest(self) -> tuple[float, float]:
         """Largest stiffness of an edge, N/mm, and of a hinge over the height of its wing, N / rad."""
         e = self.elements
-        stretch = np.einsum("tkk,tk->tk", e.K, e.rest_square).max()
-        height = 2.0 * self.mesh.areas[e.members, None] / np.sqrt(e.rest_square)
-        bend = (np.einsum("tkk->tk", e.B_triangle) / height).max()
-        spring = (e.spring_stiffness / height.min()).max(initial=0.0)
-        return float(stretch), float(max(bend, spring))
+        bend = (np.einsum("tkk->tk", e.B_triangle) / e.heights).max()
+        spring = (e.spring_stiffness / e.heights.min()).max(initial=0.0)
+        return e.stretching.largest, float(max(bend, spring))
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
@@ -248,9 +266,12 @@ class ConsistentSystem(SupportedSheet):
         N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)
         axes = (self._frame_of, self.constraints.frames)
-        kernels.stretching_tangent(x, e.triangles, e.K, N, *axes, pattern.slots[0], data)
+        e.stretching.tangent(x, N, *axes, pattern.slots[0], pattern.slots[3], data)
+        B = joined.B
+        if not e.bending.constant:
+            B = e.bending.stiffness(e.bending.angles(x, q[self.moving :], e.rest.at(lam)))
         closing = kernels.bending_tangent(
-            x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, joined.B, M, e.nodes, *axes,
+            x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, B, M, e.nodes, *axes,
             pattern.slots[1], data,
         )  # fmt: skip
         closing |= kernels.spring_tangent(
@@ -263,7 +284,7 @@ class ConsistentSystem(SupportedSheet):
         matrix: Matrix = pattern.matrix(data)
         if self.constraints.rigid_body:
             matrix = self._free_body(x, data)
-        return Tangent(matrix, partial(self._predicted_forces, x, bool(closing)))
+        return Tangent(matrix, partial(self._predicted_forces, x, B, bool(closing)))
 
     def _free_body(self, x: Array, data: Array) -> FreeBodyMatrix:
         """The matrix of `data` where rigid motions are left free at positions x; grounds one triangle in `data`."""
@@ -289,27 +310,25 @@ class ConsistentSystem(SupportedSheet):
         ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
         return rotation_pattern(self.mesh, self.elements, self.displacements, ground)
 
-    def _predicted_forces(self, x: Array, closing: bool, forces: Array, dq: Array) -> Array:
+    def _predicted_forces(self, x: Array, B: Array, closing: bool, forces: Array, dq: Array) -> Array:
         """Element forces after an increment dq (size,) from positions x with `forces`, linear in dq."""
-        rates, _ = self.force_rates(x, self.vectors(dq), dq[self.moving :], closing, controlled=False)
+        rates, _ = self.force_rates(x, self.vectors(dq), dq[self.moving :], B, closing, controlled=False)
         return forces + rates
 
     def force_rates(
-        self, x: Array, v: Array, w: Array, closing: bool, controlled: bool
+        self, x: Array, v: Array, w: Array, B: Array, closing: bool, controlled: bool
     ) -> tuple[Array, Array]:
         """Rates of the element forces and of the springs' turns for velocities v (n, 3) and w (rotations,) at x.
 
-        `controlled` adds what rest angles and couples do while lambda grows at the rate 1; without `closing` there are
-        no locks.
+        B (c, a, a) are the stiffnesses of the patches there. `controlled` adds what rest angles and couples do while
+        lambda grows at the rate 1; without `closing` there are no locks.
         """
         e, by = self.elements, float(controlled)
         rates, turns = np.empty(sum(self._counts)), np.empty(len(e.springs))
         N, M, S, L = self.split(rates)
-        kernels.stretching_rates(x, v, e.triangles, e.K, N)
+        e.stretching.rates(x, v, N)
         joined = e.patches
-        kernels.bending_rates(
-            x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, joined.B, M
-        )
+        kernels.bending_rates(x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, B, M)
         kernels.spring_rates(
             x,
             v,
@@ -336,10 +355,11 @@ class ConsistentSystem(SupportedSheet):
         x = self.positions(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         v = self.displacements.prescribed_motion
-        rates, turns = self.force_rates(x, v, np.zeros(e.rotations), closing=False, controlled=True)
+        B = e.bending.stiffness(now.theta)
+        rates, turns = self.force_rates(x, v, np.zeros(e.rotations), B, closing=False, controlled=True)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
-        kernels.stretching_force_rates(x, v, e.triangles, N, dN, f)
+        e.stretching.force_rates(x, v, N, dN, f)
         kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, M, dM, f, r)
         kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
         if L.any():

@@ -1,0 +1,117 @@
+"""Stretching of a sheet: what a membrane measures (`membrane`) and the law of its material, as one energy.
+
+Where the moduli are constant so are the stiffnesses of the cells, and everything is compiled. Any other law is
+evaluated on the strains of all cells at once, between two compiled passes over bars.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.materials import Constant, Law
+from bh.mechanics.consistent import membrane_kernels as kernels
+from bh.mechanics.consistent.membrane import Cells, Membrane
+from bh.mechanics.shared.sparsity import Slots
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+
+
+class Stretching:
+    """Energy of the membrane at positions x (n, 3), mm. Its element forces are N (b,), N / mm: d energy / d gamma."""
+
+    def __init__(self, membrane: Membrane, law: Law) -> None:
+        self.membrane, self.law = membrane, law
+        self.constant = isinstance(law, Constant)
+        self._at: Array | None = None
+        self._last: tuple[Array, ...] = ()
+        self._K: tuple[Array, ...] = (
+            tuple(cells.stiffness(law.matrix) for cells in membrane.cells)
+            if isinstance(law, Constant)
+            else ()
+        )
+
+    def gamma(self, x: Array) -> Array:
+        """(b,) half changes of the bars' squares, mm^2."""
+        out = np.empty(len(self.membrane.bars))
+        kernels.bar_strains(x, self.membrane.bars, self.membrane.rest_square, out)
+        return out
+
+    def stiffness(self, x: Array) -> tuple[Array, ...]:
+        """(c, k, k) of both kinds of cells at x: derivatives of the bars' N by gamma, N / mm^3."""
+        if self._K:
+            return self._K
+        if self._at is not x:  # the tangent and the forces that it predicts ask at the same positions
+            gamma = self.gamma(x)
+            self._last = tuple(
+                cells.stiffness(self.law.moduli(cells.strains(gamma))) for cells in self.membrane.cells
+            )
+            self._at = x
+        return self._last
+
+    def forces(self, x: Array, f: Array, N: Array) -> tuple[float, float]:
+        """Energy (N mm) and the sum of squared bar forces (N^2); adds the gradient to f (n, 3) and writes N."""
+        m, gamma = self.membrane, self.gamma(x)
+        if self._K:
+            self._by_stiffness(self._K, gamma, N)
+            energy = 0.5 * float(N @ gamma)
+        else:
+            N[:] = 0.0
+            energy = sum(self._by_law(cells, gamma, N) for cells in m.cells)
+        return energy, kernels.bar_forces(x, m.bars, m.rest_square, N, f)
+
+    def _by_stiffness(self, K: tuple[Array, ...], gamma: Array, N: Array) -> None:
+        three, five = self.membrane.cells
+        kernels.cell_forces(three.bars, K[0], five.bars, K[1], gamma, N)
+
+    def _by_law(self, cells: Cells, gamma: Array, N: Array) -> float:
+        strain = cells.strains(gamma)
+        force = cells.area[:, None] * np.einsum("cik,ci->ck", cells.strain, self.law.stress(strain))
+        np.add.at(N, cells.bars, force)
+        return float(cells.area @ self.law.energy(strain))
+
+    def tangent(
+        self, x: Array, N: Array, frame_of: Ints, frames: Array, triangles: Slots, hinges: Slots, data: Array
+    ) -> None:
+        """Add the tangent with bar forces N to `data`; slots are those of all triangles and hinges."""
+        three, five = self.membrane.cells
+        K = self.stiffness(x)
+        kernels.triangle_tangent(
+            x, three.nodes, three.bars, three.owned, K[0], N, frame_of, frames, three.source, triangles, data
+        )
+        kernels.edge_tangent(
+            x, five.nodes, five.bars, five.owned, K[1], N, frame_of, frames, five.source, hinges, data
+        )
+
+    def rates(self, x: Array, v: Array, dN: Array) -> None:
+        """Writes the rates of N for velocities v (n, 3)."""
+        m = self.membrane
+        rate = np.empty(len(m.bars))
+        kernels.bar_rates(x, v, m.bars, rate)
+        self._by_stiffness(self.stiffness(x), rate, dN)
+
+    def force_rates(self, x: Array, v: Array, N: Array, dN: Array, f: Array) -> None:
+        """Add the rate of the gradient to f (n, 3)."""
+        kernels.bar_force_rates(x, v, self.membrane.bars, N, dN, f)
+
+    def by_triangle(self, x: Array, triangles: int, beside: Ints) -> Array:
+        """(triangles,) energies, N mm; that of an edge is shared by area with `beside` (m, 2), the sides of hinges."""
+        gamma = self.gamma(x)
+        three, five = (cells.area * self.law.energy(cells.strains(gamma)) for cells in self.membrane.cells)
+        out = np.zeros(triangles)
+        np.add.at(out, self.membrane.triangles.source, three)
+        sides, share = beside[self.membrane.edges.source], self.membrane.edges.share
+        np.add.at(out, sides[:, 0], share * five)
+        np.add.at(out, sides[:, 1], (1.0 - share) * five)
+        return out
+
+    @property
+    def largest(self) -> float:
+        """Largest stiffness of a bar in the stress-free sheet, N / mm."""
+        m = self.membrane
+        total = np.zeros(len(m.bars))
+        for cells in m.cells:
+            K = cells.stiffness(self.law.moduli(np.zeros((len(cells.area), 3))))
+            np.add.at(total, cells.bars, np.einsum("ckk->ck", K))
+        return float((total * m.rest_square).max())
