@@ -18,6 +18,7 @@ import meshes
 from bh import Displace, Fold, Model, Sheet
 from bh.errors import ModelError
 from bh.formulations.registry import formulation
+from bh.loading.builder import load_steps
 from bh.materials import Constant, Law, LinearElastic
 from bh.mechanics.consistent.formulation import Consistent
 from bh.mechanics.consistent.system import ConsistentSystem

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import meshes
 from bh import Displace, Model, Sheet, trace
 from bh.formulations.registry import formulation
+from bh.loading.builder import load_steps
 from bh.mechanics.consistent.formulation import Consistent, ConstantStrain
 from bh.mechanics.consistent.membrane import Membrane, constant_strain, smoothed_strain
 from bh.mechanics.consistent.membrane_kernels import edge_strains
