@@ -27,11 +27,28 @@ UNITS = {
     14: 100.0,
 }
 # entities that are no lines of a pattern; others that are no lines are refused
-SILENT = ("TEXT", "MTEXT", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION",
-          "POINT", "HATCH", "MPOLYGON", "ATTDEF",
-          "ATTRIB", "LEADER", "MULTILEADER", "MLEADER", "TOLERANCE", "IMAGE",
-          "VIEWPORT", "SOLID", "WIPEOUT", "OLE2FRAME",
-          "ACAD_PROXY_ENTITY")  # fmt: skip
+SILENT = (
+    "TEXT",
+    "MTEXT",
+    "DIMENSION",
+    "ARC_DIMENSION",
+    "LARGE_RADIAL_DIMENSION",
+    "POINT",
+    "HATCH",
+    "MPOLYGON",
+    "ATTDEF",
+    "ATTRIB",
+    "LEADER",
+    "MULTILEADER",
+    "MLEADER",
+    "TOLERANCE",
+    "IMAGE",
+    "VIEWPORT",
+    "SOLID",
+    "WIPEOUT",
+    "OLE2FRAME",
+    "ACAD_PROXY_ENTITY",
+)
 LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX", "3DFACE", "TRACE")
 MOST = 200_000  # entities once all blocks are written out
 DEEPEST = 50  # blocks in blocks

@@ -346,8 +346,14 @@ def test_an_empty_model_space_names_the_paper_space(tmp_path: Path) -> None:
 
 
 def test_cp_and_opx(tmp_path: Path) -> None:
-    rows = [(1, -200, -200, 200, -200), (1, 200, -200, 200, 200), (1, 200, 200, -200, 200),
-            (1, -200, 200, -200, -200), (2, -200, 0, 200, 0), (3, 0, -200, 0, 0)]  # fmt: skip
+    rows = [
+        (1, -200, -200, 200, -200),
+        (1, 200, -200, 200, 200),
+        (1, 200, 200, -200, 200),
+        (1, -200, 200, -200, -200),
+        (2, -200, 0, 200, 0),
+        (3, 0, -200, 0, 0),
+    ]
     file = tmp_path / "bird.cp"
     file.write_text("\n".join(" ".join(map(str, row)) for row in rows), encoding="utf-8")
     pattern = read_pattern(file)
@@ -442,7 +448,7 @@ RENDERED = {
     "clipped": '<clipPath id="c" transform="translate(4 0)"><circle cx="50" cy="40" r="25"/></clipPath>'
     '<g clip-path="url(#c)" transform="translate(6 2)"><path d="M0 40H120M50 0V80" stroke="red"/></g>'
     '<rect x="10" y="10" width="90" height="60" stroke="black"/>',
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", list(RENDERED))

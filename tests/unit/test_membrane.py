@@ -92,10 +92,13 @@ def test_strain_of_a_cell_is_the_mean_by_area(kind: Kind) -> None:
     along = mesh.points[mesh.topology.hinges[:, 2]] - mesh.points[mesh.topology.hinges[:, 1]]
     along = along[:, :2] / np.linalg.norm(along, axis=1)[:, None]
     across = np.column_stack((-along[:, 1], along[:, 0]))
-    expected = np.column_stack([
-        np.einsum("hi,hij,hj->h", along, mean, along), np.einsum("hi,hij,hj->h", across, mean, across),
-        2.0 * np.einsum("hi,hij,hj->h", along, mean, across),
-    ])  # fmt: skip
+    expected = np.column_stack(
+        [
+            np.einsum("hi,hij,hj->h", along, mean, along),
+            np.einsum("hi,hij,hj->h", across, mean, across),
+            2.0 * np.einsum("hi,hij,hj->h", along, mean, across),
+        ]
+    )
     np.testing.assert_allclose(found, expected, atol=1e-13)
 
 

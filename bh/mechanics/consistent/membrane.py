@@ -131,10 +131,14 @@ def _triangle_cells(mesh: SheetMesh, rows: Ints, part: Array) -> Cells:
     strain, areas = kernels.triangle_strains(mesh.points, mesh.triangles[rows])
     bars = mesh.topology.triangle_edges[rows]
     return Cells(
-        source=rows, nodes=np.ascontiguousarray(mesh.triangles[rows]), bars=np.ascontiguousarray(bars),
-        owned=np.zeros(bars.shape, dtype=bool), strain=strain, area=part * areas,
+        source=rows,
+        nodes=np.ascontiguousarray(mesh.triangles[rows]),
+        bars=np.ascontiguousarray(bars),
+        owned=np.zeros(bars.shape, dtype=bool),
+        strain=strain,
+        area=part * areas,
         share=np.ones(len(rows)),
-    )  # fmt: skip
+    )
 
 
 def _edge_cells(mesh: SheetMesh, rows: Ints) -> Cells:
@@ -150,17 +154,27 @@ def _edge_cells(mesh: SheetMesh, rows: Ints) -> Cells:
     strain, areas = kernels.edge_strains(mesh.points, nodes)
     whole = areas.sum(axis=1)
     return Cells(
-        source=rows, nodes=np.ascontiguousarray(nodes), bars=bars, owned=np.zeros(bars.shape, dtype=bool),
-        strain=strain, area=whole / 3.0, share=areas[:, 0] / whole,
-    )  # fmt: skip
+        source=rows,
+        nodes=np.ascontiguousarray(nodes),
+        bars=bars,
+        owned=np.zeros(bars.shape, dtype=bool),
+        strain=strain,
+        area=whole / 3.0,
+        share=areas[:, 0] / whole,
+    )
 
 
 def _select(cells: Cells, weight: Array) -> Cells:
     keep = weight > 0.0
     return Cells(
-        source=cells.source[keep], nodes=cells.nodes[keep], bars=cells.bars[keep], owned=cells.owned[keep],
-        strain=cells.strain[keep], area=(weight * cells.area)[keep], share=cells.share[keep],
-    )  # fmt: skip
+        source=cells.source[keep],
+        nodes=cells.nodes[keep],
+        bars=cells.bars[keep],
+        owned=cells.owned[keep],
+        strain=cells.strain[keep],
+        area=(weight * cells.area)[keep],
+        share=cells.share[keep],
+    )
 
 
 def _owned(membrane: Membrane) -> Membrane:
@@ -172,6 +186,7 @@ def _owned(membrane: Membrane) -> Membrane:
     owned = last[flat] == np.arange(len(flat))
     split = three.bars.size
     return replace(
-        membrane, triangles=replace(three, owned=owned[:split].reshape(three.bars.shape)),
+        membrane,
+        triangles=replace(three, owned=owned[:split].reshape(three.bars.shape)),
         edges=replace(five, owned=owned[split:].reshape(five.bars.shape)),
-    )  # fmt: skip
+    )

@@ -1,6 +1,6 @@
 """Stretching of a sheet: what a membrane measures (`membrane`) and the law of its material, as one energy.
 
-Where the moduli are constant so are the stiffnesses of the cells, and everything is compiled. Any other law is
+Where the moduli are constant so are the stiffnesses of the cells, and everything is compiled. Another law is
 evaluated on the strains of all cells at once, between two compiled passes over bars.
 """
 

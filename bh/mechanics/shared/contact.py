@@ -81,34 +81,71 @@ class RigidContact:
         f += self.spring * moved
         total = np.zeros((len(self.indenters), 3))
         energy = _forces(
-            x, self.triangles, self.owner, self.weights, self.share, self._centres(lam), self._axes,
-            self._shape, f, total,
-        )  # fmt: skip
+            x,
+            self.triangles,
+            self.owner,
+            self.weights,
+            self.share,
+            self._centres(lam),
+            self._axes,
+            self._shape,
+            f,
+            total,
+        )
         return float(energy + 0.5 * np.vdot(self.spring, moved**2))
 
     def contact_forces(self, x: Array, lam: float) -> dict[str, Array]:
         """(3,) force of every indenter on the sheet, N."""
         total = np.zeros((len(self.indenters), 3))
         _forces(
-            x, self.triangles, self.owner, self.weights, self.share, self._centres(lam), self._axes,
-            self._shape, np.zeros_like(x), total,
-        )  # fmt: skip
+            x,
+            self.triangles,
+            self.owner,
+            self.weights,
+            self.share,
+            self._centres(lam),
+            self._axes,
+            self._shape,
+            np.zeros_like(x),
+            total,
+        )
         return {indenter.name: -force for indenter, force in zip(self.indenters, total, strict=True)}
 
     def tangent(self, x: Array, lam: float, frame_of: Ints, frames: Array, slots: Slots, data: Array) -> None:
         """Adds the Hessian; `slots` are those of the triangles."""
         _tangent(
-            x, self.triangles, self.owner, self.weights, self.share, self._centres(lam), self._axes,
-            self._shape, self.home, self.spring, frame_of, frames, slots, data,
-        )  # fmt: skip
+            x,
+            self.triangles,
+            self.owner,
+            self.weights,
+            self.share,
+            self._centres(lam),
+            self._axes,
+            self._shape,
+            self.home,
+            self.spring,
+            frame_of,
+            frames,
+            slots,
+            data,
+        )
 
     def force_rates(self, x: Array, v: Array, lam: float, moving: float, out: Array) -> None:
         """Adds the rate of the gradient for velocities v (n, 3), indenters moving at `moving` times their speed."""
         out += self.spring * v
         _force_rates(
-            x, v, self.triangles, self.owner, self.weights, self.share, self._centres(lam),
-            moving * self.velocity, self._axes, self._shape, out,
-        )  # fmt: skip
+            x,
+            v,
+            self.triangles,
+            self.owner,
+            self.weights,
+            self.share,
+            self._centres(lam),
+            moving * self.velocity,
+            self._axes,
+            self._shape,
+            out,
+        )
 
     def power(self, x: Array, lam: float) -> float:
         """Rate of energy with lambda at fixed x, N mm: work of the moving indenters on the sheet."""
@@ -201,7 +238,9 @@ def _forces(x, triangles, owner, weights, share, centres, axes, shape, f, total)
 
 
 @njit(**OPTIONS)
-def _tangent(x, triangles, owner, weights, share, centres, axes, shape, home, spring, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]  # fmt: skip
+def _tangent(
+    x, triangles, owner, weights, share, centres, axes, shape, home, spring, frame_of, frames, slots, data
+):  # type: ignore[no-untyped-def]
     p, n, H = np.empty(3), np.empty(3), np.empty((3, 3))
     K = np.zeros((9, 9))
     for k in range(len(owner)):
@@ -232,7 +271,7 @@ def _tangent(x, triangles, owner, weights, share, centres, axes, shape, home, sp
 
 
 @njit(**OPTIONS)
-def _force_rates(x, v, triangles, owner, weights, share, centres, velocity, axes, shape, out):  # type: ignore[no-untyped-def]  # fmt: skip
+def _force_rates(x, v, triangles, owner, weights, share, centres, velocity, axes, shape, out):  # type: ignore[no-untyped-def]
     p, u, n, H = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
     for k in range(len(owner)):
         corners = triangles[owner[k]]
