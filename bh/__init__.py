@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from bh.solvers.automatic import Automatic
     from bh.solvers.continuation import LoadControl
     from bh.solvers.newton import Newton
-    from bh.solving.accuracy import Accuracy
+    from bh.paths.estimate import Accuracy
     from bh.solving.follow import trace
 
 _HOME = {
-    "Accuracy": "bh.solving.accuracy", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
+    "Accuracy": "bh.paths.estimate", "ArcLength": "bh.solvers.arc_length", "Automatic": "bh.solvers.automatic",
     "Bar": "bh.model.actuations", "CreaseLaw": "bh.model.model", "Tether": "bh.model.actuations",
     "Displace": "bh.model.actuations", "DisplacementControl": "bh.solvers.arc_length", "Energy": "bh.formulations.state",
     "Fold": "bh.model.actuations",

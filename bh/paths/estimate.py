@@ -1,0 +1,138 @@
+"""What is known of the error of a path: the estimate, and the meshes that it was made from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.model.refinement import Goal
+from meshes.mesh import count
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One solve on the way.
+
+    Attributes:
+        formulation, level: what was solved; the level is that of `meshes.cells.choices`, nan of a given mesh.
+        mesh: its cells in words.
+        triangles, unknowns, iterations, wall_time_s: what it took.
+        outcome: of the path.
+        value: of the goal: (k,), nan if not reached.
+        snapped: the path jumped to another branch, or ended where it is not stable.
+        doubtful: it snapped where a finer mesh does not; its value does not enter the estimate.
+    """
+
+    formulation: str
+    level: float
+    mesh: str
+    triangles: int
+    unknowns: int
+    iterations: int
+    wall_time_s: float
+    outcome: str
+    value: Array
+    snapped: bool = False
+    doubtful: bool = False
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How accurate a path is by its own estimate, and what that took.
+
+    Attributes:
+        goal: what the estimate is of, and what was asked for.
+        estimate: of the relative error of the goal at the last state; inf where there is none.
+        met: whether the estimate is within what was asked for.
+        order: that the last three values show, nan where they show none.
+        formulation, mesh: what was solved last.
+        trials: all solves, coarse to fine.
+        wall_time_s: of all of them with their meshes; where nothing was asked for, of the estimate alone.
+        asked: False where the mesh was given and the error is only told; `met` says nothing then.
+        notes: one line each: meshes that could not be made and what was taken, values that were not trusted, why it is
+            not met.
+    """
+
+    goal: Goal
+    estimate: float
+    met: bool
+    order: float
+    formulation: str
+    mesh: str
+    trials: tuple[Trial, ...]
+    wall_time_s: float
+    asked: bool = True
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """ "energy to 1.3 % by its own estimate (2 % asked): consistent, 32 x 4 staggered cells; 3 meshes, 0.11 s" """
+        told = f"{self.goal.of} to {100 * self.estimate:.2g} % by its own estimate"
+        if not math.isfinite(self.estimate):
+            told = f"{self.goal.of}: no estimate"
+        meshes = f"{count(len(self.trials), 'mesh').replace('meshs', 'meshes')}, {self.wall_time_s:.2g} s"
+        if not self.asked:
+            return f"{told}: {self.formulation}, {self.mesh}; a coarser mesh was solved, too, {self.wall_time_s:.2g} s"
+        met = "asked" if self.met else "asked, not met"
+        return f"{told} ({100 * self.goal.within:g} % {met}): {self.formulation}, {self.mesh}; {meshes}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for result.json and path files."""
+        return {
+            "of": self.goal.of,
+            "at": self.goal.at,
+            "direction": None if self.goal.direction is None else list(self.goal.direction),
+            "within": self.goal.within if self.asked else None,
+            "estimate": self.estimate if math.isfinite(self.estimate) else None,
+            "met": self.met if self.asked else None,
+            "order": self.order if math.isfinite(self.order) else None,
+            "formulation": self.formulation,
+            "mesh": self.mesh,
+            "wall_time_s": self.wall_time_s,
+            "notes": list(self.notes),
+            "trials": [
+                {**asdict(t), "level": t.level if math.isfinite(t.level) else None, "value": _plain(t.value)}
+                for t in self.trials
+            ],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Accuracy:
+        """What `as_dict` has written."""
+        direction = data["direction"]
+        asked = data["within"] is not None
+        goal = Goal(
+            data["within"] if asked else 0.5, data["of"], data["at"], None if direction is None else tuple(direction)
+        )
+        trials = tuple(
+            Trial(
+                **{
+                    **trial,
+                    "level": math.nan if trial["level"] is None else trial["level"],
+                    "value": np.array([math.nan] if trial["value"] is None else trial["value"]),
+                }
+            )
+            for trial in data["trials"]
+        )
+        return cls(
+            goal,
+            math.inf if data["estimate"] is None else data["estimate"],
+            bool(data["met"]),
+            math.nan if data["order"] is None else data["order"],
+            data["formulation"],
+            data["mesh"],
+            trials,
+            data["wall_time_s"],
+            asked,
+            tuple(data["notes"]),
+        )
+
+
+def _plain(value: Array) -> list[float] | None:
+    return [float(v) for v in value] if np.isfinite(value).all() else None
