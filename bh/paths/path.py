@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import astuple, dataclass, replace
@@ -18,6 +19,7 @@ from bh.loading.load_step import Ended, StepProgram, open_ends
 from bh.loading.program import program
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
+from bh.paths.estimate import Accuracy
 from bh.paths.provenance import provenance_of
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.solvers.increments import ARC, LOAD, CriticalPoint
@@ -26,7 +28,6 @@ from meshes.mesh import count
 if TYPE_CHECKING:
     from bh.formulations.symmetry_reduction import Half
     from bh.loading.symmetry import Plane
-    from bh.solving.accuracy import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ class Path:
     `path[i]` is the i-th `State` (read when asked for); `path[0]` is the state that the first step begins with.
 
     Attributes:
-        accuracy: the estimate of its error, where an accuracy was asked for (`bh.Accuracy`), else None.
+        accuracy: the estimate of its error (`bh.Accuracy`), where an accuracy or an estimate was asked for, else None.
     """
 
     def __init__(
@@ -85,6 +86,7 @@ class Path:
         self.records: list[Record] = []
         self.steps: list[StepOutcome] = []
         self.accuracy: Accuracy | None = None
+        self._estimate_reason = ""
         self._formulation: Formulation = formulation(model.formulation)
         self._programs: tuple[StepProgram, ...] = program(model)
         self._halves = None
@@ -129,6 +131,19 @@ class Path:
         return [(record.step, point) for record in self.records for point in record.critical]
 
     @property
+    def estimate_reason(self) -> str:
+        """Why there is no estimate of the error, one line; empty where `accuracy` has one."""
+        if self.accuracy is not None:
+            ends = [note for note in self.accuracy.notes if note.startswith("ended")]
+            known = math.isfinite(self.accuracy.estimate)
+            return "" if known else (ends or ["fewer than three meshes could be solved"])[-1]
+        return self._estimate_reason or "none was asked for; bh.trace(..., estimate=True) solves a coarser mesh, too"
+
+    @estimate_reason.setter
+    def estimate_reason(self, why: str) -> None:
+        self._estimate_reason = why
+
+    @property
     def remarks(self) -> list[str]:
         """What happened on the way that a reader of the last state should know, one line each."""
         found = []
@@ -140,8 +155,10 @@ class Path:
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
         ends = [line for step in self._programs for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
-        if self.accuracy is not None and not self.accuracy.met:
-            found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
+        if self.accuracy is not None:
+            if not self.accuracy.met:
+                found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
+            found += self.accuracy.notes
         self._look_at_whole()
         modes = self.records[-1].negative if self.records else None
         if modes:
@@ -222,6 +239,17 @@ class Path:
         for step, end in enumerate(self.steps):
             target.finish_step(step, *astuple(end))
         target.close()
+        self.save_accuracy(file)
+
+    def save_accuracy(self, file: str | FilePath) -> None:
+        """Write what is known of the error into the file of this path.
+
+        Raises:
+            PathFileError: there is no such file, or it cannot be written.
+        """
+        told = None if self.accuracy is None else self.accuracy.as_dict()
+        with closing(PathFile.open(FilePath(file))) as target:
+            target.note("accuracy", {"told": told, "reason": self._estimate_reason})
 
     @classmethod
     def load(cls, file: str | FilePath) -> Path:
@@ -238,6 +266,9 @@ class Path:
                 path.records.append(_record(row))
             ends = source.steps()
             path.steps = [StepOutcome(*ends[step]) for step in sorted(ends)]
+        error = meta.get("accuracy", {"told": None, "reason": ""})  # files of versions that had none
+        path.accuracy = None if error["told"] is None else Accuracy.from_dict(error["told"])
+        path.estimate_reason = error["reason"]
         return path
 
     def _row(self, index: int, record: Record) -> StateRow:

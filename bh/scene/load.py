@@ -21,7 +21,7 @@ from bh.loading.symmetry import Plane, check, mirror
 from bh.model.actuations import Actuation, Displace, Force
 from bh.model.model import CreaseLaw, Model, Sheet
 from bh.model.plugins import made
-from bh.model.refinement import Goal, pattern_of
+from bh.model.refinement import DEFAULT, Goal, Refinement, pattern_of
 from bh.model.serialise import ACTUATIONS as MAKERS
 from bh.model.supports import Holding, RigidBody, Support, directions, select
 from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
@@ -53,11 +53,11 @@ from bh.scene.tables import (
     UntilTable,
 )
 from meshes import CreasePattern, SheetMesh, structured
+from meshes.cells import first_mesh
 
 SECTIONS = ("pattern", "sheet", "mesh", "model", "supports", "creases", "steps", "outputs", "accuracy",
             "symmetry")  # fmt: skip
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
-COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
 
 
@@ -171,12 +171,8 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
-    accuracy = _accuracy(data["accuracy"]) if "accuracy" in data else None
-    how_meshed = data.get("mesh")
-    if accuracy is not None and how_meshed is None and "file" not in as_table(data["pattern"], "pattern"):
-        how_meshed = COARSEST  # only to check the scene on
     model = Model(
-        mesh=_mesh(data["pattern"], how_meshed, folder),
+        mesh=_mesh(data["pattern"], data.get("mesh"), folder),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
@@ -185,13 +181,26 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
         hinge_lock=how.hinge_lock,
     )
     _check(model)
+    accuracy = _accuracy(data["accuracy"]) if "accuracy" in data else None
+    if accuracy is None and "mesh" not in data and model.mesh.pattern is not None:
+        accuracy = Goal(DEFAULT)
     if accuracy is not None:
+        _check_refinable(name, "formulation" in as_table(data.get("model", {}), "model"))
         with within("accuracy"):
             pattern_of(model)
             if accuracy.at is not None:
                 model.mesh.nodes(accuracy.at)
     return Scene(model, Outputs(**{name: as_tuple(value) for name, value in outputs}), accuracy=accuracy,
                  symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None)  # fmt: skip
+
+
+def _check_refinable(name: str, given: bool) -> None:
+    """Refuse a formulation that was asked for by name, and has no estimate of its error."""
+    if given and not isinstance(getattr(formulation(name), "refinement", None), Refinement):
+        raise SceneError(
+            f"model.formulation = {shown(name)} has no estimate of its own error to choose a mesh by; "
+            "add a table [mesh] (and no accuracy), or leave the formulation out"
+        )
 
 
 def _symmetry(model: Model, data: Any) -> Plane:
@@ -210,7 +219,8 @@ def _accuracy(data: Any) -> Goal:
             return Goal(data)
         table = read_table(AccuracyTable, data, "accuracy")
         direction = None if table.direction is None else tuple(table.direction)
-        return Goal(table.within, table.of, table.at, direction)  # type: ignore[arg-type]
+        limits = {"most_triangles": table.most_triangles, "seconds": table.seconds}
+        return Goal(table.within, table.of, table.at, direction, **limits)  # type: ignore[arg-type]
 
 
 # --- from tables to descriptions ----------------------------------------------------------------------------
@@ -232,9 +242,8 @@ def _mesh(pattern: Any, mesh: Any, folder: Path) -> SheetMesh:
         return _mesh_from_file(table, mesh, folder)
     drawn = _drawn(table)
     if mesh is None:
-        raise SceneError(
-            "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
-        )
+        with within("pattern"):
+            return first_mesh(drawn)
     how = _mesh_table(as_table(mesh, "mesh"))
     if isinstance(how, DrawnTable):
         raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
@@ -308,13 +317,11 @@ def _mesh_from_file(table: dict[str, Any], mesh: Any, folder: Path) -> SheetMesh
 def _mesh_from_drawing(table: DrawingPattern, mesh: Any, folder: Path) -> SheetMesh:
     from meshes.io import read_drawn, read_pattern
 
-    if mesh is None:
-        raise SceneError(
-            'mesh is missing; add a table [mesh] with kind = "gmsh" and size, along or aspect_ratio (creases side by '
-            'side), or kind = "drawn" (the faces of the drawing)'
-        )
-    how = _mesh_table(as_table(mesh, "mesh"))
     options = {name: value for name, value in table if name != "file"}
+    if mesh is None:
+        with within("pattern.file"):
+            return first_mesh(read_pattern(folder / table.file, **options))
+    how = _mesh_table(as_table(mesh, "mesh"))
     with within("pattern.file"):
         if isinstance(how, DrawnTable):
             return read_drawn(folder / table.file, **options)

@@ -90,7 +90,7 @@ def solve(
             race.out[name] = f"{name} has no mesh of this sheet ({error.args[0].split(';')[0]})"
             continue
         trials = mark_doubtful([*trials, trial])
-        error_, order = estimate(trusted(trials, name), _nothing(model, goal))
+        error_, order = estimate(trusted(trials, name), nothing(model, goal))
         found.append(_Found(path, error_, order, name, str(trial.mesh)))
         if error_ <= goal.within:
             break
@@ -262,7 +262,7 @@ def reading(path: Path, goal: Goal) -> Array:
     return np.array([stiffness])
 
 
-def _nothing(model: Model, goal: Goal) -> float:
+def nothing(model: Model, goal: Goal) -> float:
     """The size below which a goal is none."""
     return NOTHING * model.sheet.E * model.sheet.t**3 if goal.of == "energy" else 0.0
 

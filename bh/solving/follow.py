@@ -35,6 +35,7 @@ def trace(
     file: str | FilePath | None = None,
     resume: bool = False,
     accuracy: float | Goal | None = None,
+    estimate: bool = False,
     after: Path | None = None,
 ) -> Path:
     """Follow the equilibrium of `model` through all its steps.
@@ -48,7 +49,10 @@ def trace(
         resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
         accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
             chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
-            see `bh.solving.accuracy` and `path.accuracy`. The file is written when that is done.
+            see `bh.solving.accuracy` and `path.accuracy`. With a file, every mesh has one of its own in a folder
+            beside it (`path-levels` beside `path.bh`), and `resume` goes on from these.
+        estimate: solve one coarser mesh, too, for an estimate of the error (`path.accuracy`), at about a quarter of the
+            cost; where it cannot be had, `path.estimate_reason` says why.
         after: a solved path of the same model with fewer steps, whose states this one begins with.
 
     Returns:
@@ -65,11 +69,11 @@ def trace(
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
     if accuracy is not None:
-        if resume or after is not None:
+        if after is not None or (resume and file is None):
             raise ModelError(
-                "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
+                "a run to a wanted accuracy begins anew on every mesh; run it without after, and resume it with its file"
             )
-        return _to_accuracy(model, accuracy, symmetry, progress, strategy, file)
+        return _to_accuracy(model, accuracy, symmetry, progress, strategy, file, resume)
     strategy = strategy or Automatic()
     path, target = _opened(model, symmetry, file, resume, after)
     report = meter(progress)
@@ -86,6 +90,12 @@ def trace(
         report.close(path.outcome)
         if target is not None:
             target.close()
+    if estimate and path.accuracy is None:
+        from bh.solving.given_mesh import add_estimate
+
+        add_estimate(path, progress=report, strategy=strategy, symmetry=symmetry)
+        if file is not None:
+            path.save_accuracy(file)
     return path
 
 
@@ -96,11 +106,14 @@ def _to_accuracy(
     progress: bool | ProgressMeter,
     strategy: Strategy | None,
     file: str | FilePath | None,
+    resume: bool,
 ) -> Path:
     from bh.solving.accuracy import Goal, solve
+    from bh.solving.levels import Levels
 
     goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry)
+    levels = None if file is None else Levels(file, resume)
+    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry, levels=levels)
     if file is not None:
         path.save(file)
     return path
@@ -226,4 +239,5 @@ def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path,
 def _with_model(path: Path, model: Model, symmetry: Plane | None) -> Path:
     other = Path(model, path.provenance, symmetry)
     other.records, other.steps = path.records, path.steps
+    other.accuracy, other.estimate_reason = path.accuracy, path.estimate_reason
     return other
