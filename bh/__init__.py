@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from bh.model.model import CreaseLaw, Model, Sheet
     from bh.model.refinement import Goal
     from bh.model.supports import RigidBody, Support
+    from bh.paths.estimate import Accuracy
     from bh.paths.path import Path
     from bh.scene.load import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
     from bh.solvers.automatic import Automatic
     from bh.solvers.continuation import LoadControl
     from bh.solvers.newton import Newton
-    from bh.paths.estimate import Accuracy
     from bh.solving.follow import trace
 
 _HOME = {

@@ -1,7 +1,7 @@
 """How a pattern is cut into cells, as data: made again, made twice as fine or twice as coarse.
 
-A mesh that `structured` or `unstructured` made remembers its cells (`SheetMesh.cells`), so that it can be refined in the
-only way from which an error can be told: every cell halved in both directions, the pattern of the triangles as it was.
+A mesh that `structured` or `unstructured` made remembers its cells (`SheetMesh.cells`), so that it can be refined in
+the only way from which an error can be told: every cell halved in both directions, the pattern of the triangles kept.
 `choices` lists the cells to begin with, in order, where a program chooses the mesh: not every pattern has every mesh.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -22,7 +23,10 @@ if TYPE_CHECKING:
     from meshes.mesh import SheetMesh
 
 Kind = Literal["staggered", "alternating", "one-way", "mirrored"]
-TURN = 0.4  # rad that an edge of level 1 turns at the most: of wide panels cells as wide as high are no curves
+TURN = (
+    0.4  # rad that an edge of level 1 turns at the most: of wide panels cells as wide as high are no curves
+)
+TAPERED = 16  # columns of level 1 of panels with tips: twice as many as fewer than that are no finer mesh there
 FALLBACK: tuple[Kind, ...] = ("staggered", "alternating")  # every pattern with rails has these
 
 
@@ -104,8 +108,9 @@ Cells = RuledCells | GmshCells
 def choices(pattern: CreasePattern, kind: Kind, level: float) -> Iterator[Cells]:
     """Cells of a level, the best first, for whoever tries them until one can be made.
 
-    Level n has n rows of cells in every panel, about as wide as high, or less where the sheet's curves turn by more than
-    `TURN` / n along them; a level below one has one row of longer cells. Cells that are shorter along the creases come next, then more rows, then other cuts into triangles, then gmsh.
+    Level n has n rows of cells in every panel, about as wide as high, or less where the curves turn by more than
+    `TURN` / n along them; a level below one has one row of longer cells. Cells that are shorter along the creases
+    come next, then more rows, then other cuts into triangles, then gmsh.
     """
     if pattern.rails:
         rows = max(1, round(level))
@@ -135,15 +140,15 @@ def first_mesh(pattern: CreasePattern, kind: Kind = "staggered") -> SheetMesh:
 
 def _along(pattern: CreasePattern, level: float) -> int:
     """Cells along a crease that are about as wide as the rows of a level are high."""
+    from meshes.tapered import tapers
+
     u = np.linspace(0.0, 1.0, 65)
     rails = pattern.rails
     lengths = np.array([rail.length for rail in rails])
-    heights = np.array(
-        [np.linalg.norm(b.point(u) - a.point(u), axis=1).mean() for a, b in zip(rails[:-1], rails[1:], strict=True)]
-    )
+    heights = np.array([np.linalg.norm(b.point(u) - a.point(u), axis=1).mean() for a, b in pairwise(rails)])
     shape = float(np.mean(heights / (0.5 * (lengths[:-1] + lengths[1:]))))
     turning = max((_turning(rail.point(np.linspace(0.0, 1.0, 257))) for rail in rails), default=0.0)
-    least = math.ceil(level * turning / TURN)
+    least = math.ceil(max(level * turning / TURN, max(level, 1.0) * TAPERED if tapers(pattern) else 0.0))
     return max(3 if pattern.closed else 1, least, round(min(level / shape, 1e6)))
 
 

@@ -128,7 +128,9 @@ def run(
     loaded = load_scene(scene)
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
-        path, names, before, contact = solve(loaded, folder, resume=resume, progress=not quiet, estimate=estimate)
+        path, names, before, contact = solve(
+            loaded, folder, resume=resume, progress=not quiet, estimate=estimate
+        )
     except KeyboardInterrupt:
         again = shlex.join(["bh", "run", str(scene), "-o", str(folder), "--resume"])
         raise _InterruptedError(
@@ -148,7 +150,12 @@ def run(
     if not quiet:
         _summary(path, loaded, written, contact)
     if path.outcome == "reached" and path.accuracy is not None and not path.accuracy.met:
-        typer.echo(f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}", err=True)
+        why = "; ".join(note for note in path.accuracy.notes if note.startswith("ended"))
+        typer.echo(
+            f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}; {why}; "
+            f"the path is in '{written[0]}'",
+            err=True,
+        )
         raise typer.Exit(1)
     if path.outcome != "reached":
         why = f" ({path.reason})" if path.reason else ""

@@ -108,7 +108,10 @@ class Accuracy:
         direction = data["direction"]
         asked = data["within"] is not None
         goal = Goal(
-            data["within"] if asked else 0.5, data["of"], data["at"], None if direction is None else tuple(direction)
+            data["within"] if asked else 0.5,
+            data["of"],
+            data["at"],
+            None if direction is None else tuple(direction),
         )
         trials = tuple(
             Trial(

@@ -137,7 +137,10 @@ class Path:
             ends = [note for note in self.accuracy.notes if note.startswith("ended")]
             known = math.isfinite(self.accuracy.estimate)
             return "" if known else (ends or ["fewer than three meshes could be solved"])[-1]
-        return self._estimate_reason or "none was asked for; bh.trace(..., estimate=True) solves a coarser mesh, too"
+        return (
+            self._estimate_reason
+            or "none was asked for; bh.trace(..., estimate=True) solves a coarser mesh, too"
+        )
 
     @estimate_reason.setter
     def estimate_reason(self, why: str) -> None:

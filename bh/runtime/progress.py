@@ -79,8 +79,8 @@ class Bar:
             return
         self._due = now + self.every
         print(
-            f"{self._stage}step {step + 1}/{steps}  lambda {lam:.3f}  iterations {self._iterations}  energy {energy:.4g} N mm  "
-            f"{now - self._began:.0f} s",
+            f"{self._stage}step {step + 1}/{steps}  lambda {lam:.3f}  iterations {self._iterations}  "
+            f"energy {energy:.4g} N mm  {now - self._began:.0f} s",
             file=sys.stderr,
             flush=True,
         )

@@ -19,8 +19,8 @@ file = {file}
 # gap = 0.5                      # lines that miss each other by up to so much are joined, mm
 # lines = {{ "#00aa00" = "valley", "layer:score" = "mountain" }}   # what lines stand for, in front of the defaults
 """
-ACCURACY = """# Mesh and formulation are chosen, and refined until the energy is right to 5 % by its own estimate. To choose them yourself
-# put [mesh] in its place: kind = "staggered" with along = 64 and rows = 4, or kind = "gmsh" with size = 4.0 (docs/scenes.md).
+ACCURACY = """# Mesh and formulation are chosen, and refined until the energy is right to 5 % by its own estimate. To choose a mesh
+# put [mesh] in its place: kind = "staggered", along = 64, rows = 4; or kind = "gmsh", size = 4.0 (docs/scenes.md).
 accuracy = 0.05
 """
 REST = """[sheet]

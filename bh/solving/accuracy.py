@@ -81,7 +81,9 @@ def solve(
     trials: list[Trial] = []
     found: list[_Found] = []
     why, failed = "", None
-    while (turn := race.next()) is not None and not (why := race.too_long(trials, time.perf_counter() - began)):
+    while (turn := race.next()) is not None and not (
+        why := race.too_long(trials, time.perf_counter() - began)
+    ):
         name, step = turn
         try:
             path, trial = task.solve(ladders[name], name, race.tried[name][-1], step)
@@ -137,7 +139,9 @@ class _Task:
         path, cells = ladder.solve(step, follow)
         reached = path.outcome == "reached"
         value = reading(path, self.goal) if reached else np.array([math.nan])
-        spent = max(time.perf_counter() - clock, path.wall_time_s)  # what was found solved has cost its time before
+        spent = max(
+            time.perf_counter() - clock, path.wall_time_s
+        )  # what was found solved has cost its time before
         return path, Trial(
             name, level, str(cells), len(path.model.mesh.triangles), path.unknowns, path.iterations, spent,
             path.outcome, value, snapped(path),
@@ -174,7 +178,7 @@ def snapped(path: Path) -> bool:
 
 
 def mark_doubtful(trials: Sequence[Trial]) -> list[Trial]:
-    """The trials, with those marked that snapped where the next mesh of their formulation, which was reached, does not."""
+    """The trials, marked where one snapped and the next mesh of its formulation, which was reached, did not."""
     found = list(trials)
     for k, trial in enumerate(found):
         after = next((t for t in found[k + 1 :] if t.formulation == trial.formulation), None)

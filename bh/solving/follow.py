@@ -71,7 +71,7 @@ def trace(
     if accuracy is not None:
         if after is not None or (resume and file is None):
             raise ModelError(
-                "a run to a wanted accuracy begins anew on every mesh; run it without after, and resume it with its file"
+                "a run to a wanted accuracy begins anew on every mesh; leave out after, and resume it with its file"
             )
         return _to_accuracy(model, accuracy, symmetry, progress, strategy, file, resume)
     strategy = strategy or Automatic()

@@ -1,7 +1,7 @@
 """The error of a path on a mesh that was given: one coarser mesh is solved, too.
 
-With cells twice as large in both directions it costs about a quarter of the path. Of two values no order can be seen, so
-the first is taken: error = SAFETY |v2 - v1|. Where no such mesh exists, or it would tell nothing, one line says why.
+With cells twice as large in both directions it costs about a quarter of the path. Of two values no order can be seen,
+so the first is taken: error = SAFETY |v2 - v1|. Where no such mesh exists, or it would tell nothing, one line says why.
 """
 
 from __future__ import annotations
@@ -51,12 +51,16 @@ def add_estimate(
             progress=report, strategy=strategy, symmetry=symmetry,
         )  # fmt: skip
     except InputError as error:
-        path.estimate_reason = f"a coarser mesh to compare with could not be solved ({str(error).split(';')[0]})"
+        path.estimate_reason = (
+            f"a coarser mesh to compare with could not be solved ({str(error).split(';')[0]})"
+        )
         return
     if other.outcome != "reached":
         path.estimate_reason = f"the path on a coarser mesh to compare with ended early ({other.outcome})"
     elif snapped(other) != snapped(path):
-        which = "this mesh and not on a coarser one" if snapped(path) else "a coarser mesh and not on this one"
+        which = (
+            "this mesh and not on a coarser one" if snapped(path) else "a coarser mesh and not on this one"
+        )
         path.estimate_reason = f"doubtful: the sheet snaps to another branch on {which}; use a finer mesh"
     else:
         path.accuracy = _compared(other, coarse, path, cells, time.perf_counter() - began)

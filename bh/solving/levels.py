@@ -32,7 +32,9 @@ class Levels:
         """
         self.folder = folder_of(file)
         if resume and not self.folder.is_dir():
-            raise PathFileError(f"there are no solved meshes in '{self.folder}' to go on from; run without resume")
+            raise PathFileError(
+                f"there are no solved meshes in '{self.folder}' to go on from; run without resume"
+            )
         try:
             if not resume:
                 remove(self.folder)

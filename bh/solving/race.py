@@ -69,7 +69,9 @@ class Race:
         if self.goal.seconds is None or not trials:
             return ""
         name = next(reversed(self.tried))
-        costs = [self.options[t.formulation].cost * t.level ** self.options[t.formulation].power for t in trials]
+        costs = [
+            self.options[t.formulation].cost * t.level ** self.options[t.formulation].power for t in trials
+        ]
         unit = sum(t.wall_time_s for t in trials) / sum(costs)
         option = self.options[name]
         ahead = unit * option.cost * self.tried[name][-1] ** option.power

@@ -50,7 +50,9 @@ def _asked(rng: np.random.Generator) -> float:
     return float(rng.choice(WITHIN))
 
 
-def _folded(rng: np.random.Generator, model: Model, low: float, high: float, spring: bool) -> tuple[Model, str]:
+def _folded(
+    rng: np.random.Generator, model: Model, low: float, high: float, spring: bool
+) -> tuple[Model, str]:
     by = math.radians(float(rng.uniform(low, high)))
     model = model.fold("all", by=by, Lstar=float(rng.choice(SPRINGS)) if spring else None)
     return model, f"{'spring' if spring else 'imposed'} {math.degrees(by):.0f} degrees"
@@ -136,15 +138,23 @@ def several(rng: np.random.Generator) -> Draw:
     pattern: CreasePattern
     if which == 0:
         radii = [float(60.0 + width * k) for k in range(count)]
-        pattern, name = meshes.annulus_sector(radii, width, float(rng.uniform(0.5, 1.2)), alternating(count)), "sector"
+        pattern, name = (
+            meshes.annulus_sector(radii, width, float(rng.uniform(0.5, 1.2)), alternating(count)),
+            "sector",
+        )
     elif which == 1:
         amplitude = float(rng.uniform(2.0, 6.0))
         pattern, name = meshes.sine_tessellation(100.0, 100.0, count, amplitude, 1.5), "sines"
     elif which == 2:
-        pattern, name = meshes.parabolic_canopy(100.0, 100.0, count, float(rng.uniform(8.0, 20.0))), "parabolas"
+        pattern, name = (
+            meshes.parabolic_canopy(100.0, 100.0, count, float(rng.uniform(8.0, 20.0))),
+            "parabolas",
+        )
     else:
         count, name = 2, "arcs"
-        pattern = meshes.two_arcs(100.0, 100.0, [float(rng.uniform(70.0, 100.0)), float(rng.uniform(150.0, 300.0))])
+        pattern = meshes.two_arcs(
+            100.0, 100.0, [float(rng.uniform(70.0, 100.0)), float(rng.uniform(150.0, 300.0))]
+        )
     model, how = _folded(rng, Model(first_mesh(pattern), paper(rng)), 20.0, 60.0, True)
     return Draw(f"{count} {name}, {how}", model, Goal(_asked(rng)))
 
@@ -162,7 +172,9 @@ def network(rng: np.random.Generator) -> Draw:
         cx, cy = 0.5 * (x + u) - bow * (v - y), 0.5 * (y + v) + bow * (u - x)
         colour = "blue" if k == 0 else "red"
         lines.append(f'<path d="M{x} {y} Q{cx} {cy} {u} {v}" stroke="{colour}" fill="none"/>')
-    head = f'xmlns="http://www.w3.org/2000/svg" width="{wide_}mm" height="{high}mm" viewBox="0 0 {wide_} {high}"'
+    head = (
+        f'xmlns="http://www.w3.org/2000/svg" width="{wide_}mm" height="{high}mm" viewBox="0 0 {wide_} {high}"'
+    )
     rim = f'<rect width="{wide_}" height="{high}" stroke="black" fill="none"/>'
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "network.svg")
