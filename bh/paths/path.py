@@ -19,7 +19,6 @@ from bh.loading.load_step import Ended, StepProgram, open_ends
 from bh.loading.program import program
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
-from bh.paths.estimate import Accuracy
 from bh.paths.provenance import provenance_of
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.solvers.increments import ARC, LOAD, CriticalPoint
@@ -28,6 +27,7 @@ from meshes.mesh import count
 if TYPE_CHECKING:
     from bh.formulations.symmetry_reduction import Half
     from bh.loading.symmetry import Plane
+    from bh.paths.estimate import Accuracy
 
 Array = NDArray[np.float64]
 
@@ -270,7 +270,10 @@ class Path:
             ends = source.steps()
             path.steps = [StepOutcome(*ends[step]) for step in sorted(ends)]
         error = meta.get("accuracy", {"told": None, "reason": ""})  # files of versions that had none
-        path.accuracy = None if error["told"] is None else Accuracy.from_dict(error["told"])
+        if error["told"] is not None:
+            from bh.paths.estimate import Accuracy
+
+            path.accuracy = Accuracy.from_dict(error["told"])
         path.estimate_reason = error["reason"]
         return path
 

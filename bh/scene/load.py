@@ -21,7 +21,7 @@ from bh.loading.symmetry import Plane, check, mirror
 from bh.model.actuations import Actuation, Displace, Force
 from bh.model.model import CreaseLaw, Model, Sheet
 from bh.model.plugins import made
-from bh.model.refinement import DEFAULT, Goal, Refinement, pattern_of
+from bh.model.refinement import Goal
 from bh.model.serialise import ACTUATIONS as MAKERS
 from bh.model.supports import Holding, RigidBody, Support, directions, select
 from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
@@ -41,7 +41,6 @@ from bh.scene.reading import (
 )
 from bh.scene.tables import (
     ACTUATIONS,
-    AccuracyTable,
     CreaseTable,
     DrawnTable,
     GmshTable,
@@ -52,6 +51,7 @@ from bh.scene.tables import (
     SupportTable,
     UntilTable,
 )
+from bh.scene.wanted_accuracy import wanted_accuracy
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.cells import first_mesh
 
@@ -181,26 +181,9 @@ def _from_tables(data: dict[str, Any], folder: Path) -> Scene:
         hinge_lock=how.hinge_lock,
     )
     _check(model)
-    accuracy = _accuracy(data["accuracy"]) if "accuracy" in data else None
-    if accuracy is None and "mesh" not in data and model.mesh.pattern is not None:
-        accuracy = Goal(DEFAULT)
-    if accuracy is not None:
-        _check_refinable(name, "formulation" in as_table(data.get("model", {}), "model"))
-        with within("accuracy"):
-            pattern_of(model)
-            if accuracy.at is not None:
-                model.mesh.nodes(accuracy.at)
+    accuracy = wanted_accuracy(data, model)
     return Scene(model, Outputs(**{name: as_tuple(value) for name, value in outputs}), accuracy=accuracy,
                  symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None)  # fmt: skip
-
-
-def _check_refinable(name: str, given: bool) -> None:
-    """Refuse a formulation that was asked for by name, and has no estimate of its error."""
-    if given and not isinstance(getattr(formulation(name), "refinement", None), Refinement):
-        raise SceneError(
-            f"model.formulation = {shown(name)} has no estimate of its own error to choose a mesh by; "
-            "add a table [mesh] (and no accuracy), or leave the formulation out"
-        )
 
 
 def _symmetry(model: Model, data: Any) -> Plane:
@@ -210,17 +193,6 @@ def _symmetry(model: Model, data: Any) -> Plane:
     with within("symmetry"):
         check(model, program(model), mirror(model.mesh, data))
     return data if isinstance(data, str) else tuple(data)
-
-
-def _accuracy(data: Any) -> Goal:
-    """A number, or a table."""
-    with within("accuracy"):
-        if not isinstance(data, dict):
-            return Goal(data)
-        table = read_table(AccuracyTable, data, "accuracy")
-        direction = None if table.direction is None else tuple(table.direction)
-        limits = {"most_triangles": table.most_triangles, "seconds": table.seconds}
-        return Goal(table.within, table.of, table.at, direction, **limits)  # type: ignore[arg-type]
 
 
 # --- from tables to descriptions ----------------------------------------------------------------------------
