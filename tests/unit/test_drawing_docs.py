@@ -93,7 +93,7 @@ class TestInit:
         assert "--force" in capsys.readouterr().err
         assert main(["init", "--force"]) == 0
 
-    def test_drawings_get_the_mesh_that_suits_them(self, here):
+    def test_drawings_are_solved_to_an_accuracy(self, here):
         (here / "cross.svg").write_text(
             '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="60mm" viewBox="0 0 60 60">'
             '<rect width="60" height="60" stroke="black" fill="none"/>'
@@ -101,9 +101,13 @@ class TestInit:
         )
         text = (here / "cross.svg").read_text()
         (here / "rulings.svg").write_text(text.replace("FACETS", '<path d="M30,0 L30,60" stroke="yellow"/>'))
-        for name, kind in (("wave", "staggered"), ("cross", "gmsh"), ("rulings", "drawn")):
+        for name, kind in (("wave", "staggered"), ("cross", "gmsh"), ("rulings", "gmsh")):
             scene = parse_scene(example(Path(f"{name}.svg"), here), here)
+            assert scene.accuracy is not None
             assert scene.model.mesh.kind == kind
+            (line,) = [line for line in report(scene) if line.startswith("mesh")]
+            assert "chosen by the run, until the energy is right to 5 %" in line
+            assert not any(line.startswith("remark (aspect") for line in report(scene))
         with pytest.raises(InputError, match="no drawing"):
             example(Path("scene.toml"), here)
 
@@ -232,10 +236,9 @@ class TestRemarks:
 
         text = (here / "wave.svg").read_text().replace("</svg>", '<path d="M40,0 V80" stroke="black"/></svg>')
         (here / "ruled.svg").write_text(text)
-        scene = parse_scene(
-            example(Path("ruled.svg"), here).replace('kind = "drawn"', 'kind = "gmsh"\nsize = 9.0'), here
-        )
-        (remark,) = scene.model.remarks
+        meshed = example(Path("ruled.svg"), here).replace("accuracy = 0.05\n", "")
+        scene = parse_scene(meshed + '[mesh]\nkind = "gmsh"\nsize = 9.0\n', here)
+        (remark,) = [remark for remark in scene.model.remarks if remark.code == "drawing"]
         assert remark.code == "drawing"
         assert "boundary lines lie inside" in remark.text
         path = bh.trace(scene.model, file=here / "path.bh")
