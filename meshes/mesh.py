@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from meshes.cells import Cells
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
 from meshes.pattern import FOLD_KINDS, CreasePattern, FoldKind
@@ -27,11 +28,12 @@ class Origin:
 
     pattern: CreasePattern
     mark: int
+    cells: Cells
 
     @classmethod
-    def of(cls, pattern: CreasePattern, points: Array, triangles: Ints) -> Origin:
-        """The origin of a mesh with points (n, 2 or 3) and triangles (t, 3) that was made of `pattern`."""
-        return cls(pattern, _mark(points, triangles))
+    def of(cls, pattern: CreasePattern, cells: Cells, points: Array, triangles: Ints) -> Origin:
+        """The origin of a mesh with points (n, 2 or 3) and triangles (t, 3): `pattern`, cut into `cells`."""
+        return cls(pattern, _mark(points, triangles), cells)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -144,9 +146,19 @@ class SheetMesh:
     @property
     def pattern(self) -> CreasePattern | None:
         """The pattern that this mesh was made of, so that it can be meshed anew; None for others and changed copies."""
+        origin = self._own_origin()
+        return None if origin is None else origin.pattern
+
+    @property
+    def cells(self) -> Cells | None:
+        """The cells of the pattern, so that they can be halved or doubled; None where there is no `pattern`."""
+        origin = self._own_origin()
+        return None if origin is None else origin.cells
+
+    def _own_origin(self) -> Origin | None:
         if self.origin is None or self.origin.mark != _mark(self.points, self.triangles):
             return None
-        return self.origin.pattern
+        return self.origin
 
     @cached_property
     def topology(self) -> Topology:

@@ -14,18 +14,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
+from meshes.cells import Kind, RuledCells
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.tapered import tapered_mesh, tapers
 from meshes.topology import Ints, build
-
-Kind = Literal["staggered", "alternating", "one-way", "mirrored"]
 
 
 def structured(
@@ -99,7 +98,7 @@ def structured(
         kind=kind,
         aspect_ratio=alpha,
         remarks=pattern.remarks,
-        origin=Origin.of(pattern, points, triangles),
+        origin=Origin.of(pattern, RuledCells(kind, int(along), int(rows)), points, triangles),
     )
 
 
@@ -132,6 +131,7 @@ def _tapered(pattern: CreasePattern, along: int, rows: int, kind: Kind, alpha: f
         curves=curves,
         kind=kind,
         aspect_ratio=alpha,
+        origin=Origin.of(pattern, RuledCells(kind, along, rows), points, triangles),
     )
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from meshes.cells import GmshCells
 from meshes.curves import Array, Curve, Polyline
 from meshes.errors import MeshError
 from meshes.mesh import Origin, SheetMesh
@@ -130,7 +131,7 @@ def unstructured(
         curves=curves,
         kind="gmsh",
         remarks=pattern.remarks,
-        origin=Origin.of(pattern, points, triangles),
+        origin=Origin.of(pattern, GmshCells(size, dict(near or {}), growth, seed), points, triangles),
     )
 
 

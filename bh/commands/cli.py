@@ -124,6 +124,9 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the states in the folder.")] = False,
     pictures: Annotated[bool, typer.Option("--pictures", help="Draw the folded sheet (PNG).")] = False,
     vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
+    estimate: Annotated[
+        bool, typer.Option("--estimate/--no-estimate", help="Of a given mesh: also solve a coarser one.")
+    ] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
@@ -134,7 +137,9 @@ def run(
     loaded = load_scene(scene)
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
-        path, names, before, contact = solve(loaded, folder, resume=resume, progress=not quiet)
+        path, names, before, contact = solve(
+            loaded, folder, resume=resume, progress=not quiet, estimate=estimate
+        )
     except KeyboardInterrupt:
         again = shlex.join(["bh", "run", str(scene), "-o", str(folder), "--resume"])
         raise _InterruptedError(
@@ -154,7 +159,12 @@ def run(
     if not quiet:
         _summary(path, loaded, written, contact)
     if path.reached and path.accuracy is not None and not path.accuracy.met:
-        typer.echo(f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}", err=True)
+        why = "; ".join(note for note in path.accuracy.notes if note.startswith("ended"))
+        typer.echo(
+            f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}; {why}; "
+            f"the path is in '{written[0]}'",
+            err=True,
+        )
         raise typer.Exit(1)
     if not path.reached:
         why = f" ({path.reason})" if path.reason else ""
@@ -367,8 +377,6 @@ def _summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contac
         f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
         f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
     )
-    if path.accuracy is not None:
-        typer.echo(str(path.accuracy))
     for remark in path.remarks[:6]:
         typer.echo(remark)
     model = path.model
@@ -391,6 +399,10 @@ def _summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contac
         typer.echo("self-contact: none")
     else:
         typer.echo(f"self-contact (reported, not prevented), first in {contact}")
+    if path.accuracy is not None:
+        typer.echo(f"accuracy: {path.accuracy}")
+    if path.estimate_reason:
+        typer.echo(f"accuracy: no estimate: {path.estimate_reason}")
     typer.echo("files: " + " ".join(str(file) for file in written))
 
 

@@ -18,7 +18,6 @@ import numpy as np
 
 from bh.analysis.contact import Contact, first_contact
 from bh.errors import InputError
-from bh.model.model import Model
 from bh.model.serialise import fingerprint
 from bh.paths.export import FOLDED, write_flat, write_state
 from bh.paths.path import Path as Trace
@@ -26,6 +25,8 @@ from bh.paths.storage import PathFile, reading
 from bh.runtime.progress import ProgressMeter
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
+from bh.solving.levels import folder_of, move
+from bh.solving.levels import remove as remove_levels
 from bh.solving.trace import trace
 from meshes.io.export import replacing
 
@@ -49,7 +50,12 @@ class Solved(NamedTuple):
 
 
 def solve(
-    scene: Scene, folder: Path, *, resume: bool = False, progress: bool | ProgressMeter = False
+    scene: Scene,
+    folder: Path,
+    *,
+    resume: bool = False,
+    progress: bool | ProgressMeter = False,
+    estimate: bool = True,
 ) -> Solved:
     """Trace a scene into a folder, which is made if need be.
 
@@ -60,15 +66,17 @@ def solve(
         folder: for the files.
         resume: go on from the states in the folder.
         progress: as for `bh.trace`.
+        estimate: solve a coarser mesh, too, where the mesh was given, for an estimate of the error.
 
     Raises:
         InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
             described; a folder that was made for the run is taken away again if nothing came of it.
     """
-    names = _names(folder, scene.model, resume)
+    names = _names(folder, scene, resume)
     made = _make(folder)
     file = folder / names[0]
-    before = resume and _is_whole(file, scene.model)
+    before = resume and _is_whole(file, scene)
+    solved = _solved_meshes(file)
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
         (folder / names[1]).unlink(missing_ok=True)
     try:
@@ -79,16 +87,20 @@ def solve(
             resume=resume,
             accuracy=scene.accuracy,
             symmetry=scene.symmetry,
+            estimate=estimate and scene.accuracy is None,
         )
     except (InputError, KeyboardInterrupt):
-        if not resume and not holds_states(file):
+        if not resume and not holds_states(folder):
+            remove_levels(folder_of(file))
             _take_back(file, made)
         raise
     clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
     if path.reached:
         if names == UNFINISHED:
             _move(file, folder / FINISHED[0])
+            move(folder_of(file), folder_of(folder / FINISHED[0]))
         names = FINISHED
+    before = before and solved == _solved_meshes(folder / names[0])
     contact = first_contact(path)
     text = json.dumps(result(path, scene, contact), indent=2, allow_nan=False) + "\n"
     with replacing(folder / names[1]) as draft:
@@ -98,12 +110,21 @@ def solve(
     if names == FINISHED and clear:
         for name in UNFINISHED:
             (folder / name).unlink(missing_ok=True)
+        remove_levels(folder_of(folder / UNFINISHED[0]))
         remove_extras(folder, "-unfinished")
     return Solved(path, names, before, contact)
 
 
-def _is_whole(file: Path, model: Model) -> bool:
-    """True if all steps of the model are reached in a path file."""
+def _solved_meshes(file: Path) -> list[str]:
+    """Names of the path files of the meshes of a run to an accuracy."""
+    return sorted(found.name for found in folder_of(file).glob("*.bh"))
+
+
+def _is_whole(file: Path, scene: Scene) -> bool:
+    """True if all steps of a scene are reached in a path file."""
+    if scene.accuracy is not None and not file.is_file():
+        return False
+    model = scene.model
     with contextlib.closing(PathFile.open(file)) as stored, reading(file):
         outcomes = [outcome for outcome, *_ in stored.steps().values()]
     return outcomes == [Outcome.REACHED] * len(model.steps)
@@ -122,10 +143,11 @@ def path_file(folder: Path) -> Path:
 
 
 def holds_states(folder_or_file: Path) -> bool:
-    """True if a path file (or one in a folder) has a state to go on from."""
+    """True if a path file (or one in a folder, or of its meshes) has a state to go on from."""
     files = [folder_or_file]
     if folder_or_file.is_dir():
         files = [folder_or_file / name for name, _ in (UNFINISHED, FINISHED)]
+        files += [mesh for file in files for mesh in sorted(folder_of(file).glob("*.bh"))]
     for file in files:
         with (
             contextlib.suppress(InputError),
@@ -137,7 +159,7 @@ def holds_states(folder_or_file: Path) -> bool:
     return False
 
 
-def _names(folder: Path, model: Model, resume: bool) -> tuple[str, str]:
+def _names(folder: Path, scene: Scene, resume: bool) -> tuple[str, str]:
     """Names of the path and the result that a run writes.
 
     Raises:
@@ -145,10 +167,15 @@ def _names(folder: Path, model: Model, resume: bool) -> tuple[str, str]:
     """
     if not resume:
         return UNFINISHED if _is_finished(folder) else FINISHED
+    if scene.accuracy is not None:
+        for names in (UNFINISHED, FINISHED):
+            if folder_of(folder / names[0]).is_dir():
+                return names
+        raise InputError(f"there are no solved meshes in '{folder}' to go on from; run without --resume")
     found = [names for names in (UNFINISHED, FINISHED) if (folder / names[0]).is_file()]
     if not found:
         raise InputError(f"there is no {FINISHED[0]} in '{folder}' to go on from; run without --resume")
-    wanted = fingerprint(model)
+    wanted = fingerprint(scene.model)
     for names in found:
         place = folder / names[0]
         with contextlib.closing(PathFile.open(place)) as file, reading(place):
@@ -260,6 +287,7 @@ def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, obje
         },
         "formulation": model.formulation,
         "accuracy": path.accuracy.as_dict() if path.accuracy is not None else None,
+        "no_estimate": path.estimate_reason or None,
         "versions": path.provenance["versions"],
         "input": path.provenance["input"],
         "scene": str(scene.source),

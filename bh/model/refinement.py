@@ -14,11 +14,14 @@ from bh.errors import ModelError
 from bh.model.actuations import Fold, Force
 from bh.model.model import Model
 from bh.model.supports import Support, select
-from meshes import CreasePattern, SheetMesh, structured
-from meshes.structured import Kind
+from meshes import CreasePattern, SheetMesh
+from meshes.cells import Kind
+from meshes.choices import choices, cut
 
 GOALS = ("energy", "tip", "stiffness")
 LEAST, MOST = 1e-4, 0.5  # accuracies that can be asked for
+DEFAULT = 0.05  # of the energy, where neither a mesh nor an accuracy is given
+MOST_TRIANGLES = 40_000
 
 
 @dataclass(frozen=True)
@@ -31,12 +34,16 @@ class Goal:
             against a force in a direction).
         at: the place of a tip or a stiffness.
         direction: of the force on it; three numbers.
+        most_triangles: no finer mesh is made.
+        seconds: no mesh is begun that is likely to take longer than is left of them; None for no limit.
     """
 
     within: float
     of: str = "energy"
     at: str | None = None
     direction: tuple[float, float, float] | None = None
+    most_triangles: int = MOST_TRIANGLES
+    seconds: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
@@ -61,14 +68,17 @@ class Goal:
             raise ModelError(
                 "a direction [x, y, z] goes with the accuracy of a stiffness, and with nothing else"
             )
+        if self.most_triangles < 1:
+            raise ModelError(f"most_triangles = {self.most_triangles} cannot be; use a whole number from 1")
+        if self.seconds is not None and not self.seconds > 0.0:
+            raise ModelError(f"seconds = {self.seconds} cannot be; use a positive time in s, or leave it out")
 
 
 @dataclass(frozen=True)
 class Refinement:
     """Meshes on which a formulation converges, and what `bh verify speed_error` has measured there.
 
-    Level n has n rows of cells in every panel, about as wide as high; levels below one have one row of longer cells.
-    Levels are powers of two.
+    Levels are those of `meshes.choices.choices`, powers of two.
 
     Attributes:
         kind: the mesh pattern.
@@ -97,13 +107,12 @@ class Refinement:
 
 
 def mesh_at(pattern: CreasePattern, kind: Kind, level: float) -> SheetMesh:
-    """The mesh of a level (see `Refinement`): structured where the pattern has rails, else by gmsh."""
-    rows = max(1, round(level))
-    if pattern.rails:
-        return structured(pattern, kind=kind, rows=rows, aspect_ratio=level / rows)
-    from meshes.unstructured import sheet_area, unstructured
+    """The mesh of a level (see `meshes.choices.choices`): structured where the pattern has rails, else by gmsh.
 
-    return unstructured(pattern, size=sheet_area(pattern) ** 0.5 / (8.0 * level))
+    Raises:
+        MeshError: the pattern has no such mesh; `bh.solving.mesh_choice` tries others.
+    """
+    return cut(pattern, next(choices(pattern, kind, level)))
 
 
 def with_mesh(model: Model, mesh: SheetMesh, formulation: str) -> Model:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import astuple, replace
@@ -40,7 +41,7 @@ class Path:
     `path[i]` is the i-th `State` (read when asked for); `path[0]` is the state that the first step begins with.
 
     Attributes:
-        accuracy: the estimate of its error, where an accuracy was asked for (`bh.Accuracy`), else None.
+        accuracy: the estimate of its error (`bh.Accuracy`), where an accuracy or an estimate was asked for, else None.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class Path:
         self.records: list[Record] = []
         self.steps: list[StepOutcome] = []
         self.accuracy: Accuracy | None = None
+        self._estimate_reason = ""
         self._formulation: Formulation[SheetSystem] = formulation(model.formulation)
         self._load_steps: tuple[LoadStep, ...] = load_steps(model)
         self._halves: Halves | None = None
@@ -112,6 +114,22 @@ class Path:
         return [(record.step, point) for record in self.records for point in record.critical]
 
     @property
+    def estimate_reason(self) -> str:
+        """Why there is no estimate of the error, one line; empty where `accuracy` has one."""
+        if self.accuracy is not None:
+            ends = [note for note in self.accuracy.notes if note.startswith("ended")]
+            known = math.isfinite(self.accuracy.estimate)
+            return "" if known else (ends or ["fewer than three meshes could be solved"])[-1]
+        return (
+            self._estimate_reason
+            or "none was asked for; bh.trace(..., estimate=True) solves a coarser mesh, too"
+        )
+
+    @estimate_reason.setter
+    def estimate_reason(self, why: str) -> None:
+        self._estimate_reason = why
+
+    @property
     def remarks(self) -> list[str]:
         """What happened on the way that a reader of the last state should know, one line each."""
         found = []
@@ -123,8 +141,10 @@ class Path:
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
         ends = [line for step in self._load_steps for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
-        if self.accuracy is not None and not self.accuracy.met:
-            found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
+        if self.accuracy is not None:
+            if not self.accuracy.met:
+                found.append(f"the accuracy that was asked for is not met: {self.accuracy}")
+            found += self.accuracy.notes
         self._look_at_whole()
         modes = self.records[-1].negative if self.records else None
         if modes:
@@ -214,6 +234,17 @@ class Path:
         for step, end in enumerate(self.steps):
             target.finish_step(step, *astuple(end))
         target.close()
+        self.save_accuracy(file)
+
+    def save_accuracy(self, file: str | FilePath) -> None:
+        """Write what is known of the error into the file of this path.
+
+        Raises:
+            PathFileError: there is no such file, or it cannot be written.
+        """
+        told = None if self.accuracy is None else self.accuracy.as_dict()
+        with closing(PathFile.open(FilePath(file))) as target:
+            target.note("accuracy", {"told": told, "reason": self._estimate_reason})
 
     @classmethod
     def load(cls, file: str | FilePath) -> Path:
@@ -232,6 +263,12 @@ class Path:
             path.steps = [
                 StepOutcome(Outcome(end), reason, lost) for _, (end, reason, lost) in sorted(ends.items())
             ]
+        error = meta.get("accuracy", {"told": None, "reason": ""})  # files of versions that had none
+        if error["told"] is not None:
+            from bh.paths.estimate import Accuracy
+
+            path.accuracy = Accuracy.from_dict(error["told"])
+        path.estimate_reason = error["reason"]
         return path
 
     def row(self, index: int) -> StateRow:

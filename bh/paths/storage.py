@@ -193,6 +193,18 @@ class PathFile:
         """Model and provenance as plain data."""
         return {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
 
+    def note(self, key: str, value: Any) -> None:
+        """Write a JSON value into `meta` in place of an older one.
+
+        Raises:
+            PathFileError: the file cannot be written.
+        """
+        try:
+            with self._db:
+                self._db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, json.dumps(value)))
+        except sqlite3.Error as error:
+            raise PathFileError(f"cannot write '{self.file}' ({error}); is the disk full?") from error
+
     def arrays(self) -> dict[str, AnyArray]:
         """Arrays of the model by name."""
         rows = self._db.execute("SELECT name, dtype, shape, data FROM arrays")

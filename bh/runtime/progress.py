@@ -47,7 +47,7 @@ class Bar:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         self._progress = Progress(
-            TextColumn("step {task.fields[step]}"),
+            TextColumn("{task.fields[stage]}step {task.fields[step]}"),
             BarColumn(),
             TextColumn("lambda {task.completed:.3f}  iterations {task.fields[iterations]}"),
             TextColumn("energy {task.fields[energy]:.4g} N mm"),
@@ -59,8 +59,13 @@ class Bar:
         self._task: TaskID | None = None
         self._step = -1
         self._iterations = 0
+        self._stage = ""
         self._began = time.monotonic()
         self._due = self._began + self.first
+
+    def stage(self, words: str) -> None:
+        """Say what is solved from here on, such as one of several meshes."""
+        self._stage, self._step = f"{words}: ", -1
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
         """Move the bar, or print a line where there is no terminal."""
@@ -72,7 +77,7 @@ class Bar:
         if new:
             self._progress.start()
             self._task = self._progress.add_task(
-                "", total=1.0, step=f"{step + 1}/{steps}", iterations=0, energy=0.0
+                "", total=1.0, stage=self._stage, step=f"{step + 1}/{steps}", iterations=0, energy=0.0
             )
         assert self._task is not None
         self._progress.update(self._task, completed=lam, iterations=self._iterations, energy=energy)
@@ -83,8 +88,8 @@ class Bar:
             return
         self._due = now + self.every
         print(
-            f"step {step + 1}/{steps}  lambda {lam:.3f}  iterations {self._iterations}  energy {energy:.4g} N mm  "
-            f"{now - self._began:.0f} s",
+            f"{self._stage}step {step + 1}/{steps}  lambda {lam:.3f}  iterations {self._iterations}  "
+            f"energy {energy:.4g} N mm  {now - self._began:.0f} s",
             file=sys.stderr,
             flush=True,
         )
@@ -102,6 +107,13 @@ class Bar:
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Close the bar, also after an error."""
         self.close("")
+
+
+def stage(report: ProgressMeter, words: str) -> None:
+    """Tell a meter what is solved from here on, if it has a method `stage` for that."""
+    tell = getattr(report, "stage", None)
+    if tell is not None:
+        tell(words)
 
 
 def meter(progress: bool | ProgressMeter) -> ProgressMeter:

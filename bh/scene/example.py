@@ -19,26 +19,15 @@ file = {file}
 # gap = 0.5                      # lines that miss each other by up to so much are joined, mm
 # lines = {{ "#00aa00" = "valley", "layer:score" = "mountain" }}   # what lines stand for, in front of the defaults
 """
-STRUCTURED = """[mesh]                           # along the rulings
-kind = "staggered"               # right for bars and hinges
-aspect_ratio = 8.0               # of the cells, best 5 to 12; or along = 64, the number of cells along a crease
-"""
-GMSH = """[mesh]                           # creases that meet, cross or end inside the sheet
-kind = "gmsh"
-size = {size:.3g}                       # of the triangles, mm
-"""
-DRAWN = """[mesh]                           # the drawing has facet lines (rulings): its own faces are the mesh
-kind = "drawn"
+ACCURACY = """\
+# Mesh and formulation are chosen, and refined until the energy is right to 5 % by its own estimate. To choose a mesh
+# put [mesh] in its place: kind = "staggered", along = 64, rows = 4; or kind = "gmsh", size = 4.0 (docs/scenes.md).
+accuracy = 0.05
 """
 REST = """[sheet]
 E = 4000.0                       # Young's modulus, MPa (paper: 3000 to 5000)
 nu = 0.3                         # Poisson's ratio; bars and hinges take 0
 t = 0.2                          # thickness, mm
-
-{mesh}
-[model]
-# "bars-and-hinges" is fast, on rulings; "consistent" is right on every mesh; "shell" judges both
-formulation = "{formulation}"
 
 # Without supports the sheet is free: rigid motions are taken out, nothing is held. To hold something:
 # [[supports]]
@@ -63,7 +52,7 @@ pictures = true
 
 
 def example(drawing: Path | None = None, folder: Path = Path()) -> str:
-    """The text of a scene; with a drawing (looked for in `folder`) the mesh that suits what it shows.
+    """The text of a scene; with a drawing (looked for in `folder`) that is to be folded.
 
     Args:
         drawing: file name of a drawing (.svg, .dxf) or of a .fold file; None for a scene without one.
@@ -74,8 +63,7 @@ def example(drawing: Path | None = None, folder: Path = Path()) -> str:
     """
     head = "# A scene: `bh check` draws it, `bh run` folds it. mm, N, rad; docs/scenes.md has every key.\n\n"
     if drawing is None:
-        rest = REST.format(mesh=STRUCTURED, formulation="bars-and-hinges", place="corner:inner-start")
-        return f"{head}{LIBRARY}\n{rest}"
+        return f"{head}{ACCURACY}\n{LIBRARY}\n{REST.format(place='corner:inner-start')}"
     from meshes.io import read_pattern
     from meshes.io.drawing import DRAWINGS
 
@@ -84,16 +72,5 @@ def example(drawing: Path | None = None, folder: Path = Path()) -> str:
 
     pattern = read_pattern(folder / drawing)
     name = '"' + str(drawing).replace("\\", "/").replace('"', '\\"') + '"'
-    if pattern.rails:
-        mesh, formulation = STRUCTURED, "bars-and-hinges"
-    elif pattern.facets:
-        mesh, formulation = DRAWN, "consistent"
-    else:
-        side = max(
-            float(pattern.rings[0][:, axis].max() - pattern.rings[0][:, axis].min()) for axis in (0, 1)
-        )
-        mesh, formulation = GMSH.format(size=side / 25.0), "consistent"
-    place = f"edge:{pattern.edges[0][0]}"
-    return (
-        f"{head}{DRAWING.format(file=name)}\n{REST.format(mesh=mesh, formulation=formulation, place=place)}"
-    )
+    rest = REST.format(place=f"edge:{pattern.edges[0][0]}")
+    return f"{head}{ACCURACY}\n{DRAWING.format(file=name)}\n{rest}"

@@ -17,7 +17,7 @@ from bh.loading.symmetry import Plane, check, mirror
 from bh.model.actuations import Displace, Force
 from bh.model.model import Model
 from bh.model.plugins import made
-from bh.model.refinement import Goal, pattern_of
+from bh.model.refinement import Goal
 from bh.model.serialise import ACTUATIONS as MAKERS
 from bh.model.sheet import CreaseLaw, Sheet
 from bh.model.step import Actuation, Step
@@ -40,7 +40,6 @@ from bh.scene.reading import (
 )
 from bh.scene.tables import (
     ACTUATIONS,
-    AccuracyTable,
     CreaseTable,
     ModelTable,
     OutputsTable,
@@ -48,6 +47,7 @@ from bh.scene.tables import (
     SupportTable,
     UntilTable,
 )
+from bh.scene.wanted_accuracy import wanted_accuracy
 
 SECTIONS = (
     "pattern",
@@ -61,7 +61,6 @@ SECTIONS = (
     "accuracy",
     "symmetry",
 )
-COARSEST = {"aspect_ratio": 1.0}
 LONGEST_FILE = 20_000_000  # bytes
 
 
@@ -196,12 +195,8 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
-    accuracy = _accuracy(data["accuracy"]) if "accuracy" in data else None
-    how_meshed = data.get("mesh")
-    if accuracy is not None and how_meshed is None and "file" not in as_table(data["pattern"], "pattern"):
-        how_meshed = COARSEST  # only to check the scene on
     model = Model(
-        mesh=mesh_of(data["pattern"], how_meshed, folder),
+        mesh=mesh_of(data["pattern"], data.get("mesh"), folder),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
@@ -210,15 +205,10 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         hinge_lock=how.hinge_lock,
     )
     _check(model)
-    if accuracy is not None:
-        with within("accuracy"):
-            pattern_of(model)
-            if accuracy.at is not None:
-                model.mesh.nodes(accuracy.at)
     return Scene(
         model,
         Outputs(**arguments(outputs)),
-        accuracy=accuracy,
+        accuracy=wanted_accuracy(data, model),
         symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None,
     )
 
@@ -230,16 +220,6 @@ def _symmetry(model: Model, data: object) -> Plane:
     with within("symmetry"):
         check(model, load_steps(model), mirror(model.mesh, data))
     return data if isinstance(data, str) else tuple(data)
-
-
-def _accuracy(data: object) -> Goal:
-    """A number, or a table."""
-    with within("accuracy"):
-        if not isinstance(data, dict):
-            return Goal(data)  # type: ignore[arg-type]  # it refuses what is no number
-        table = read_table(AccuracyTable, data, "accuracy")
-        direction = None if table.direction is None else tuple(table.direction)
-        return Goal(table.within, table.of, table.at, direction)  # type: ignore[arg-type]
 
 
 # --- from tables to descriptions ----------------------------------------------------------------------------

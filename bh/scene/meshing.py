@@ -12,6 +12,7 @@ from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
 from bh.scene.reading import as_table, nearest, read_table, shown, within, without
 from bh.scene.tables import DrawnTable, GmshTable, MeshTable
 from meshes import CreasePattern, SheetMesh, structured
+from meshes.choices import first_mesh
 
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
 
@@ -21,7 +22,7 @@ def mesh_of(pattern: object, mesh: object, folder: Path) -> SheetMesh:
 
     Args:
         pattern: table [pattern].
-        mesh: table [mesh], or None.
+        mesh: table [mesh], or None for a coarse one that only shows the places (the mesh is chosen by the run).
         folder: where files that these name are looked for.
 
     Raises:
@@ -33,9 +34,8 @@ def mesh_of(pattern: object, mesh: object, folder: Path) -> SheetMesh:
         return _mesh_from_file(table, mesh, folder)
     drawn = _drawn(table)
     if mesh is None:
-        raise SceneError(
-            "mesh is missing; add a table [mesh] with along (cells along the crease) or aspect_ratio"
-        )
+        with within("pattern"):
+            return first_mesh(drawn)
     how = _mesh_table(as_table(mesh, "mesh"))
     if isinstance(how, DrawnTable):
         raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
@@ -112,12 +112,6 @@ def _mesh_from_drawing(table: DrawingPattern, mesh: object, folder: Path) -> She
     from meshes.io import read_drawn, read_pattern
     from meshes.io.drawing import DrawingOptions
 
-    if mesh is None:
-        raise SceneError(
-            'mesh is missing; add a table [mesh] with kind = "gmsh" and size, along or aspect_ratio (creases side by '
-            'side), or kind = "drawn" (the faces of the drawing)'
-        )
-    how = _mesh_table(as_table(mesh, "mesh"))
     options: DrawingOptions = {
         "scale": table.scale,
         "fit": table.fit,
@@ -125,6 +119,10 @@ def _mesh_from_drawing(table: DrawingPattern, mesh: object, folder: Path) -> She
         "gap": table.gap,
         "lines": table.lines,
     }
+    if mesh is None:
+        with within("pattern.file"):
+            return first_mesh(read_pattern(folder / table.file, **options))
+    how = _mesh_table(as_table(mesh, "mesh"))
     with within("pattern.file"):
         if isinstance(how, DrawnTable):
             return read_drawn(folder / table.file, **options)

@@ -11,6 +11,7 @@ import numpy as np
 
 from bh.errors import InputError
 from bh.formulations.registry import remarks
+from bh.model.refinement import Goal
 from bh.model.supports import Support, select
 from bh.scene.load import Scene
 from meshes import SheetMesh
@@ -32,7 +33,7 @@ def report(scene: Scene) -> list[str]:
     size = np.ptp(mesh.points, axis=0)
     lines = [
         f"sheet: {size[0]:.5g} x {size[1]:.5g} mm, {mesh.areas.sum():.6g} mm^2, t = {model.sheet.t:g} mm",
-        f"mesh: {mesh!r}; {model.formulation}",
+        f"mesh: {mesh!r}; {model.formulation}" if scene.accuracy is None else _chosen(scene.accuracy),
     ]
     for name in mesh.creases[:SHOWN]:
         pairs = mesh.crease_edges(name)
@@ -60,7 +61,15 @@ def report(scene: Scene) -> list[str]:
     for i, step in enumerate(model.steps):
         items = (*step.actuations, step.until) if step.until else step.actuations
         lines.append(f"step {i + 1}: " + ", ".join(_words(item) for item in items))
-    return lines + [f"remark ({remark.code}): {remark}" for remark in remarks(model)]
+    # a mesh that is yet to be chosen is here to show the places, and nothing can be said of it
+    told = [r for r in remarks(model) if scene.accuracy is None or r.code == "drawing"]
+    return lines + [f"remark ({remark.code}): {remark}" for remark in told]
+
+
+def _chosen(goal: Goal) -> str:
+    what = goal.of if goal.at is None else f"{goal.of} at {goal.at}"
+    how_well = f"{100 * goal.within:g} % by its own estimate"
+    return f"mesh and formulation: chosen by the run, until the {what} is right to {how_well}"
 
 
 def _words(item: object) -> str:

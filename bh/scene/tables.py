@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from bh.model.pinch import Profile
-from bh.model.refinement import LEAST, MOST
+from bh.model.refinement import LEAST, MOST, MOST_TRIANGLES
 from bh.scene.reading import (
     DENSITY,
     LSTAR,
@@ -31,7 +31,7 @@ from bh.scene.reading import (
     Table,
     Vector,
 )
-from meshes.structured import Kind
+from meshes.cells import Kind
 
 
 class SheetTable(Table):
@@ -115,6 +115,12 @@ class AccuracyTable(Table):
     of: Literal["energy", "tip", "stiffness"] = Field("energy", description='"energy", "tip" or "stiffness"')
     at: str | None = Field(None, description='the place of a tip or a stiffness, such as "corner:outer-end"')
     direction: Vector | None = Field(None, description=VECTOR + ", of the force on a stiffness")
+    most_triangles: Annotated[int, Field(ge=1, le=4_000_000)] = Field(
+        MOST_TRIANGLES, description="a whole number of triangles; no finer mesh is solved"
+    )
+    seconds: Positive | None = Field(
+        None, description="a time in s; no mesh is begun that is likely to take longer than is left of it"
+    )
 
 
 class SupportTable(Table):

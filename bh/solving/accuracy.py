@@ -8,15 +8,15 @@ two values v1, v2 and the order p that the last three show, but not more than `O
 
 where |v2 - v1| counts as at least what second order leaves of the difference before it: values that go up and then
 down are close to each other once without being close to their limit. Where they turn back, or the differences do not
-fall, p is `ORDERS[0]`.
+fall, p is `ORDERS[0]`. A coarse mesh that snaps to another branch where the next one does not is left out.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -27,104 +27,189 @@ from bh.errors import ModelError
 from bh.formulations.protocols import Mirrored, Refinable
 from bh.formulations.registry import formulation, names
 from bh.loading.builder import load_steps
+from bh.loading.symmetry import Plane
 from bh.model.model import Model
-from bh.model.refinement import Goal, Refinement, mesh_at, pattern_of, with_mesh
+from bh.model.refinement import Goal, Refinement, pattern_of, with_mesh
 from bh.paths.estimate import Accuracy, Trial
 from bh.paths.path import Path
+from bh.runtime.progress import ProgressMeter, meter, stage
+from bh.solvers.outcome import Outcome
+from bh.solvers.trace import Strategy
+from bh.solving.follow import follow
+from bh.solving.levels import Levels
+from bh.solving.mesh_choice import Ladder
+from bh.solving.race import Race
+from meshes import MeshError, SheetMesh
+from meshes.cells import Cells
 
 Array = NDArray[np.float64]
-LARGEST = 40_000  # triangles
-FALLING = 0.9  # an estimate that does not fall by this factor from one mesh to the next falls no more
-LOST = 3  # meshes in a row whose path ends early
 SAFETY = 1.5
 ORDERS = (1.0, 2.0)
+NOTHING = 1e-6  # of E t^3: an energy that is none, such as that of straight creases that nothing holds
 
 
-def solve(model: Model, goal: Goal, follow: Callable[[Model], Path], *, halves: bool = False) -> Path:
+def solve(
+    model: Model,
+    goal: Goal,
+    *,
+    progress: bool | ProgressMeter = False,
+    strategy: Strategy | None = None,
+    symmetry: Plane | None = None,
+    levels: Levels | None = None,
+) -> Path:
     """Trace a model to a wanted accuracy; its own mesh and formulation only say what the sheet is.
 
     Args:
-        model: the sheet, on any mesh of its pattern.
-        goal: what is to be how accurate.
-        follow: solves a model on one mesh; it is called for every mesh that is tried.
-        halves: only formulations that can be solved by halves.
+        model: what is solved.
+        goal: what is to be how accurate, and at which cost.
+        progress: as for `bh.trace`; a meter that has a method `stage` is told the mesh that comes next.
+        strategy: as for `bh.trace`.
+        symmetry: as for `bh.trace`.
+        levels: where the path of every mesh is kept, and found again.
 
     Returns:
         the path on the finest mesh; `path.accuracy` says what was chosen, estimated and spent. If the estimate does not
-        hold with up to `LARGEST` triangles, or falls no more, `met` is False.
+        hold within the cost of the goal, or falls no more, `met` is False, and the path is that of the best estimate.
 
     Raises:
         ModelError: the model cannot be meshed anew, or has no such goal.
+        MeshError: no mesh can be made of it.
     """
     began = time.perf_counter()
     pattern = pattern_of(model)
     _check(model, goal)
-    race = _Race(goal, candidates(halves))
+    race = Race(goal, candidates(halves=symmetry is not None))
+    task = _Task(model, goal, meter(progress), strategy, symmetry, levels)
+    ladders = {name: Ladder(pattern, option.kind, race.first(name)) for name, option in race.options.items()}
     trials: list[Trial] = []
-    error, order, lost = math.inf, math.nan, 0
-    while True:
-        name, level = race.next()
-        mesh = mesh_at(pattern, race.options[name].kind, level)
-        clock = time.perf_counter()
-        path = follow(with_mesh(model, mesh, name))
-        reached = path.reached
-        value = reading(path, goal) if reached else np.array([math.nan])
-        spent = time.perf_counter() - clock
-        trials.append(
-            Trial(
-                name, level, len(mesh.triangles), path.unknowns, path.iterations, spent, path.outcome, value
-            )
-        )
-        before = error
-        error, order = estimate([t.value for t in trials if t.formulation == name])
-        lost = 0 if reached else lost + 1
-        stuck = len(race.tried[name]) > 3 and error > FALLING * before
-        if error <= goal.within or lost == LOST or stuck or 4 * len(mesh.triangles) > LARGEST:
+    found: list[_Found] = []
+    why, failed = "", None
+    while (turn := race.next()) is not None and not (
+        why := race.too_long(trials, time.perf_counter() - began)
+    ):
+        name, step = turn
+        try:
+            path, trial = task.solve(ladders[name], name, race.tried[name][-1], step)
+        except MeshError as error:
+            failed = failed or error
+            race.out[name] = f"{name} has no mesh of this sheet ({error.args[0].split(';')[0]})"
+            continue
+        trials = mark_doubtful([*trials, trial])
+        error_, order = estimate(trusted(trials, name), nothing(model, goal))
+        found.append(_Found(path, error_, order, name, str(trial.mesh)))
+        if error_ <= goal.within:
             break
-    met, spent = error <= goal.within, time.perf_counter() - began
-    path.accuracy = Accuracy(goal, error, met, order, name, _words(path), tuple(trials), spent)
+        race.judge(name, trials, [item.error for item in found if item.formulation == name])
+    if not found:
+        raise failed or ModelError("no formulation is left to solve this with")
+    return _chosen(goal, found, trials, _notes(race, ladders, trials, why), time.perf_counter() - began)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A solved mesh and the estimate that was made there."""
+
+    path: Path
+    error: float
+    order: float
+    formulation: str
+    mesh: str
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is the same on every mesh."""
+
+    model: Model
+    goal: Goal
+    report: ProgressMeter
+    strategy: Strategy | None
+    symmetry: Plane | None
+    levels: Levels | None
+
+    def solve(self, ladder: Ladder, name: str, level: float, step: int) -> tuple[Path, Trial]:
+        """Solve mesh number `step` of a ladder."""
+        clock = time.perf_counter()
+
+        def on_mesh(mesh: SheetMesh, cells: Cells) -> Path:
+            stage(self.report, f"{name}, {cells}")
+            file = None if self.levels is None else self.levels.file(name, cells)
+            return follow(
+                with_mesh(self.model, mesh, name), progress=self.report, strategy=self.strategy,
+                symmetry=self.symmetry, file=file, resume=file is not None and file.exists(),
+            )  # fmt: skip
+
+        path, cells = ladder.solve(step, on_mesh)
+        value = reading(path, self.goal) if path.reached else np.array([math.nan])
+        spent = max(
+            time.perf_counter() - clock, path.wall_time_s
+        )  # what was found solved has cost its time before
+        return path, Trial(
+            name, level, str(cells), len(path.model.mesh.triangles), path.unknowns, path.iterations, spent,
+            path.outcome, value, snapped(path),
+        )  # fmt: skip
+
+
+def _chosen(goal: Goal, found: Sequence[_Found], trials: list[Trial], notes: list[str], spent: float) -> Path:
+    """The last path where its estimate holds, else the one with the best estimate."""
+    best = min(reversed(found), key=lambda item: item.error)
+    if not math.isfinite(best.error):
+        best = found[-1]
+    path, met = best.path, best.error <= goal.within
+    path.accuracy = Accuracy(
+        goal, best.error, met, best.order, best.formulation, _words(path, best.mesh), tuple(trials), spent,
+        notes=tuple(notes if not met else [note for note in notes if not note.startswith("ended")]),
+    )  # fmt: skip
     return path
 
 
-@dataclass
-class _Race:
-    """Which formulation at which level comes next.
-
-    The formulation that is likely to be the cheapest begins, with three levels. Where its estimate does not hold it is
-    refined further, unless another one is likely to do the whole in less time than that level takes.
-    """
-
-    goal: Goal
-    options: Mapping[str, Refinement]
-    tried: dict[str, list[float]] = field(default_factory=dict)
-
-    def next(self) -> tuple[str, float]:
-        within = self.goal.within
-        now = next(reversed(self.tried), "")
-        fresh = [name for name in self.options if name not in self.tried]
-        best = min(fresh, key=lambda name: self.options[name].time(within), default="")
-        if now and len(self.tried[now]) >= 3:
-            option = self.options[now]
-            ahead = option.cost * (2.0 * self.tried[now][-1]) ** option.power
-            if best and self.options[best].time(within) < ahead:
-                now = ""
-        if not now:
-            now = best
-            self.tried[now] = []
-        levels = self.tried[now]
-        levels.append(2.0 * levels[-1] if levels else self.options[now].level(within) / 4.0)
-        return now, levels[-1]
+def _notes(race: Race, ladders: dict[str, Ladder], trials: Sequence[Trial], why: str) -> list[str]:
+    """What was not as planned, and why the run ended, last."""
+    notes = [note for name in race.tried for note in ladders[name].notes]
+    notes += [
+        f"doubtful: {t.formulation}, {t.mesh}: it snaps to another branch where the next mesh does not"
+        for t in trials
+        if t.doubtful
+    ]
+    return notes + [f"ended: {text}" for text in dict.fromkeys([*race.out.values(), *([why] if why else [])])]
 
 
-def estimate(values: list[Array]) -> tuple[float, float]:
+def snapped(path: Path) -> bool:
+    """Whether a path jumped to another branch on its way, or ends where it is not stable."""
+    return any(record.jumped for record in path.records) or path.stable is False
+
+
+def mark_doubtful(trials: Sequence[Trial]) -> list[Trial]:
+    """The trials, marked where one snapped and the next mesh of its formulation, which was reached, did not."""
+    found = list(trials)
+    for k, trial in enumerate(found):
+        after = next((t for t in found[k + 1 :] if t.formulation == trial.formulation), None)
+        doubtful = (
+            trial.snapped and after is not None and after.outcome is Outcome.REACHED and not after.snapped
+        )
+        found[k] = replace(trial, doubtful=doubtful)
+    return found
+
+
+def trusted(trials: Sequence[Trial], name: str) -> list[Array]:
+    """Values of a formulation that an estimate may be made of, coarse to fine."""
+    return [t.value for t in trials if t.formulation == name and not t.doubtful]
+
+
+def estimate(values: Sequence[Array], nothing: float = 0.0) -> tuple[float, float]:
     """(estimated relative error of the last value, observed order) of values on meshes twice as fine each.
 
-    Values are vectors; (inf, nan) for fewer than three of them in a row.
+    Args:
+        values: vectors, coarse to fine.
+        nothing: a size below which a value is none; the error is told of that size then.
+
+    Returns:
+        (inf, nan) for fewer than three of them in a row.
     """
     last = values[-3:]
     if len(last) < 3 or not all(np.isfinite(v).all() for v in last):
         return math.inf, math.nan
-    size = float(np.linalg.norm(last[2]))
+    size = max(float(np.linalg.norm(last[2])), nothing)
     before, now = (float(np.linalg.norm(b - a)) for a, b in pairwise(last))
     if size == 0.0:
         return (0.0 if now == 0.0 else math.inf), math.nan
@@ -184,6 +269,10 @@ def reading(path: Path, goal: Goal) -> Array:
     return np.array([stiffness])
 
 
-def _words(path: Path) -> str:
-    mesh = path.model.mesh
-    return f"{len(mesh.triangles)} triangles ({mesh.kind})"
+def nothing(model: Model, goal: Goal) -> float:
+    """The size below which a goal is none."""
+    return NOTHING * model.sheet.E * model.sheet.t**3 if goal.of == "energy" else 0.0
+
+
+def _words(path: Path, cells: str) -> str:
+    return f"{len(path.model.mesh.triangles)} triangles ({cells})"

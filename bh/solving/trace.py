@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from bh.errors import ModelError
 from bh.model.model import Model
 from bh.paths.path import Path
-from bh.runtime.progress import ProgressMeter
+from bh.runtime.progress import ProgressMeter, meter
 from bh.solvers.trace import Strategy
 from bh.solving.follow import follow
 
@@ -26,6 +26,7 @@ def trace(
     file: str | FilePath | None = None,
     resume: bool = False,
     accuracy: float | Goal | None = None,
+    estimate: bool = False,
     after: Path | None = None,
 ) -> Path:
     """Follow the equilibrium of `model` through all its steps.
@@ -41,7 +42,10 @@ def trace(
         resume: go on from the states in `file` (which must be of the same model) instead of starting anew.
         accuracy: wanted relative error of the energy, such as 0.02, or a `bh.Goal`. Formulation and mesh are then
             chosen (those of the model only say what the sheet is) and refined until an estimate of the error holds;
-            see `bh.solving.accuracy` and `path.accuracy`. The file is written when that is done.
+            see `bh.solving.accuracy` and `path.accuracy`. With a file, every mesh has one of its own in a folder
+            beside it (`path-levels` beside `path.bh`), and `resume` goes on from these.
+        estimate: solve one coarser mesh, too, for an estimate of the error (`path.accuracy`), at about a quarter of the
+            cost; where it cannot be had, `path.estimate_reason` says why.
         after: a solved path of the same model with fewer steps, whose states this one begins with.
 
     Returns:
@@ -57,29 +61,42 @@ def trace(
         raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
-    if accuracy is None:
-        return follow(
-            model,
-            symmetry=symmetry,
-            progress=progress,
-            strategy=strategy,
-            file=file,
-            resume=resume,
-            after=after,
-        )
-    if resume or after is not None:
-        raise ModelError(
-            "a run to a wanted accuracy begins anew on every mesh; run it without resume and after"
-        )
+    if accuracy is not None:
+        if after is not None or (resume and file is None):
+            raise ModelError(
+                "a run to a wanted accuracy begins anew on every mesh; leave out after, and resume it with its file"
+            )
+        return _to_accuracy(model, accuracy, symmetry, progress, strategy, file, resume)
+    report = meter(progress)
+    path = follow(
+        model, symmetry=symmetry, progress=report, strategy=strategy, file=file, resume=resume, after=after
+    )
+    if estimate and path.accuracy is None:
+        from bh.solving.given_mesh import add_estimate
+
+        add_estimate(path, progress=report, strategy=strategy, symmetry=symmetry)
+        if file is not None:
+            path.save_accuracy(file)
+    return path
+
+
+def _to_accuracy(
+    model: Model,
+    accuracy: float | Goal,
+    symmetry: Plane | None,
+    progress: bool | ProgressMeter,
+    strategy: Strategy | None,
+    file: str | FilePath | None,
+    resume: bool,
+) -> Path:
     # its analyses are loaded only where they are needed
     from bh.model.refinement import Goal
     from bh.solving.accuracy import solve
-
-    def on_mesh(refined: Model) -> Path:
-        return follow(refined, symmetry=symmetry, progress=progress, strategy=strategy)
+    from bh.solving.levels import Levels
 
     goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-    path = solve(model, goal, on_mesh, halves=symmetry is not None)
+    levels = None if file is None else Levels(file, resume)
+    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry, levels=levels)
     if file is not None:
         path.save(file)
     return path

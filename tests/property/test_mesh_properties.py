@@ -13,9 +13,9 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip, structured
+from meshes.cells import Kind
 from meshes.curves import Arc
 from meshes.io import read_fold, write_fold
-from meshes.structured import Kind
 from meshes.topology import boundary_loops
 
 PROPERTY = settings(

@@ -16,7 +16,7 @@ import bh.solving.accuracy
 import meshes
 from bh.commands.cli import main
 from bh.errors import ModelError, SceneError
-from bh.model.refinement import Refinement, mesh_at, pattern_of
+from bh.model.refinement import Goal, Refinement, mesh_at, pattern_of
 from bh.scene.load import parse_scene
 from bh.solving.accuracy import candidates, estimate
 from verification.studies.solver.honesty import TRAINING, examine
@@ -163,12 +163,19 @@ def test_goals(goal: bh.Goal) -> None:
     assert value.shape == ((3,) if goal.of == "tip" else (1,))
 
 
-def test_what_is_not_met_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bh.solving.accuracy, "LARGEST", 100)
-    path = bh.trace(model().fold("crease", by=1.0), accuracy=1e-4)
+def test_what_is_not_met_is_said() -> None:
+    """A cost that is stated ends the run; the best path is kept, and why it ended is said."""
+    path = bh.trace(model().fold("crease", by=1.0), accuracy=Goal(1e-4, most_triangles=100))
     assert path.accuracy is not None
+    assert path.outcome == "reached"
     assert not path.accuracy.met
     assert any("not met" in remark for remark in path.remarks)
+    assert "more than 100" in path.accuracy.notes[-1]
+    assert path.accuracy.notes[-1] == path.estimate_reason
+    short = bh.trace(model().fold("crease", by=1.0), accuracy=Goal(1e-4, seconds=1e-6)).accuracy
+    assert short is not None
+    assert "more than is left of 1e-06 s" in short.notes[-1]
+    assert len(short.trials) == 1
 
 
 def test_a_path_that_ends_early_has_no_estimate() -> None:
@@ -227,6 +234,8 @@ def test_bad_uses() -> None:
         bh.trace(folded, accuracy=bh.Goal(0.1, "tip", "corner:outer-end"))
     with pytest.raises(ModelError, match="begins anew"):
         bh.trace(folded, accuracy=0.1, resume=True)
+    with pytest.raises(ModelError, match="begins anew"):
+        bh.trace(folded, accuracy=0.1, after=bh.trace(folded))
     held = folded.support("edge:start", "xyz").support("edge:end", "xyz")
     with pytest.raises(ModelError, match="held in that direction"):
         bh.trace(held, accuracy=bh.Goal(0.1, "stiffness", "corner:outer-start", (0.0, 0.0, 1.0)))
@@ -264,7 +273,10 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     assert found["accuracy"]["trials"][-1]["unknowns"] == found["unknowns"]
     assert found["formulation"] == found["accuracy"]["formulation"]
     assert bh.Path.load("out/path.bh")[-1].energy.total == pytest.approx(found["energy"]["total"])
-    monkeypatch.setattr(bh.solving.accuracy, "LARGEST", 10)
-    Path("scene.toml").write_text(SCENE.format(accuracy=0.0001))
+    Path("scene.toml").write_text(SCENE.format(accuracy="{ within = 0.0001, most_triangles = 10 }"))
     assert main(["run", "scene.toml", "-o", "other", "-q"]) == 1
-    assert "not met" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "not met" in told
+    assert "more than 10" in told
+    assert len(told.splitlines()) == 1
+    assert bh.Path.load("other/path.bh").outcome == "reached"

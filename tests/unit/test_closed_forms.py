@@ -20,7 +20,7 @@ from bh.mechanics.bars_and_hinges.stiffness import (
     shear_exact_factor,
 )
 from bh.solvers.linear import linear_response
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.theory import cone as cone_theory
 from verification.theory import shear
 from verification.theory import strips as strip_theory

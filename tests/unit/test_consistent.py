@@ -18,7 +18,7 @@ from bh.materials import LinearElastic
 from bh.mechanics.consistent.membrane_kernels import triangle_strains
 from bh.mechanics.consistent.patches import bending_matrices, curvature_maps, triangle_frames
 from bh.model.sheet import ElementStiffness
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.studies.solver import plates
 from verification.studies.solver.patch_tests import (
     CURVATURES,

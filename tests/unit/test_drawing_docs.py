@@ -94,7 +94,7 @@ class TestInit:
         assert "--force" in capsys.readouterr().err
         assert main(["init", "--force"]) == 0
 
-    def test_drawings_get_the_mesh_that_suits_them(self, here: Any) -> None:
+    def test_drawings_are_solved_to_an_accuracy(self, here: Any) -> None:
         (here / "cross.svg").write_text(
             '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="60mm" viewBox="0 0 60 60">'
             '<rect width="60" height="60" stroke="black" fill="none"/>'
@@ -102,9 +102,13 @@ class TestInit:
         )
         text = (here / "cross.svg").read_text()
         (here / "rulings.svg").write_text(text.replace("FACETS", '<path d="M30,0 L30,60" stroke="yellow"/>'))
-        for name, kind in (("wave", "staggered"), ("cross", "gmsh"), ("rulings", "drawn")):
+        for name, kind in (("wave", "staggered"), ("cross", "gmsh"), ("rulings", "gmsh")):
             scene = parse_scene(example(Path(f"{name}.svg"), here), here)
+            assert scene.accuracy is not None
             assert scene.model.mesh.kind == kind
+            (line,) = [line for line in report(scene) if line.startswith("mesh")]
+            assert "chosen by the run, until the energy is right to 5 %" in line
+            assert not any(line.startswith("remark (aspect") for line in report(scene))
         with pytest.raises(InputError, match="no drawing"):
             example(Path("scene.toml"), here)
 
@@ -216,9 +220,8 @@ class TestRemarks:
         assert self.codes("aspect_ratio = 8.0", pull, "shell") == []
 
     def test_the_command_prints_them(self, here: Any, capsys: pytest.CaptureFixture[str]) -> None:
-        text = (
-            (ROOT / "examples" / "wave.toml").read_text().replace("aspect_ratio = 8.0", "aspect_ratio = 1.0")
-        )
+        text = (ROOT / "examples" / "wave.toml").read_text().replace("accuracy = 0.05\n", "")
+        text += '[mesh]\naspect_ratio = 1.0\n[model]\nformulation = "bars-and-hinges"\n'
         (here / "coarse.toml").write_text(text)
         assert main(["run", "coarse.toml"]) == 0
         assert main(["check", "coarse.toml", "--no-picture"]) == 0
@@ -233,10 +236,9 @@ class TestRemarks:
 
         text = (here / "wave.svg").read_text().replace("</svg>", '<path d="M40,0 V80" stroke="black"/></svg>')
         (here / "ruled.svg").write_text(text)
-        scene = parse_scene(
-            example(Path("ruled.svg"), here).replace('kind = "drawn"', 'kind = "gmsh"\nsize = 9.0'), here
-        )
-        (remark,) = bh.remarks(scene.model)
+        meshed = example(Path("ruled.svg"), here).replace("accuracy = 0.05\n", "")
+        scene = parse_scene(meshed + '[mesh]\nkind = "gmsh"\nsize = 9.0\n', here)
+        (remark,) = [remark for remark in bh.remarks(scene.model) if remark.code == "drawing"]
         assert remark.code == "drawing"
         assert "boundary lines lie inside" in remark.text
         path = bh.trace(scene.model, file=here / "path.bh")

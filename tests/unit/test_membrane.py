@@ -19,7 +19,7 @@ from bh.mechanics.consistent.membrane import Membrane, constant_strain, smoothed
 from bh.mechanics.consistent.membrane_kernels import edge_strains
 from bh.mechanics.consistent.system import ConsistentSystem
 from bh.solvers.linear import linear_response
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.studies.solver import plates
 from verification.studies.solver.convergence import folded, sector
 from verification.studies.solver.patch_tests import distorted

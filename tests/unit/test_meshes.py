@@ -25,8 +25,8 @@ from meshes import (
     strip,
     structured,
 )
+from meshes.cells import Kind
 from meshes.curves import sample
-from meshes.structured import Kind
 from meshes.topology import boundary_loops, build
 
 KINDS = get_args(Kind)

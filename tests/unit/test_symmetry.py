@@ -16,7 +16,7 @@ from bh.errors import ModelError, SceneError
 from bh.loading.symmetry import mirror
 from bh.paths.path import Path
 from bh.scene.load import parse_scene
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.alignment import aligned
 
 SHEET = bh.Sheet(E=4000.0, nu=0.3, t=0.127)

@@ -9,7 +9,7 @@ from bh import Model, Path, trace
 from bh.plotting.interactive import frames
 from bh.plotting.pictures import picture
 from bh.solvers.outcome import Outcome
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context, Cost
 from verification.framework.run import write_json
 

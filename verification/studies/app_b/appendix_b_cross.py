@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.state import ShellState
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.alignment import aligned, hausdorff
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.studies.app_b.shell_folding import ACTUATIONS, ANGLE, Solved, solve

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from bh import Model
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context
 from verification.framework.folded_frames import by_every_formulation, store
 from verification.studies.app_b.shell_folding import sheet_model

@@ -20,7 +20,7 @@ from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
 from bh.solvers.system import System
 from bh.solvers.trace import Walk, walk
-from meshes.structured import Kind
+from meshes.cells import Kind
 
 SHEET = Sheet(E=4000.0, nu=0.38, t=0.127)
 CREASE_STIFFNESS = 4.0e-3  # N mm / (mm rad), B.3

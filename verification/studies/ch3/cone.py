@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Model, Path, Sheet, trace
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework import setups
 from verification.framework.checks import CaseResult, Context, line, plot
 from verification.theory import cone

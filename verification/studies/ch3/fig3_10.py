@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Displace, Model, Path, Sheet, State, trace
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context, line, plot
 
 SHEET = Sheet(E=4000.0, t=0.127)  # nu = 0, as bars and hinges take it

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh import Path, Sheet, State, trace
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context, line, plot
 from verification.studies.ch3 import cone
 

@@ -8,7 +8,7 @@ from typing import Literal
 import meshes
 from bh import Model, Sheet
 from meshes import CreasePattern
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context
 from verification.framework.folded_frames import by_every_formulation, store
 

@@ -13,7 +13,7 @@ from bh import Model, Sheet
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
 from bh.solvers.linear import linear_response
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.theory import strips as theory
 

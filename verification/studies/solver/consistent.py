@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import get_args
 
 from bh import Sheet
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.studies.solver import plates
 from verification.studies.solver.patch_tests import (

@@ -12,7 +12,7 @@ import numpy as np
 import meshes
 from bh import Model, Path, Sheet, trace
 from meshes import SheetMesh
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context, Cost, line, plot, reached_energy
 from verification.studies.app_b import appendix_b
 

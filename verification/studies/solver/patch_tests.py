@@ -15,7 +15,7 @@ from bh.mechanics.consistent.system import ConsistentSystem
 from bh.model.ramp import Ramp
 from bh.solvers.linear import linear_response
 from meshes import SheetMesh
-from meshes.structured import Kind
+from meshes.cells import Kind
 
 Array = NDArray[np.float64]
 EDGES = ("inner", "outer", "start", "end")

@@ -15,7 +15,7 @@ from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
 from bh.solvers.linear import linear_response
 from meshes import SheetMesh
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.studies.ch3 import strips
 from verification.theory import strips as strip_theory
 

@@ -6,12 +6,10 @@ has ended, so that a run that was stopped goes on where it was.
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
-from pathlib import Path as FilePath
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,13 +17,13 @@ import numpy as np
 import meshes
 from bh import Path, trace
 from bh.solvers.outcome import Outcome
-from meshes.structured import Kind
+from meshes.cells import Kind
 from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
-from verification.framework.environment import environment
 from verification.framework.measuring import REPEATS, measure
 from verification.framework.pareto import Trial, cheapest, front, rate
 from verification.framework.richardson import fitted
+from verification.framework.store import Store
 from verification.studies.solver.speed_problems import PROBLEMS, Problem, curve
 
 CASE = "speed_error"
@@ -90,33 +88,6 @@ class Truth(NamedTuple):
     stiffness: tuple[float, float, float]
     curves: dict[int, list[list[float]]]
     bar: float
-
-
-@dataclass
-class Store:
-    """Runs by scene, member and level, on disk as they are found."""
-
-    file: FilePath
-    runs: dict[str, Any] = field(default_factory=dict)
-
-    @classmethod
-    def open(cls, folder: FilePath, quick: bool) -> Store:
-        """The store in a folder; empty where what is there was made by other versions."""
-        file = folder / RUNS
-        made_by = {"versions": environment(), "quick": quick}
-        try:
-            found = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            found = {}
-        same = isinstance(found, dict) and found.get("made_by") == made_by
-        return cls(file, found if same else {"made_by": made_by})
-
-    def keep(self, key: str, value: Any) -> None:
-        """Add one run (JSON data) and write the file anew."""
-        self.runs[key] = value
-        draft = self.file.with_suffix(".part")
-        draft.write_text(json.dumps(self.runs), encoding="utf-8")
-        draft.replace(self.file)
 
 
 def solve(problem: Problem, member: Member, level: float, *, timed: bool, quick: bool) -> tuple[Run, Path]:
@@ -201,7 +172,7 @@ def run(context: Context) -> CaseResult:
     )
     members = [m if not context.quick else Member(**{**asdict(m), "levels": m.levels[:4]}) for m in MEMBERS]
     problems = PROBLEMS[:2] if context.quick else PROBLEMS
-    store = Store.open(context.folder, context.quick)
+    store = Store.open(context.folder, RUNS, context.quick)
     lost: list[str] = []
     for problem in problems:
         truth = _truth(context, store, problem)
