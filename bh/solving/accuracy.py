@@ -135,9 +135,13 @@ class _Task:
             stage(self.report, f"{name}, {cells}")
             file = None if self.levels is None else self.levels.file(name, cells)
             return follow(
-                with_mesh(self.model, mesh, name), progress=self.report, strategy=self.strategy,
-                symmetry=self.symmetry, file=file, resume=file is not None and file.exists(),
-            )  # fmt: skip
+                with_mesh(self.model, mesh, name),
+                progress=self.report,
+                strategy=self.strategy,
+                symmetry=self.symmetry,
+                file=file,
+                resume=file is not None and file.exists(),
+            )
 
         path, cells = ladder.solve(step, on_mesh)
         value = reading(path, self.goal) if path.reached else np.array([math.nan])
@@ -145,9 +149,17 @@ class _Task:
             time.perf_counter() - clock, path.wall_time_s
         )  # what was found solved has cost its time before
         return path, Trial(
-            name, level, str(cells), len(path.model.mesh.triangles), path.unknowns, path.iterations, spent,
-            path.outcome, value, snapped(path),
-        )  # fmt: skip
+            name,
+            level,
+            str(cells),
+            len(path.model.mesh.triangles),
+            path.unknowns,
+            path.iterations,
+            spent,
+            path.outcome,
+            value,
+            snapped(path),
+        )
 
 
 def _chosen(goal: Goal, found: Sequence[_Found], trials: list[Trial], notes: list[str], spent: float) -> Path:
@@ -157,9 +169,16 @@ def _chosen(goal: Goal, found: Sequence[_Found], trials: list[Trial], notes: lis
         best = found[-1]
     path, met = best.path, best.error <= goal.within
     path.accuracy = Accuracy(
-        goal, best.error, met, best.order, best.formulation, _words(path, best.mesh), tuple(trials), spent,
+        goal,
+        best.error,
+        met,
+        best.order,
+        best.formulation,
+        _words(path, best.mesh),
+        tuple(trials),
+        spent,
         notes=tuple(notes if not met else [note for note in notes if not note.startswith("ended")]),
-    )  # fmt: skip
+    )
     return path
 
 

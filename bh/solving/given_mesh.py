@@ -52,8 +52,10 @@ def add_estimate(
     try:
         other = follow(
             with_mesh(path.model, cut(pattern_of(path.model), coarse), path.model.formulation),
-            progress=report, strategy=strategy, symmetry=symmetry,
-        )  # fmt: skip
+            progress=report,
+            strategy=strategy,
+            symmetry=symmetry,
+        )
     except InputError as error:
         path.estimate_reason = (
             f"a coarser mesh to compare with could not be solved ({str(error).split(';')[0]})"
@@ -104,13 +106,28 @@ def _compared(coarse: Path, coarse_cells: Cells, path: Path, cells: Cells, spent
     error = TWO_MESHES * float(np.linalg.norm(trials[1].value - trials[0].value)) / (2.0 ** ORDERS[1] - 1.0)
     words = f"{trials[1].triangles} triangles ({cells})"
     return Accuracy(
-        ENERGY, error / size if size > 0.0 else 0.0, True, math.nan, path.model.formulation, words, trials, spent,
+        ENERGY,
+        error / size if size > 0.0 else 0.0,
+        True,
+        math.nan,
+        path.model.formulation,
+        words,
+        trials,
+        spent,
         asked=False,
-    )  # fmt: skip
+    )
 
 
 def _trial(path: Path, cells: Cells) -> Trial:
     return Trial(
-        path.model.formulation, math.nan, str(cells), len(path.model.mesh.triangles), path.unknowns, path.iterations,
-        path.wall_time_s, path.outcome, reading(path, ENERGY), snapped(path),
-    )  # fmt: skip
+        path.model.formulation,
+        math.nan,
+        str(cells),
+        len(path.model.mesh.triangles),
+        path.unknowns,
+        path.iterations,
+        path.wall_time_s,
+        path.outcome,
+        reading(path, ENERGY),
+        snapped(path),
+    )

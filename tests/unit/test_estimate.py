@@ -20,9 +20,10 @@ from bh.model.refinement import DEFAULT
 from bh.paths.estimate import Accuracy, Trial
 from bh.scene.example import example
 from bh.scene.load import parse_scene
+from bh.solvers.outcome import Outcome
 from bh.solving.accuracy import estimate, mark_doubtful, trusted
-from bh.solving.follow import trace
 from bh.solving.levels import folder_of
+from bh.solving.trace import trace
 
 SHEET = bh.Sheet(E=4000.0, nu=0.38, t=0.127)
 SECTOR = meshes.annulus_sector(100.0, 10.0, 0.4)
@@ -85,11 +86,18 @@ def test_no_estimate_is_made_unless_asked_for() -> None:
     [
         (lambda: model(rows=1), "one row of cells"),
         (lambda: model(formulation="bars-and-hinges"), "not known to converge"),
-        (lambda: replace(model(), mesh=meshes.SheetMesh(model().mesh.points, model().mesh.triangles,
-                                                        edge_sets=model().mesh.edge_sets)), "read from a file"),
+        (
+            lambda: replace(
+                model(),
+                mesh=meshes.SheetMesh(
+                    model().mesh.points, model().mesh.triangles, edge_sets=model().mesh.edge_sets
+                ),
+            ),
+            "read from a file",
+        ),
         (lambda: model(8, 2).support("node:0", "xyz").support("edge:end", "xyz"), "one mesh"),
     ],
-)  # fmt: skip
+)
 def test_why_there_is_none(changed, words: str) -> None:  # type: ignore[no-untyped-def]
     path = bh.trace(changed(), estimate=True)
     assert path.accuracy is None
@@ -125,7 +133,7 @@ def test_a_path_file_keeps_what_is_known_of_the_error(tmp_path: Path) -> None:
 # --- of an accuracy -----------------------------------------------------------------------------------------------
 
 
-def trial(value: float, snapped: bool = False, outcome: str = "reached") -> Trial:
+def trial(value: float, snapped: bool = False, outcome: Outcome = Outcome.REACHED) -> Trial:
     return Trial("consistent", 1.0, "cells", 10, 10, 1, 0.1, outcome, np.array([value]), snapped)
 
 

@@ -54,7 +54,8 @@ def test_there_are_the_examples_of_the_issue() -> None:
 
 @pytest.mark.parametrize("file", [f for f in SCENES if f.stem != "full_annulus"], ids=lambda file: file.stem)
 def test_examples_reach_their_end(file: Any) -> None:
-    path = bh.trace(load_scene(file).model)
+    loaded = load_scene(file)
+    path = bh.trace(loaded.model, accuracy=loaded.accuracy)
     assert path.outcome == "reached"
     assert path[-1].energy.total == pytest.approx(energy_in_readme(file), rel=1e-3)
 

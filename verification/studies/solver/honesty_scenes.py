@@ -36,8 +36,12 @@ def draw(seed: int, number: int) -> Draw:
     rng = np.random.default_rng([seed, number])
     kind = KINDS[number % len(KINDS)]
     makers: dict[str, Callable[[np.random.Generator], Draw]] = {
-        "narrow": narrow, "wide": wide, "ring": ring, "several": several, "network": network,
-    }  # fmt: skip
+        "narrow": narrow,
+        "wide": wide,
+        "ring": ring,
+        "several": several,
+        "network": network,
+    }
     return makers[kind](rng)
 
 
