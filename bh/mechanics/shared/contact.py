@@ -238,9 +238,9 @@ def _forces(x, triangles, owner, weights, share, centres, axes, shape, f, total)
 
 
 @njit(**OPTIONS)
-def _tangent(
+def _tangent(  # type: ignore[no-untyped-def]
     x, triangles, owner, weights, share, centres, axes, shape, home, spring, frame_of, frames, slots, data
-):  # type: ignore[no-untyped-def]
+):
     p, n, H = np.empty(3), np.empty(3), np.empty((3, 3))
     K = np.zeros((9, 9))
     for k in range(len(owner)):
