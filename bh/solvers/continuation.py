@@ -44,9 +44,9 @@ class _Trial:
 class LoadControl:
     """Adaptive increments of lambda with extrapolated starts.
 
-    It begins with large increments and cuts early: one that does not contract is given up after a few iterations, and
-    one that is accepted has the work of the actuation to show for its energy. The guess is the polynomial through the last
-    three states and their element forces.
+    It begins with large increments and cuts early: one that does not contract is given up after a few iterations,
+    and one that is accepted has the work of the actuation to show for its energy. The guess is the polynomial through
+    the last three states and their element forces.
 
     Attributes:
         first_rotation, largest_rotation: increments where angles are imposed, rad.

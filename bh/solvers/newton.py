@@ -1,4 +1,4 @@
-"""Newton's method for one value of lambda: full steps with independent forces, or globalised by a line search and shift.
+"""Newton's method for one value of lambda: full steps with independent forces, or globalised by a line search.
 
 Where both stop, a pseudo-transient motion to rest is the last resort (`bh.solvers.pseudo_transient`).
 """
@@ -47,7 +47,8 @@ class Newton:
     """Solve residual(q) = 0 at a fixed lambda.
 
     First full Newton: whole steps with the tangent of independent element forces, which takes the large rotations of
-    thin sheets in a few iterations though the energy rises on the way. If that does not converge, once more from the start
+    thin sheets in a few iterations though the energy rises on the way. If that does not converge, once more from the
+    start
     and globalised: the exact Hessian, shifted until it is positive definite, and a line search on the energy, which
     can only go downhill.
 
