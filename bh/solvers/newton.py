@@ -48,8 +48,8 @@ class Newton:
 
     First full Newton: whole steps with the tangent of independent element forces, which takes the large rotations of
     thin sheets in a few iterations though the energy rises on the way. If that does not converge, once more from the
-    start and globalised: the exact Hessian, shifted until it is positive definite, and a line search on the energy, which
-    can only go downhill.
+    start and globalised: the exact Hessian, shifted until it is positive definite, and a line search on the energy,
+    which can only go downhill.
 
     Attributes:
         tolerance: on `Evaluation.imbalance`.
