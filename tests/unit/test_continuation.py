@@ -289,7 +289,7 @@ def test_a_right_angle_takes_one_increment(formulation: str, along: int, rows: i
 def ended(system: Small, q: Array) -> list[Increment]:
     """What `Automatic` makes of an arc that ends in an unstable state at lambda = 1."""
     end = replace(point(system, q, 1.0, ARC), negative=1)
-    arc = iter([Increment(end, "reached", 3, 0.0, 0.1)])
+    arc = iter([Increment(end, Outcome.REACHED, 3, 0.0, 0.1)])
     passing = Automatic()._pass(arc, [], LoadControl(newton=Newton(globalised=20)), system)
     found = []
     while True:
