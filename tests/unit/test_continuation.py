@@ -16,6 +16,7 @@ from bh import ArcLength, Automatic, DisplacementControl, LoadControl, Model, Ne
 from bh.solvers.arc_length import Displacement, Generalised
 from bh.solvers.automatic import behind_limit
 from bh.solvers.increments import ARC, DISPLACEMENT, LOAD, Increment, Point, fold_ahead, point
+from bh.solvers.outcome import Outcome
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
