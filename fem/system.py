@@ -86,7 +86,7 @@ class ShellSystem:
 
         Args:
             model: a sheet with supports and steps.
-            program: what the step imposes and loads.
+            load_step: what the step imposes and loads.
             start: the state that the step begins with; None is the flat sheet.
             elements: of the sheet.
             moments: couples on boundary edges.

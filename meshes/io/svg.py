@@ -170,7 +170,8 @@ def _clipped(stroke: Stroke, clips: tuple[Any, ...]) -> Iterator[Stroke]:
 
 
 def _always(points: Array) -> Callable[[float], Array]:
-    return lambda tolerance: points
+    """A sampler of a line that is a polyline already: any tolerance gives its own points."""
+    return lambda _: points
 
 
 def _hidden(shape: Any) -> bool:

@@ -141,6 +141,7 @@ class SmoothedStrain(Consistent):
     refinement = None
 
     def __init__(self, material: Material = LINEAR) -> None:
+        """The material (E, nu and t are the sheet's)."""
         super().__init__(smoothed_strain, material)
 
 
