@@ -32,11 +32,11 @@ t = 0.1
 along = 6
 """
 GOOD = SECTOR + '[[steps]]\nfold = { crease = "crease", to = 2.0 }\n'
-# the first step is a load, whose increments are short: several states
+# both steps are loads, whose increments are short: several states
 TWO_STEPS = (
     SECTOR
     + '[creases.crease]\nLstar = 25.0\n[[steps]]\nmoment = { crease = "crease", to = 0.01 }\n'
-    + '[[steps]]\nfold = { crease = "crease", rest = 2.5 }\n'
+    + '[[steps]]\nmoment = { crease = "crease", to = 0.03 }\n'
 )
 # a dead couple that ten turns of the soft crease could not balance; nothing stops it from closing
 EARLY = (
