@@ -32,6 +32,8 @@ t = 0.127
 [mesh]
 along = 12
 [[steps]]
+fold = { crease = "all", by = 0.3, Lstar = 25.0 }
+[[steps]]
 fold = { crease = "all", by = 0.6, Lstar = 25.0 }
 [outputs]
 folded = ["glb", "stl"]
@@ -116,11 +118,11 @@ def test_the_command(
     names = {file.name for file in (tmp_path / "out").iterdir()}
     assert names == {"path.bh", "result.json", "folded.glb", "folded.stl", "flat.dxf", "flat.svg"}
     assert main(["export", "scene.toml", "flat.dxf", "--facets"]) == 0
-    assert main(["export", "out", "sheet.obj", "--state", "0"]) == 0
+    assert main(["export", "out", "sheet.obj", "--state", "1"]) == 0
     assert main(["export", "out/path.bh", "sheet.svg"]) == 0
     assert capsys.readouterr().out.count("wrote ") == 3
     height = np.ptp(meshio.read("sheet.obj").points[:, 2])
-    assert height == 0.0 < np.ptp(meshio.read("out/folded.stl").points[:, 2])
+    assert 0.0 < height < np.ptp(meshio.read("out/folded.stl").points[:, 2])
     assert main(["export", "out", "sheet.xyz"]) == 2
     assert main(["export", "out", "sheet.obj", "--state", "99"]) == 2
     assert main(["export", "none.bh", "sheet.obj"]) == 2

@@ -220,8 +220,7 @@ def _number_rotations(
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
 
     There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that
-    keeps its own; but one for a spring in the plane
-    of a symmetric sheet, and none for what lies outside of its half.
+    keeps its own; but one for a spring in the plane of a symmetric sheet, and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
     two_sided = spring.copy()
