@@ -113,7 +113,7 @@ def reference_pages() -> dict[str, tuple[str, ...]]:
     import bh
 
     found = {
-        "To use": (*PUBLIC, *sorted(bh._MODULES.values()), *USE),
+        "To use": (*PUBLIC, *sorted(bh._SUBMODULES.values()), *USE),
         "To extend": EXTENSION,
         "The shell": tuple(modules_of("fem")),
         "Geometry in detail": tuple(modules_of("meshes")),
@@ -154,7 +154,7 @@ def write_module(folder: Path, name: str, described: set[int]) -> bool:
     hidden = name in PUBLIC or (parent and inspect.isroutine(getattr(import_module(parent), last, None)))
     lines = [name, "=" * len(name), "", f".. py:module:: {name}", "   :no-index:" if hidden else "", ""]
     lines += [(inspect.getdoc(module) or "").split("\n\n")[0], ""]
-    lines += [f"In short ``bh.{short}``.\n" for short, real in bh._MODULES.items() if real == name]
+    lines += [f"In short ``bh.{short}``.\n" for short, real in bh._SUBMODULES.items() if real == name]
     for item in items:
         value = getattr(module, item)
         described.add(id(value))

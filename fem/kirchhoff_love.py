@@ -50,7 +50,7 @@ class Shell:
 
         Args:
             model: a flat sheet with its supports and steps.
-            program: what the step imposes and loads.
+            load_step: what the step imposes and loads.
             start: the state that the step begins with.
             moments: couples on boundary edges.
 

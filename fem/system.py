@@ -86,7 +86,7 @@ class ShellSystem:
 
         Args:
             model: a sheet with supports and steps.
-            program: what the step imposes and loads.
+            load_step: what the step imposes and loads.
             start: the state that the step begins with; None is the flat sheet.
             elements: of the sheet.
             moments: couples on boundary edges.
@@ -356,7 +356,7 @@ class ShellSystem:
             return f"an edge turned by {np.degrees(angle):.0f} degrees within the step; split the step in two"
         return ""
 
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+    def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Nothing: the shell knows no contact, and its sides may pass through each other."""
         del q, lam, q_new, lam_new  # the arguments of every system
         return ""

@@ -252,7 +252,7 @@ class ArcLength:
         q = here.q + change
         newton = replace(self.newton, unstable=True)
         forces = path.tangent.predicted_forces(here.forces, change)
-        solution = newton.solve_boldly(system, q, 1.0, forces)
+        solution = newton.solve_full(system, q, 1.0, forces)
         if not solution.converged:
             return _Arrival(None, None, solution.iterations, solution.reason)
         p = system.primal

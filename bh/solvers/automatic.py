@@ -14,7 +14,7 @@ from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import System
 
-NEVER = 10**6  # cuts before the careful way: arc length comes first
+NEVER = 10**6  # cuts before globalised Newton: arc length comes first
 FAR = 8  # states by arc length that rise steadily: there is no limit point
 
 
@@ -48,11 +48,11 @@ class Automatic:
         """See `LoadControl.follow`; increments by arc length say so in their note."""
         points = list(history)
         load = replace(self.load, at_bifurcation=self.at_bifurcation)
-        bold = replace(load, smallest=max(self.patience, load.smallest), foresee=True, brisk=NEVER)
+        hasty = replace(load, smallest=max(self.patience, load.smallest), foresee=True, brisk=NEVER)
         failure: Increment | None = None
         while True:
             if points[-1].mode != ARC:
-                failure = yield from self._run(bold.follow(system, points[-3:], increment), points)
+                failure = yield from self._run(hasty.follow(system, points[-3:], increment), points)
                 if failure is None:
                     return
                 if failure.outcome is Outcome.BIFURCATION and self.at_bifurcation == "stop":

@@ -44,22 +44,22 @@ class _Trial:
 class LoadControl:
     """Adaptive increments of lambda with extrapolated starts.
 
-    It begins boldly and cuts early: an increment that does not contract is given up after a few iterations, and one
-    that is accepted has the work of the actuation to show for its energy. The guess is the polynomial through the last
-    three states and their element forces.
+    It begins with large increments and cuts early: one that does not contract is given up after a few iterations,
+    and one that is accepted has the work of the actuation to show for its energy. The guess is the polynomial through
+    the last three states and their element forces.
 
     Attributes:
         first_rotation, largest_rotation: increments where angles are imposed, rad.
         first, largest: increments of lambda where no angle is.
         cautious_rotation: first increment behind a limit point, rad (`first` where no angle is imposed); a state
-            without history may take Newton's careful way from half of it down.
-        goal, bold_goal: iterations up to which increments grow, by a factor of 1.7 at most; where angles are imposed
+            without history may take globalised Newton from half of it down.
+        goal, full_goal: iterations up to which increments grow, by a factor of 1.7 at most; where angles are imposed
             they grow by 2. What ends a step by a snap or by buckling is a load or a displacement, seldom an angle.
         smallest: part of the step below which an increment gives up.
         work_mismatch: largest relative difference between the energy gained in an increment and the work of the
             actuation (trapezoidal rule, corrected by the slopes at the ends where that alone would object); a larger
             one means that the state jumped to another branch.
-        brisk: cuts of an increment before Newton's careful way is tried.
+        brisk: cuts of an increment before globalised Newton is tried.
         at_bifurcation: where the branch loses its stability, go on along the stable branch of lowest energy
             ("stable"), stay on the one that is not stable ("primary"), or end with the outcome "bifurcation" ("stop").
         foresee: hand over as soon as the last states point at a limit point in the next increment, instead of
@@ -72,7 +72,7 @@ class LoadControl:
     largest: float = 0.34
     cautious_rotation: float = math.radians(15.0)
     goal: int = 5
-    bold_goal: int = 8
+    full_goal: int = 8
     smallest: float = 1e-5
     work_mismatch: float = 0.2
     newton: Newton = field(default_factory=Newton)
@@ -163,11 +163,11 @@ class LoadControl:
     def _try(self, system: System, points: Sequence[Point], lam: float, brisk: bool) -> _Trial:
         """One solve at `lam`, from the branch's stable side if it is unstable there, and what is to be said against it.
 
-        A shorter increment is a cheaper remedy than the careful way, so that is left out where `brisk`.
+        A shorter increment is a cheaper remedy than globalised Newton, so that is left out where `brisk`.
         """
         here = points[-1]
         newton = replace(self.newton, unstable=self.at_bifurcation != "stable")
-        method = replace(newton, careful=0, hasty=True) if brisk else newton
+        method = replace(newton, globalised=0, hasty=True) if brisk else newton
         q, forces = extrapolate(points, lam)
         primary = found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
         iterations, note = found.iterations, ""
@@ -180,7 +180,7 @@ class LoadControl:
             iterations += found.iterations
             there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
             # the stable state may be far, but not on the other side of a closed hinge
-            objection = system.crossing(here.q, here.lam, there.q, lam) if note else found.reason
+            objection = system.penetration(here.q, here.lam, there.q, lam) if note else found.reason
         return _Trial(there, found, primary, objection, note, iterations)
 
     def _critical(
@@ -200,7 +200,7 @@ class LoadControl:
 
     def _next(self, taken: float, iterations: int, was_cut: bool, imposed: bool) -> float:
         """The next increment of lambda after one of size `taken`; one that was cut is not followed by a larger one."""
-        goal, most = (self.bold_goal, 2.0) if imposed else (self.goal, 1.7)
+        goal, most = (self.full_goal, 2.0) if imposed else (self.goal, 1.7)
         growth = min(1.0 if was_cut else most, max(0.5, math.sqrt(goal / max(iterations, 1))))
         # slow but successful increments must not shrink away
         return max(10.0 * self.smallest, growth * taken)

@@ -113,7 +113,7 @@ def point(
 
 
 def power_rate(system: System, here: Point) -> float:
-    """d power / d lambda along the path's own tangent, N mm; nan where the state is critical."""
+    """Rate d power / d lambda along the path's own tangent, N mm; nan where the state is critical."""
     try:
         factor, _ = system.tangent(here.q, here.lam, here.forces).matrix.factorise_any()
     except IndefiniteError:

@@ -1,4 +1,4 @@
-"""Newton's method for one value of lambda: bold with independent forces, careful with energy line search and shift.
+"""Newton's method for one value of lambda: full steps with independent forces, or globalised by a line search.
 
 Where both stop, a pseudo-transient motion to rest is the last resort (`bh.solvers.pseudo_transient`).
 """
@@ -34,7 +34,7 @@ class Solution:
     converged: bool
     reason: str = ""
     negative: int | None = None
-    careful: bool = False
+    globalised: bool = False
 
     @property
     def stable(self) -> bool | None:
@@ -46,24 +46,24 @@ class Solution:
 class Newton:
     """Solve residual(q) = 0 at a fixed lambda.
 
-    First boldly: full steps with the tangent of independent element forces, which takes the large rotations of thin
-    sheets in a few iterations though the energy rises on the way. If that does not converge, once more from the start
-    and carefully: the exact Hessian, shifted until it is positive definite, and a line search on the energy, which
-    can only go downhill.
+    First full Newton: whole steps with the tangent of independent element forces, which takes the large rotations of
+    thin sheets in a few iterations though the energy rises on the way. If that does not converge, once more from the
+    start and globalised: the exact Hessian, shifted until it is positive definite, and a line search on the energy,
+    which can only go downhill.
 
     Attributes:
         tolerance: on `Evaluation.imbalance`.
-        bold, careful: most iterations of either way.
-        bold_shift: largest shift of the bold way; a tangent that is more indefinite asks for the careful one.
+        full, globalised: most iterations of either way.
+        full_shift: largest shift of full Newton; a tangent that is more indefinite asks for the globalised way.
         transient: the last resort; None to do without.
-        hasty: give the bold way up where its steps contract too slowly; for increments that are cheaper cut than saved.
-        unstable: take indefinite tangents as they are and go boldly only, to stay on a branch that is not stable.
+        hasty: give full Newton up where its steps contract too slowly; for increments that are cheaper cut than saved.
+        unstable: take indefinite tangents as they are and take full steps only, to stay on a branch that is not stable.
     """
 
     tolerance: float = 1e-8
-    bold: int = 14
-    careful: int = 150
-    bold_shift: float = 1e-5
+    full: int = 14
+    globalised: int = 150
+    full_shift: float = 1e-5
     transient: PseudoTransient | None = field(default_factory=PseudoTransient)
     hasty: bool = False
     unstable: bool = False
@@ -78,41 +78,41 @@ class Newton:
     ) -> Solution:
         """Equilibrium at `lam` from the guess `q`; `forces` are the element forces that go with the guess.
 
-        `second_guess` makes another one, tried boldly before the careful way.
+        `second_guess` makes another one, tried by full Newton before the globalised way.
         """
-        first = self.solve_boldly(system, q, lam, forces)
+        first = self.solve_full(system, q, lam, forces)
         if not first.converged and second_guess is not None:
             spent = first.iterations
             other, other_forces = second_guess()
-            first = self.solve_boldly(system, other, lam, other_forces)
+            first = self.solve_full(system, other, lam, other_forces)
             first = replace(first, iterations=first.iterations + spent)
-        if first.converged or self.careful == 0 or self.unstable:
+        if first.converged or self.globalised == 0 or self.unstable:
             return first
-        second = self.solve_carefully(system, q, lam)
+        second = self.solve_globalised(system, q, lam)
         second = replace(second, iterations=first.iterations + second.iterations)
         if second.converged or self.transient is None:
             return second
         q, now, steps = self.transient.relax(system, second.q, lam, self.tolerance)
         if now.imbalance > self.tolerance:
             return replace(second, iterations=second.iterations + steps)
-        return self._finish(system, q, lam, now, second.iterations + steps, careful=True)
+        return self._finish(system, q, lam, now, second.iterations + steps, globalised=True)
 
-    def solve_boldly(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
+    def solve_full(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
         """Full steps with independent forces; gives up on an indefinite tangent or when it runs away."""
         now = system.evaluate(q, lam)
         forces = now.forces if forces is None else forces
         least, before = now.imbalance, np.inf
         sizes: list[float] = []  # of the steps taken
-        for iteration in range(self.bold):
+        for iteration in range(self.full):
             if now.imbalance <= self.tolerance:
-                return self._finish(system, q, lam, now, iteration, careful=False)
+                return self._finish(system, q, lam, now, iteration, globalised=False)
             tangent = system.tangent(q, lam, forces)
-            factor = self._bold_factor(tangent.matrix)
+            factor = self._full_factor(tangent.matrix)
             if factor is None:
                 return Solution(q, now, iteration, False, "indefinite tangent")
             dq = -factor.solve(now.residual)
             if self._exhausted(system, now, before, dq):
-                return self._finish(system, q, lam, now, iteration, careful=False)
+                return self._finish(system, q, lam, now, iteration, globalised=False)
             sizes.append(float(np.linalg.norm(dq[: system.primal])))
             if self.hasty and now.imbalance > NEAR_SADDLE and slow(sizes):
                 return Solution(q, now, iteration, False, "slow contraction")
@@ -123,32 +123,32 @@ class Newton:
                 return Solution(q, now, iteration + 1, False, "diverged")
             least = min(least, now.imbalance)
         if now.imbalance <= self.tolerance:
-            return self._finish(system, q, lam, now, self.bold, careful=False)
-        return Solution(q, now, self.bold, False, "iteration limit")
+            return self._finish(system, q, lam, now, self.full, globalised=False)
+        return Solution(q, now, self.full, False, "iteration limit")
 
-    def _bold_factor(self, matrix: Matrix) -> Factor | None:
+    def _full_factor(self, matrix: Matrix) -> Factor | None:
         if not self.unstable:
-            return factorise_shifted(matrix, 0.0, self.bold_shift)[0]
+            return factorise_shifted(matrix, 0.0, self.full_shift)[0]
         try:
             return matrix.factorise_any()[0]
         except IndefiniteError:
             return None
 
-    def solve_carefully(self, system: System, q: Array, lam: float) -> Solution:
+    def solve_globalised(self, system: System, q: Array, lam: float) -> Solution:
         """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns."""
         now = system.evaluate(q, lam)
         shift, before = 0.0, np.inf
-        for iteration in range(self.careful):
+        for iteration in range(self.globalised):
             if now.imbalance <= self.tolerance:
-                return self._finish(system, q, lam, now, iteration, careful=True)
+                return self._finish(system, q, lam, now, iteration, globalised=True)
             matrix = system.tangent(q, lam, now.forces).matrix
             factor, shift = factorise_shifted(matrix, shift, least=1e-11)
             if factor is None:
-                return Solution(q, now, iteration, False, "singular tangent", careful=True)
+                return Solution(q, now, iteration, False, "singular tangent", globalised=True)
             descent = factor.descend(now.residual)
             dq = descent.direction
             if self._exhausted(system, now, before, dq):
-                return self._finish(system, q, lam, now, iteration, careful=True)
+                return self._finish(system, q, lam, now, iteration, globalised=True)
             if shift > 1e-9 and now.imbalance < NEAR_SADDLE:
                 # nearly at rest where the tangent is indefinite: without a push it would take for ever to roll off
                 rolled = roll_off(system, q, lam, now, matrix)
@@ -160,15 +160,15 @@ class Newton:
             step = step or line_search(system, q, lam, now, descent)
             if step is None:
                 if shift > 1e3:
-                    return Solution(q, now, iteration, False, "no descent", careful=True)
+                    return Solution(q, now, iteration, False, "no descent", globalised=True)
                 shift = max(10.0 * shift, 1e-4)
                 continue
             before = now.imbalance
             q, now, length = step
             shift = 0.1 * shift if length > 0.5 else shift
         if now.imbalance <= self.tolerance:
-            return self._finish(system, q, lam, now, self.careful, careful=True)
-        return Solution(q, now, self.careful, False, "iteration limit", careful=True)
+            return self._finish(system, q, lam, now, self.globalised, globalised=True)
+        return Solution(q, now, self.globalised, False, "iteration limit", globalised=True)
 
     def _exhausted(self, system: System, now: Evaluation, before: float, dq: Array) -> bool:
         """Nearly balanced, getting no better, and what energy the step could still gain is rounding.
@@ -183,10 +183,10 @@ class Newton:
 
     @staticmethod
     def _finish(
-        system: System, q: Array, lam: float, now: Evaluation, iterations: int, careful: bool
+        system: System, q: Array, lam: float, now: Evaluation, iterations: int, globalised: bool
     ) -> Solution:
         negative = count_negative(system.tangent(q, lam, now.forces).matrix)
-        return Solution(q, now, iterations, True, "", negative, careful)
+        return Solution(q, now, iterations, True, "", negative, globalised)
 
 
 def slow(sizes: Sequence[float]) -> bool:

@@ -35,7 +35,7 @@ def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -
         same = abs(merits[0] - merits[1]) <= 1e-6 * abs(merits[0] - base)
         best: Solution | None = None
         for start in starts[:1] if same else starts:
-            found = newton.solve_carefully(system, start, lam)
+            found = newton.solve_globalised(system, start, lam)
             spent += found.iterations
             lower = found.evaluation.energy < saddle.evaluation.energy
             better = best is None or found.evaluation.energy < best.evaluation.energy

@@ -38,7 +38,7 @@ class Evaluation(NamedTuple):
 
     @property
     def merit(self) -> float:
-        """What a careful step must lower: the energy, with constraints the augmented Lagrangian; N mm."""
+        """What a globalised step must lower: the energy, with constraints the augmented Lagrangian; N mm."""
         return self.energy + self.penalty
 
 
@@ -127,7 +127,7 @@ class System(Protocol):
         """Why an increment from one state to the next is not to be trusted, or an empty string."""
         ...
 
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+    def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """What passed through itself between two states, which no increment may, or an empty string."""
         ...
 

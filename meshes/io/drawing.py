@@ -154,13 +154,7 @@ def read_graph(
             the file.
         PatternError: lines that cannot be healed, see `meshes.planar.heal`.
     """
-    for name, value in (("scale", scale), ("fit", fit), ("tolerance", tolerance), ("gap", gap)):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise FileFormatError(f"{name} = {value} cannot be; give a positive number")
-    if outline not in OUTLINES:
-        raise FileFormatError(f"outline = '{outline}' is not known; use {' or '.join(OUTLINES)}")
-    if scale is not None and fit is not None:
-        raise FileFormatError("scale and fit are both given; give one of them")
+    _check({"scale": scale, "fit": fit, "tolerance": tolerance, "gap": gap}, outline)
     found = _read(path)
     strokes, unit, remarks = found.strokes, found.unit, list(found.remarks)
     rules = Rules(lines)
@@ -204,6 +198,17 @@ def read_graph(
         drawn.append(_hull(drawn))
         remarks.append("the outline is the convex hull of what is drawn")
     return heal(drawn, gap), drawn, [*remarks, *rules.remarks, *joined]
+
+
+def _check(lengths: Mapping[str, float | None], outline: str) -> None:
+    """Refuse options that cannot be."""
+    for name, value in lengths.items():
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise FileFormatError(f"{name} = {value} cannot be; give a positive number")
+    if outline not in OUTLINES:
+        raise FileFormatError(f"outline = '{outline}' is not known; use {' or '.join(OUTLINES)}")
+    if lengths["scale"] is not None and lengths["fit"] is not None:
+        raise FileFormatError("scale and fit are both given; give one of them")
 
 
 def _hull(lines: list[DrawnLine]) -> DrawnLine:

@@ -36,7 +36,7 @@ def drawing_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
         FileFormatError: it cannot be read, is no plain file, is too large, or is something else by its first bytes.
     """
     try:
-        found = os.stat(path)
+        found = Path(path).stat()
         if stat.S_ISDIR(found.st_mode):
             raise FileFormatError(f"this is a folder; name a .{kind.lower()} file in it")
         if not stat.S_ISREG(found.st_mode):  # a pipe would be waited for

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from xml.etree import ElementTree
 
 import numpy as np
 
-from meshes.curves import Array
 from meshes.errors import FileFormatError
 from meshes.io.files import drawing_bytes
-from meshes.io.strokes import Colour, Stroke, Strokes
+from meshes.io.strokes import Colour, Stroke, Strokes, always
 
 COLOURS: dict[int, Colour | None] = {
     0: (255, 255, 255),  # auxiliary
@@ -84,10 +83,6 @@ def _value(void: ElementTree.Element) -> float:
         ) from error
 
 
-def _always(points: Array) -> Callable[[float], Array]:
-    return lambda tolerance: points
-
-
 def _strokes(rows: Iterator[Row]) -> Strokes:
     strokes = []
     for number, (kind, a, b, c, d) in enumerate(rows, start=1):
@@ -98,7 +93,7 @@ def _strokes(rows: Iterator[Row]) -> Strokes:
         points = np.array([[a, -b], [c, -d]])
         if np.array_equal(points[0], points[1]):
             continue
-        strokes.append(Stroke(_always(points), f"line {number}", COLOURS[kind]))
+        strokes.append(Stroke(always(points), f"line {number}", COLOURS[kind]))
     if not strokes:
         raise FileFormatError("there is no line in the file; draw the creases first")
     return Strokes(strokes, 1.0, stated=False)

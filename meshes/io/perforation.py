@@ -10,12 +10,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from meshes.curves import Array, arc_lengths
 from meshes.planar import DrawnLine
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from shapely import STRtree
 
 LEAST = 4  # dashes of a crease
 STRAIGHT = 0.95  # cosine between a dash and the gap after it
@@ -43,20 +47,23 @@ def join_dashes(lines: Sequence[DrawnLine], near: float) -> tuple[list[DrawnLine
     Returns:
         the lines with the dashes of a crease as one, and one remark where there were any.
     """
+    import shapely
+
     out = list(lines)
     gone: set[int] = set()
     dashes = creases = 0
+    tree = shapely.STRtree([shapely.LineString(line.points) for line in lines])
     for kind in KINDS:
         numbers = [k for k, line in enumerate(lines) if line.kind == kind and not _closed(line)]
         if len(numbers) < LEAST:
             continue
-        for chain in _chains([lines[k] for k in numbers], lines, near):
+        ends = _ends([lines[k] for k in numbers])
+        for chain in _chains(ends, _meeting(ends, numbers, tree, near), near):
             rows = [numbers[index] for index, _ in chain]
             parts = [lines[row].points[:: 1 if on else -1] for row, (_, on) in zip(rows, chain, strict=True)]
             gap = max(float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(parts))
-            others = [line for k, line in enumerate(lines) if k not in set(rows)]
-            points = _lengthened(np.vstack(parts), 1.5 * gap, others)
-            points = _lengthened(points[::-1], 1.5 * gap, others)[::-1]
+            points = _lengthened(np.vstack(parts), 1.5 * gap, tree, rows)
+            points = _lengthened(points[::-1], 1.5 * gap, tree, rows)[::-1]
             first = lines[rows[0]]
             out[rows[0]] = replace(first, points=points, name=f"{first.name} and the dashes after it")
             gone.update(rows[1:])
@@ -70,18 +77,17 @@ def join_dashes(lines: Sequence[DrawnLine], near: float) -> tuple[list[DrawnLine
     )
 
 
-def _lengthened(points: Array, by: float, others: Sequence[DrawnLine]) -> Array:
-    """Points (k, 2) with the place where the line, made longer by up to `by`, meets the first other line."""
+def _lengthened(points: Array, by: float, tree: STRtree, own: Sequence[int]) -> Array:
+    """Points (k, 2) with the place where the line, made longer by up to `by`, meets the first that is not its `own`."""
     import shapely
 
     last = points[-1]
     ahead = last - points[-2]
     tip = last + by * ahead / max(float(np.linalg.norm(ahead)), 1e-300)
     ray = shapely.LineString([last, tip])
-    met = [ray.intersection(shapely.LineString(line.points)) for line in others]
-    spots = [
-        np.asarray(place.coords)[0] for each in met for place in shapely.get_parts(each) if not place.is_empty
-    ]
+    others = np.setdiff1d(tree.query(ray, predicate="intersects"), own)
+    met = shapely.get_parts(ray.intersection(tree.geometries[others]))
+    spots = [np.asarray(place.coords)[0] for place in met if not place.is_empty]
     if not spots:
         return points
     return np.vstack((points, min(spots, key=lambda spot: float(np.linalg.norm(spot - last)))))
@@ -91,15 +97,12 @@ def _closed(line: DrawnLine) -> bool:
     return bool(np.array_equal(line.points[0], line.points[-1]))
 
 
-def _chains(
-    dashes: Sequence[DrawnLine], lines: Sequence[DrawnLine], near: float
-) -> list[list[tuple[int, bool]]]:
+def _chains(ends: _Ends, meeting: Ints, near: float) -> list[list[tuple[int, bool]]]:
     """Rows of dashes in order, each with whether it is passed from its first point to its last."""
-    ends = _ends(dashes)
-    link = _links(ends, _meeting(ends, dashes, lines, near), near)
+    link = _links(ends, meeting, near)
     found = []
     seen: set[int] = set()
-    for start in range(len(dashes)):
+    for start in range(len(link) // 2):
         if start in seen:
             continue
         # walk backwards to the beginning of the row (or round it), then forwards
@@ -128,22 +131,19 @@ def _ends(dashes: Sequence[DrawnLine]) -> _Ends:
     points, out, lengths = [], [], []
     for dash in dashes:
         p = dash.points
+        lengths += 2 * [float(arc_lengths(p)[-1])]
         for end, inner in ((p[0], p[1]), (p[-1], p[-2])):
             points.append(end)
             out.append((end - inner) / max(float(np.linalg.norm(end - inner)), 1e-300))
-            lengths.append(float(arc_lengths(p)[-1]))
     return _Ends(np.array(points), np.array(out), np.array(lengths))
 
 
-def _meeting(ends: _Ends, dashes: Sequence[DrawnLine], lines: Sequence[DrawnLine], near: float) -> Ints:
-    """Numbers of the ends that lie on another line: no gap begins there."""
+def _meeting(ends: _Ends, numbers: Sequence[int], tree: STRtree, near: float) -> Ints:
+    """Numbers of the ends that lie on another line than their own, `numbers` (n,): no gap begins there."""
     import shapely
 
-    tree = shapely.STRtree([shapely.LineString(line.points) for line in lines])
-    own = {id(dash): k for k, dash in enumerate(lines)}
     at, on = tree.query(shapely.points(ends.points), predicate="dwithin", distance=near)
-    mine = np.array([own[id(dash)] for dash in dashes])[at // 2]
-    return np.unique(at[on != mine])
+    return np.unique(at[on != np.asarray(numbers)[at // 2]])
 
 
 def _links(ends: _Ends, meeting: Ints, near: float) -> Ints:

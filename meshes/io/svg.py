@@ -6,7 +6,7 @@ import contextlib
 import io
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import ParseError
@@ -16,7 +16,7 @@ import numpy as np
 from meshes.curves import Array
 from meshes.errors import FileFormatError
 from meshes.io.files import drawing_bytes
-from meshes.io.strokes import Colour, Dash, Stroke, Strokes, dash_kind
+from meshes.io.strokes import Colour, Dash, Stroke, Strokes, always, dash_kind
 from meshes.io.svg_tree import CLIP, CLIP_SHAPE, svg_tree
 
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
@@ -166,11 +166,7 @@ def _clipped(stroke: Stroke, clips: tuple[Any, ...]) -> Iterator[Stroke]:
         if piece.geom_type == "LineString" and piece.length > 0.0:
             points = np.asarray(piece.coords)
             name = stroke.name + (f", clipped part {number + 1}" if number else ", clipped")
-            yield replace(stroke, sample=_always(points), name=name)
-
-
-def _always(points: Array) -> Callable[[float], Array]:
-    return lambda tolerance: points
+            yield replace(stroke, sample=always(points), name=name)
 
 
 def _hidden(shape: Any) -> bool:

@@ -266,9 +266,9 @@ def test_held_creases_and_open_hinges_have_no_lock() -> None:
 
 def test_passing_through_is_seen() -> None:
     (system, q), (_, other) = nearly_closed(0.3, held=False), nearly_closed(2.0 * math.pi - 0.3, held=False)
-    assert "crease 'crease'" in system.crossing(q, 0.4, other, 0.4)
+    assert "crease 'crease'" in system.penetration(q, 0.4, other, 0.4)
     assert "would pass through" in system.objection(q, 0.4, other, 0.4)
-    assert system.crossing(q, 0.4, q, 0.4) == ""
+    assert system.penetration(q, 0.4, q, 0.4) == ""
 
 
 def test_spring_presses_shut() -> None:

@@ -32,7 +32,12 @@ t = 0.1
 along = 6
 """
 GOOD = SECTOR + '[[steps]]\nfold = { crease = "crease", to = 2.0 }\n'
-TWO_STEPS = GOOD + '[[steps]]\nfold = { crease = "crease", to = 1.0 }\n'
+# both steps are loads, whose increments are short: several states
+TWO_STEPS = (
+    SECTOR
+    + '[creases.crease]\nLstar = 25.0\n[[steps]]\nmoment = { crease = "crease", to = 0.01 }\n'
+    + '[[steps]]\nmoment = { crease = "crease", to = 0.03 }\n'
+)
 # a dead couple that ten turns of the soft crease could not balance; nothing stops it from closing
 EARLY = (
     SECTOR

@@ -16,6 +16,7 @@ from bh import ArcLength, Automatic, DisplacementControl, LoadControl, Model, Ne
 from bh.solvers.arc_length import Displacement, Generalised
 from bh.solvers.automatic import behind_limit
 from bh.solvers.increments import ARC, DISPLACEMENT, LOAD, Increment, Point, fold_ahead, point
+from bh.solvers.outcome import Outcome
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
@@ -151,7 +152,7 @@ def test_automatic_passes_the_limit_point_and_goes_back(load: float) -> None:
 
 
 def test_load_control_alone_names_the_limit_point() -> None:
-    found = follow(Arch(0.5), LoadControl(newton=Newton(careful=0)), np.array([-1.0]))
+    found = follow(Arch(0.5), LoadControl(newton=Newton(globalised=0)), np.array([-1.0]))
     assert found[-1].outcome == "limit-point"
     assert found[-1].point.lam * 0.5 == pytest.approx(ARCH_LIMIT, rel=1e-3)
     assert found[-1].point.lam * 0.5 < ARCH_LIMIT
@@ -209,9 +210,9 @@ def test_pseudo_transient_comes_to_rest(start: tuple[float, float]) -> None:
 
 
 def test_newton_falls_back_on_it() -> None:
-    stuck = Newton(bold=1, careful=1, transient=None).solve(Stiffening(), np.array([0.0]), 1.0)
+    stuck = Newton(full=1, globalised=1, transient=None).solve(Stiffening(), np.array([0.0]), 1.0)
     assert not stuck.converged
-    found = Newton(bold=1, careful=1).solve(Stiffening(), np.array([0.0]), 1.0)
+    found = Newton(full=1, globalised=1).solve(Stiffening(), np.array([0.0]), 1.0)
     assert found.converged
     assert found.q[0] == pytest.approx(2.0, rel=1e-9)
     assert found.iterations > stuck.iterations
@@ -280,17 +281,17 @@ def test_a_right_angle_takes_one_increment(formulation: str, along: int, rows: i
     model = sheet_model("a", along, rows, formulation=formulation, kind="staggered")
     model = model.fold("crease", to=0.5 * math.pi)
     small = LoadControl(first_rotation=math.radians(15.0), largest_rotation=math.radians(27.0))
-    bold, timid = trace(model), trace(model, strategy=Automatic(load=small))
-    assert bold.iterations <= 6
+    large, timid = trace(model), trace(model, strategy=Automatic(load=small))
+    assert large.iterations <= 6
     assert timid.iterations > 12
-    assert bold[-1].energy.total == pytest.approx(timid[-1].energy.total, rel=1e-9)
+    assert large[-1].energy.total == pytest.approx(timid[-1].energy.total, rel=1e-9)
 
 
 def ended(system: Small, q: Array) -> list[Increment]:
     """What `Automatic` makes of an arc that ends in an unstable state at lambda = 1."""
     end = replace(point(system, q, 1.0, ARC), negative=1)
-    arc = iter([Increment(end, "reached", 3, 0.0, 0.1)])
-    passing = Automatic()._pass(arc, [], LoadControl(newton=Newton(careful=20)), system)
+    arc = iter([Increment(end, Outcome.REACHED, 3, 0.0, 0.1)])
+    passing = Automatic()._pass(arc, [], LoadControl(newton=Newton(globalised=20)), system)
     found = []
     while True:
         try:

@@ -98,7 +98,7 @@ def test_reference_has_every_public_name_of_bh(reference: dict[str, str]) -> Non
         assert f":: bh.{name}\n" in reference["bh"]
 
 
-@pytest.mark.parametrize("short", sorted(bh._MODULES))
+@pytest.mark.parametrize("short", sorted(bh._SUBMODULES))
 def test_reference_has_every_public_module_of_bh(reference: dict[str, str], short: str) -> None:
     module = getattr(bh, short)
     page = reference[module.__name__]

@@ -32,6 +32,8 @@ t = 0.127
 [mesh]
 along = 12
 [[steps]]
+fold = { crease = "all", by = 0.3, Lstar = 25.0 }
+[[steps]]
 fold = { crease = "all", by = 0.6, Lstar = 25.0 }
 [outputs]
 folded = ["glb", "stl"]

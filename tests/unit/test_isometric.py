@@ -347,12 +347,13 @@ def test_straight_inflected_and_flat_creases_are_finite() -> None:
 
 @pytest.mark.parametrize("formulation", ["bars-and-hinges", "consistent"])
 def test_the_isometric_sheet_is_a_good_first_guess(formulation: str) -> None:
-    """Fewer iterations from it than folding from flat takes, to the same state."""
+    """Fewer iterations from it than folding from flat in increments of 15 to 27 degrees takes, to the same state."""
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.785), along=16, rows=2)
     model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), formulation=formulation).fold(
         "crease", to=math.pi / 2
     )
-    path = bh.trace(model)
+    steady = bh.LoadControl(first_rotation=math.radians(15.0), largest_rotation=math.radians(27.0))
+    path = bh.trace(model, strategy=steady)
     guess = of_mesh(mesh, "crease", math.pi / 2).place(mesh.points)
     found = relax(model, guess)
     assert found.converged

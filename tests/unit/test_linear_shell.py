@@ -12,7 +12,6 @@ import pytest
 import bh
 import meshes
 from bh.errors import InputError
-from bh.mechanics.consistent.formulation import ConstantStrain
 from bh.model.model import Model
 from bh.model.sheet import Sheet
 from fem.state import ShellState
@@ -22,7 +21,7 @@ PATTERN = meshes.annulus_sector(100.0, 10.0, math.pi / 4)
 GMSH = meshes.unstructured(PATTERN, size=6.0)
 
 
-CONSTANT = f"{ConstantStrain.__module__}:ConstantStrain"
+CONSTANT = "consistent"
 
 
 def model(formulation: str, kind: str) -> Model:

@@ -135,45 +135,45 @@ def test_linear_system_takes_one_iteration() -> None:
     assert found.q == pytest.approx(np.linalg.solve(system.K, 0.7 * system.load), rel=1e-14)
 
 
-@pytest.mark.parametrize("bold", [14, 0])
-def test_stiffening_spring(bold: int) -> None:
+@pytest.mark.parametrize("full", [14, 0])
+def test_stiffening_spring(full: int) -> None:
     """Both ways find the root of q + q^3 = 10, and count their iterations."""
-    found = Newton(bold=bold).solve(Stiffening(), np.array([0.0]), 1.0)
+    found = Newton(full=full).solve(Stiffening(), np.array([0.0]), 1.0)
     assert found.converged
-    assert found.careful is (bold == 0)
+    assert found.globalised is (full == 0)
     assert found.q[0] == pytest.approx(2.0, rel=1e-9)
     assert 3 < found.iterations < 14
 
 
 def test_quadratic_convergence() -> None:
     """The number of right digits doubles: from 1 % to rounding in three iterations."""
-    near = Newton(bold=3, careful=0, tolerance=1e-13).solve(Stiffening(), np.array([2.02]), 1.0)
+    near = Newton(full=3, globalised=0, tolerance=1e-13).solve(Stiffening(), np.array([2.02]), 1.0)
     assert near.converged
     assert near.q[0] == pytest.approx(2.0, rel=1e-13)
 
 
 def test_what_does_not_converge_says_so() -> None:
-    found = Newton(bold=1, careful=0).solve(Stiffening(), np.array([0.0]), 1.0)
+    found = Newton(full=1, globalised=0).solve(Stiffening(), np.array([0.0]), 1.0)
     assert not found.converged
     assert found.reason == "iteration limit"
     assert found.stable is None
-    found = Newton(bold=1, careful=2, transient=None).solve(Stiffening(), np.array([0.0]), 1.0)
+    found = Newton(full=1, globalised=2, transient=None).solve(Stiffening(), np.array([0.0]), 1.0)
     assert not found.converged
     assert found.iterations == 3
 
 
 def test_bold_way_refuses_an_indefinite_tangent() -> None:
-    found = Newton(careful=0).solve(Arch(0.1), np.array([0.1]), 1.0)
+    found = Newton(globalised=0).solve(Arch(0.1), np.array([0.1]), 1.0)
     assert not found.converged
     assert found.reason == "indefinite tangent"
     assert found.iterations == 0
 
 
 @pytest.mark.parametrize("start", [-0.3, -0.01, 0.2])
-def test_careful_way_goes_downhill_from_where_the_tangent_is_indefinite(start: float) -> None:
+def test_globalised_way_goes_downhill_from_where_the_tangent_is_indefinite(start: float) -> None:
     system = Arch(0.1)
     before = system.evaluate(np.array([start]), 1.0).energy
-    found = Newton(bold=0).solve(system, np.array([start]), 1.0)
+    found = Newton(full=0).solve(system, np.array([start]), 1.0)
     assert found.converged
     assert found.stable is True
     assert found.evaluation.energy < before
@@ -195,7 +195,7 @@ def test_energies_that_are_not_finite_are_no_solution() -> None:
                 return math.nan, np.full(1, math.nan), np.eye(1)
             return super().internal(q)
 
-    found = Newton(careful=30).solve(Poisoned(), np.array([0.0]), 1.0)
+    found = Newton(globalised=30).solve(Poisoned(), np.array([0.0]), 1.0)
     assert not found.converged
     assert found.reason
 
@@ -293,7 +293,7 @@ def test_a_saddle_without_a_way_out_is_kept() -> None:
 
     system = Hill(1, [0.0])
     saddle = Solution(np.zeros(1), system.evaluate(np.zeros(1), 0.0), 0, True, negative=1)
-    found, note = leave_saddle(system, saddle, 0.0, Newton(careful=20))
+    found, note = leave_saddle(system, saddle, 0.0, Newton(globalised=20))
     assert note == ""
     assert "no stable state" in found.reason
     assert found.q == pytest.approx([0.0])
@@ -434,7 +434,8 @@ def test_a_hasty_newton_gives_up_early() -> None:
             return float((size**1.55).sum()), 1.55 * np.sign(q) * size**0.55, np.diag(0.8525 * size**-0.45)
 
     patient, hasty = (
-        Newton(careful=0, hasty=haste).solve(Sharp(1, [0.0]), np.array([1.0]), 1.0) for haste in (False, True)
+        Newton(globalised=0, hasty=haste).solve(Sharp(1, [0.0]), np.array([1.0]), 1.0)
+        for haste in (False, True)
     )
     assert not patient.converged
     assert not hasty.converged
@@ -463,8 +464,8 @@ def test_a_long_increment_is_told_from_a_jump_by_the_slopes_of_the_work() -> Non
 
 
 def test_other_newton() -> None:
-    strategy = LoadControl(goal=3, newton=Newton(bold=2))
-    assert strategy.newton.bold == 2
+    strategy = LoadControl(goal=3, newton=Newton(full=2))
+    assert strategy.newton.full == 2
     assert strategy.goal == 3
 
 

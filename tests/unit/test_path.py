@@ -271,7 +271,7 @@ def test_progress_is_told_of_failure_and_of_errors() -> None:
     path = trace(
         MODELS["held"],
         progress=meter,
-        strategy=LoadControl(smallest=0.3, newton=Newton(bold=1, careful=0, transient=None)),
+        strategy=LoadControl(smallest=0.3, newton=Newton(full=1, globalised=0, transient=None)),
     )
     assert meter.closed == [path.outcome] == ["stalled"]
 
@@ -299,7 +299,8 @@ def test_silence(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_path_that_cannot_go_on_says_so() -> None:
     path = trace(
-        MODELS["held"], strategy=LoadControl(smallest=0.3, newton=Newton(bold=1, careful=0, transient=None))
+        MODELS["held"],
+        strategy=LoadControl(smallest=0.3, newton=Newton(full=1, globalised=0, transient=None)),
     )
     assert path.outcome == "stalled"
     assert path.reason
@@ -331,7 +332,7 @@ def test_failure_in_the_middle_keeps_what_was_reached() -> None:
 
 
 def test_a_failed_step_is_the_end() -> None:
-    impatient = LoadControl(smallest=0.5, newton=Newton(bold=1, careful=0, transient=None))
+    impatient = LoadControl(smallest=0.5, newton=Newton(full=1, globalised=0, transient=None))
     path = trace(FREE.fold("crease", to=1.2).fold("crease", to=2.0), strategy=impatient)
     assert path.outcome == "stalled"
     assert len(path.steps) == 1
@@ -357,7 +358,7 @@ def test_angle_that_bars_forbid() -> None:
     """A hinge whose wings and end lie on a line that is held cannot turn: its crease is half as long there."""
     mesh = meshes.structured(meshes.annulus_sector((40.0, 50.0), 8.0, 0.6), along=5)
     model = Model(mesh, SHEET).support("edge:start", "xyz").support("corner:inner-end", "z")
-    strategy = LoadControl(smallest=0.02, newton=Newton(careful=30))
+    strategy = LoadControl(smallest=0.02, newton=Newton(globalised=30))
     path = trace(model.fold("crease-2", to=3.6), strategy=strategy)
     assert path.outcome != "reached"
     assert path.reason

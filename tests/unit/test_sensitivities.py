@@ -320,7 +320,8 @@ def test_bad_input() -> None:
     shell = bh.trace(replace(build(p), formulation="shell"))
     with pytest.raises(InputError, match="formulation 'shell' has no sensitivities"):
         of(shell, lambda q: replace(build(q), formulation="shell"), p, [Energy()])
-    stepped = bh.trace(build(p).fold("crease", to=1.5))
+    several = bh.LoadControl(largest_rotation=0.2, first_rotation=0.2)
+    stepped = bh.trace(build(p).fold("crease", to=1.5), strategy=several)
     middle = next(i for i, record in enumerate(stepped.records) if record.step == 1 and record.lam < 1.0)
     with pytest.raises(InputError, match="depends on the step before; take its end"):
         of(stepped, lambda q: build(q).fold("crease", to=1.5), p, [Energy()], index=middle)

@@ -393,7 +393,7 @@ def test_loads_that_lose_their_balance_do_not_end_as_reached() -> None:
     """Opposite forces on corners that are not each other's mirror image: folding turns their line."""
     a, b = MESH.corners["corner:inner-start"], MESH.corners["corner:outer-end"]
     pull = 0.1 * (MESH.points[b] - MESH.points[a]) / np.linalg.norm(MESH.points[b] - MESH.points[a])
-    strategy = bh.LoadControl(smallest=0.02, newton=bh.Newton(careful=20))
+    strategy = bh.LoadControl(smallest=0.02, newton=bh.Newton(globalised=20))
     path = trace(
         Model(MESH, SHEET).step(
             Fold("crease", to=2.0), Force([a], each=tuple(-pull)), Force([b], each=tuple(pull))

@@ -365,7 +365,7 @@ def bad_case(monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
     import types
 
-    module = types.ModuleType("verification.bad_for_tests")
+    module = types.ModuleType("verification.studies.solver.bad_for_tests")
     module.run = disagreeing  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setitem(registry.BY_NAME, "bad", registry.Study("bad_for_tests", "solver"))

@@ -32,6 +32,7 @@ class Bending:
     def __init__(
         self, patches: Patches, law: Law, maps: Array, area: Array, quad: Ints, ghost: Array, rotation: Ints
     ) -> None:
+        """The law of the curvatures that patches measure; arrays as in `ConsistentElements`."""
         self.patches, self.law, self.constant = patches, law, isinstance(law, Constant)
         self.quad, self.ghost, self.rotation = quad, ghost, rotation
         if self.constant:

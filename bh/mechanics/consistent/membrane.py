@@ -35,9 +35,9 @@ class Cells:
     Attributes:
         source: (c,) rows of the mesh's triangles (three bars) or hinges (five bars).
         nodes: (c, p) their nodes.
-        bars: (c, k) rows of `Membrane.bars`: of a triangle opposite its corners, of a hinge (wing, edge, edge, wing)
-            = 0..3
-            those between 1-2, 1-0, 2-0, 1-3, 2-3; `owned` those whose force this cell takes to the tangent.
+        bars: (c, k) rows of `Membrane.bars`: of a triangle opposite its corners, of a hinge with the nodes
+            (wing, edge, edge, wing) = 0..3 those between 1-2, 1-0, 2-0, 1-3, 2-3.
+        owned: (c, k) bars whose force this cell takes to the tangent.
         strain: (c, 3, k) map S from gamma (mm^2) to the strain (xx, yy, 2 xy).
         area: (c,) of the stress-free sheet, mm^2.
         share: (c,) part of it that lies in the first triangle of an edge; ones for triangles.

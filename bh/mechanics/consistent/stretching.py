@@ -22,6 +22,7 @@ class Stretching:
     """Energy of the membrane at positions x (n, 3), mm. Its element forces are N (b,), N / mm: d energy / d gamma."""
 
     def __init__(self, membrane: Membrane, law: Law) -> None:
+        """A membrane, and the law of the strains that it measures."""
         self.membrane, self.law = membrane, law
         self.constant = isinstance(law, Constant)
         self._at: Array | None = None

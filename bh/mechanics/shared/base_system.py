@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
-from bh.mechanics.shared import penetration as closing
+from bh.mechanics.shared import penetration as hinge_penetration
 from bh.mechanics.shared.contact import RigidContact
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
@@ -92,16 +92,16 @@ class SupportedSheet:
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Why an increment between two states is not to be trusted, or an empty string."""
         asked = np.where(self.load_step.law == SHEET, 0.0, self.rotation * abs(lam_new - lam))
-        return closing.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new), asked)
+        return hinge_penetration.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new), asked)
 
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+    def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Which panels passed through each other between two states, or an empty string."""
-        return closing.crossing(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
+        return hinge_penetration.penetration(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def contact(self, q: Array, lam: float) -> str:
         """Which panels have met at a hinge that is not prescribed, or an empty string."""
         reference = dihedral_angles(self.mesh.points, self.mesh.topology.hinges)
-        return closing.panels_in_contact(
+        return hinge_penetration.panels_in_contact(
             self.mesh, self.angles(q, lam), reference, self.load_step.law != PRESCRIBED
         )
 

@@ -85,7 +85,7 @@ def lock_force_rates(x, v, hinges, k, L, f):  # type: ignore[no-untyped-def]
             add_product(H, hinges[h], v, f)
 
 
-def crossing(mesh: SheetMesh, before: Array, after: Array) -> str:
+def penetration(mesh: SheetMesh, before: Array, after: Array) -> str:
     """Which panels passed through each other between dihedral angles (m,) of two states, or an empty string.
 
     Angles are known modulo a turn; a hinge passed 0 or 2 pi where the way through closed is the shorter one.
@@ -103,7 +103,7 @@ def objection(mesh: SheetMesh, before: Array, after: Array, asked: Array) -> str
     """
     turn = float((np.abs(after - before) - asked).max(initial=0.0))
     far = f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
-    return crossing(mesh, before, after) or far
+    return penetration(mesh, before, after) or far
 
 
 def panels_in_contact(mesh: SheetMesh, angles: Array, reference: Array, asked: NDArray[np.bool_]) -> str:

@@ -29,7 +29,7 @@ class Silent:
         del q, lam
         return 0.0
 
-    def crossing(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+    def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Nothing crosses."""
         del q, lam, q_new, lam_new
         return ""
