@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bh.model.refinement import Goal
 
 
-def trace(
+def trace(  # noqa: PLR0913 - the options of the one entry, all by name
     model: Model,
     *,
     symmetry: Plane | None = None,
