@@ -10,7 +10,7 @@ from typing import Any
 from bh.runtime.progress import ProgressMeter, note
 
 _log = logging.getLogger(__name__)
-WORDS = "compiling {} for this computer (numba): this happens once, and takes some seconds; later runs load what is kept"
+WORDS = "compiling {} for this computer (numba): it happens once and takes some seconds; later runs load what is kept"
 _PARTS = {
     "bh.mechanics.bars_and_hinges": "bars and hinges",
     "bh.mechanics.consistent": "the consistent formulation",

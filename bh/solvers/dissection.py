@@ -81,7 +81,7 @@ def _dissect(order, indptr, indices, keys, ranks, leaf):  # type: ignore[no-unty
         if hi - lo <= leaf:
             own_start[here] = lo
             continue
-        _best_cut(order, lo, hi, indptr, indices, keys, ranks, side, best)
+        _best_cut(lo, hi, indptr, indices, keys, ranks, side, best)
         ends[0] = ends[1] = ends[2] = 0
         for i in range(lo, hi):
             ends[best[order[i]]] += 1
@@ -126,8 +126,8 @@ def _gap(keys, ranks, direction, lo, hi):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _best_cut(order, lo, hi, indptr, indices, keys, ranks, side, best):  # type: ignore[no-untyped-def]
-    """Writes 0, 1 (halves) or 2 (separator) into `best` for order[lo:hi], for the direction of fewest separators."""
+def _best_cut(lo, hi, indptr, indices, keys, ranks, side, best):  # type: ignore[no-untyped-def]
+    """Writes 0, 1 (halves) or 2 (separator) into `best` for the set at lo:hi, for the direction of fewest separators."""
     fewest = hi - lo + 1
     touching = np.empty(2, np.int64)
     for direction in range(keys.shape[1]):
@@ -136,7 +136,7 @@ def _best_cut(order, lo, hi, indptr, indices, keys, ranks, side, best):  # type:
             side[ranks[direction, i]] = 0 if i < half else 1
         touching[0] = touching[1] = 0
         for i in range(lo, hi):
-            v = order[i]
+            v = ranks[0, i]
             for e in range(indptr[v], indptr[v + 1]):
                 if side[indices[e]] == 1 - side[v]:
                     touching[side[v]] += 1
@@ -146,7 +146,7 @@ def _best_cut(order, lo, hi, indptr, indices, keys, ranks, side, best):  # type:
             continue
         fewest = touching[lesser]
         for i in range(lo, hi):
-            v = order[i]
+            v = ranks[0, i]
             best[v] = side[v]
             if side[v] == lesser:
                 for e in range(indptr[v], indptr[v + 1]):

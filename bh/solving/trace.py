@@ -71,7 +71,13 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
         if accuracy is not None:
             return _to_accuracy(model, accuracy, symmetry, report, strategy, file, resume)
         path = follow(
-            model, symmetry=symmetry, progress=report, strategy=strategy, file=file, resume=resume, after=after
+            model,
+            symmetry=symmetry,
+            progress=report,
+            strategy=strategy,
+            file=file,
+            resume=resume,
+            after=after,
         )
         if estimate and path.accuracy is None:
             from bh.solving.given_mesh import add_estimate

@@ -307,7 +307,9 @@ def spring_force_rates(x, v, hinges, rotation, S, dS, f, r):  # type: ignore[no-
         r[rotation[h, 0]] -= dS[h]
         r[rotation[h, 1]] -= dS[h]
         _clear(small)
-        add_hinge_hessian(hinge_geometry(x, hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3], g), S[h], small)
+        add_hinge_hessian(
+            hinge_geometry(x, hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3], g), S[h], small
+        )
         _add_hinge_rate(small, g, dS[h], hinges[h], v, f)
 
 

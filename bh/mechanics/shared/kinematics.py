@@ -146,7 +146,9 @@ def dihedral_hessians(x: Array, hinges: NDArray[np.int64]) -> Array:
     H = np.zeros((len(hinges), 12, 12))
     g = np.empty(12)
     for i in range(len(hinges)):
-        add_hinge_hessian(hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g), 1.0, H[i])
+        add_hinge_hessian(
+            hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g), 1.0, H[i]
+        )
         for p in range(12):
             for q in range(p):
                 H[i, q, p] = H[i, p, q]
