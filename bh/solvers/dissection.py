@@ -127,7 +127,7 @@ def _gap(keys, ranks, direction, lo, hi):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _best_cut(lo, hi, indptr, indices, keys, ranks, side, best):  # type: ignore[no-untyped-def]
-    """Writes 0, 1 (halves) or 2 (separator) into `best` for the set at lo:hi, for the direction of fewest separators."""
+    """Writes 0, 1 (halves) or 2 (separator) into `best` for the set at lo:hi, by the cut of fewest separators."""
     fewest = hi - lo + 1
     touching = np.empty(2, np.int64)
     for direction in range(keys.shape[1]):
