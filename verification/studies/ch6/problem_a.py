@@ -26,7 +26,7 @@ def run(context: Context) -> CaseResult:
         question="How near do one to six circular segments come to the source's three curves?",
         source=CURVES_IN,
     )
-    most = 3 if context.quick else 6
+    most = 2 if context.quick else 6
     errors: dict[str, list[float]] = {}
     best: dict[str, Any] = {}
     for name, target in CURVES.items():
