@@ -254,7 +254,7 @@ def test_unstable_end_is_told() -> None:
 
 
 def test_a_thin_ring_of_bars_and_hinges_leaves_the_plane() -> None:
-    """It stayed flat at 900 times the energy: modes as soft as the shift of globalised Newton kept it from converging."""
+    """It stayed flat at 900 times the energy: modes as soft as a shift let Newton creep."""
     mesh = meshes.structured(meshes.full_annulus(100.0, 5.0), along=48)
     path = trace(Model(mesh, Sheet(E=4000.0, t=0.02)).fold("crease", to=2.2))
     assert path.outcome == "reached"
