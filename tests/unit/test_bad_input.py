@@ -64,7 +64,7 @@ CASES = [
     ("no pattern", {"pattern": ""}, ["pattern is missing", "[pattern]"]),
     ("no sheet", {"sheet": ""}, ["sheet is missing"]),
     ("no steps", {"steps": ""}, ["steps is missing", "[[steps]]"]),
-    ("no mesh", {"mesh": ""}, ["mesh is missing", "along"]),
+    ("no mesh", {"mesh": '[model]\nformulation = "bars-and-hinges"\n'}, ["no estimate", "table [mesh]"]),
     ("single steps", {"steps": '[steps]\nfold = { crease = "crease", to = 2.5 }\n'}, ["[[steps]]", "double"]),
     ("empty step", {"steps": "[[steps]]\n"}, ["steps[0] is empty", "fold"]),
     ("empty steps", {"pattern": "steps = []\n" + BASE["pattern"], "steps": ""}, ["steps is empty"]),

@@ -2,8 +2,8 @@
 
 The scenes (`verification.studies.solver.honesty_scenes`) are drawn at random from a seed that no choice in
 `bh.solving` was made with ("held"): four of ten are narrow sheets, the others wide panels, closed rings, several
-creases and drawn networks. Every scene is kept in `honesty_runs.json` beside the results as it is done; a run that was
-stopped goes on.
+creases and drawn networks. Quick are the first of them without the rings, which buckle and take minutes each. Every
+scene is kept in `honesty_runs.json` beside the results as it is done; a run that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from meshes.cells import Cells, RuledCells
 from meshes.choices import choices, cut
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.framework.store import Store
-from verification.studies.solver.honesty_scenes import WITHIN, Draw, draw
+from verification.studies.solver.honesty_scenes import WITHIN, Draw, draw, kind_of
 
 CASE, SHELL, RUNS = "honesty", "the shell on a fine mesh", "honesty_runs.json"
-SCENES, QUICK, ALLOWED = 100, 10, 1.5
+SCENES, QUICK, ALLOWED = 100, 6, 1.5
 ENOUGH_HONEST, ENOUGH_RIGHT = 95, 98
 HELD, TRAINING = 20261128, 7  # seeds
 JUDGES = (3, 5)  # rows of the shell; the last is the truth, its distance to the one before the bar
@@ -136,13 +136,15 @@ def run(context: Context) -> CaseResult:
         question="Over scenes that nothing was chosen with: is the error at most 1.5 times the estimate?",
         source="mutual: a hundred random scenes, judged by a fine shell",
     )
-    count = QUICK if context.quick else SCENES
+    numbers = [n for n in range(SCENES) if not (context.quick and kind_of(n) == "ring")]
+    numbers = numbers[: QUICK if context.quick else SCENES]
+    count = len(numbers)
     store = Store.open(context.folder, RUNS, context.quick)
     found = []
-    for number in range(count):
+    for done, number in enumerate(numbers, 1):
         key = str(number)
         if key not in store.runs:
-            context.tell(f"{CASE}: scene {number + 1} of {count}")
+            context.tell(f"{CASE}: scene {done} of {count}")
             store.keep(key, asdict(examine(HELD, number)))
         found.append(Found(**store.runs[key]))
         _record(result, number, found[-1])

@@ -31,10 +31,14 @@ class Draw:
     goal: Goal
 
 
+def kind_of(number: int) -> str:
+    """The kind of a scene; kinds take turns, six of ten are not narrow."""
+    return KINDS[number % len(KINDS)]
+
+
 def draw(seed: int, number: int) -> Draw:
-    """Scene `number` of a seed; kinds take turns, six of ten are not narrow."""
+    """Scene `number` of a seed."""
     rng = np.random.default_rng([seed, number])
-    kind = KINDS[number % len(KINDS)]
     makers: dict[str, Callable[[np.random.Generator], Draw]] = {
         "narrow": narrow,
         "wide": wide,
@@ -42,7 +46,7 @@ def draw(seed: int, number: int) -> Draw:
         "several": several,
         "network": network,
     }
-    return makers[kind](rng)
+    return makers[kind_of(number)](rng)
 
 
 def paper(rng: np.random.Generator) -> Sheet:
