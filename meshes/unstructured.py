@@ -124,10 +124,10 @@ def unstructured(
     return SheetMesh(
         points=points,
         triangles=triangles,
-        edge_sets=with_groups(pattern, chains),
+        edge_sets=(edge_sets := with_groups(pattern, chains)),
         corners=_corners(chains),
         folds=pattern.folds,
-        fold_angles=drawn_angles(pattern, chains),
+        fold_angles=drawn_angles(pattern, edge_sets),
         curves=curves,
         kind="gmsh",
         remarks=pattern.remarks,

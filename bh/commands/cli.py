@@ -178,6 +178,67 @@ def run(
 
 
 @app.command()
+def fold(  # noqa: PLR0913 - the options of a command line
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="SVG, DXF, FOLD, .cp or .opx.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Output folder; default FILE-folded.")
+    ] = None,
+    angle: Annotated[
+        str | None, typer.Option("--angle", metavar="60deg", help="Fold angle of every crease (deg or rad).")
+    ] = None,
+    percent: Annotated[
+        float | None,
+        typer.Option("--percent", help="Of the drawn angles, or of 180 degrees; default 80 of 180."),
+    ] = None,
+    material: Annotated[
+        str, typer.Option("--material", help="paper, card, board, pet, pp, aluminium or steel.")
+    ] = "card",
+    fit: Annotated[float | None, typer.Option("--fit", help="Longer side of the sheet, mm.")] = None,
+    scale: Annotated[float | None, typer.Option("--scale", help="mm a unit of the drawing.")] = None,
+    frame: Annotated[
+        str | None, typer.Option("--frame", help="Of a FOLD file: number (0 is the key frame) or title.")
+    ] = None,
+    write: Annotated[
+        list[str] | None,
+        typer.Option("--write", metavar="glb", help="Also glb, stl, obj, ...; may be repeated."),
+    ] = None,
+    seconds: Annotated[float, typer.Option("--seconds", help="Processor time to spend on it.")] = 60.0,
+    force: Annotated[bool, typer.Option("--force", help="Write over a scene that is there.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+) -> None:
+    """Fold a drawing as it is: picture, result.json and the scene that did it."""
+    from bh.commands.fold import fold_file
+    from bh.scene.folding import Wish, radians_of
+
+    number = int(frame) if frame is not None and frame.isdigit() else frame
+    wish = Wish(
+        None if angle is None else radians_of(angle),
+        percent,
+        material,
+        fit,
+        scale,
+        number,
+        tuple(write or ()),
+    )
+    folder = Path(f"{file.stem}-folded") if output is None else output
+    done = fold_file(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
+    if not quiet:
+        for line in done.proposal.assumed:
+            typer.echo(f"assumed: {line}")
+        for line in done.notes:
+            typer.echo(f"tried: {line}")
+        typer.echo(f"mesh: {done.proposal.mesh}; {done.path.model.formulation}")
+        _summary(done.path, done.scene, done.written, None)
+    if not done.path.reached:
+        typer.echo(
+            f"bh: {file}: folded to {100 * done.path[-1].lam:.0f} % of what was wanted ({done.notes[-1]}); "
+            f"more time: --seconds; what was reached is in '{done.written[2]}'",
+            err=True,
+        )
+        raise typer.Exit(1)
+
+
+@app.command()
 def view(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="A path file, or the output folder of a run.")],
     picture: Annotated[
@@ -264,7 +325,7 @@ def export(
 def init(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The scene to write.")] = Path("scene.toml"),
     drawing: Annotated[
-        Path | None, typer.Option("--drawing", metavar="FILE", help="An SVG or DXF crease pattern to fold.")
+        Path | None, typer.Option("--drawing", metavar="FILE", help="SVG, DXF, FOLD, .cp or .opx to fold.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
 ) -> None:
@@ -285,7 +346,7 @@ def init(
 
 @app.command()
 def check(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).")],
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML), or a drawing.")],
     picture: Annotated[
         Path | None,
         typer.Option("--picture", metavar="FILE", help="PNG, SVG or PDF to draw; default SCENE-check.png."),
@@ -295,12 +356,24 @@ def check(
     """Check a scene, say what it is, and draw its flat pattern."""
     from bh.scene.load import load_scene
     from bh.scene.report import draw, report
+    from meshes.io.drawing import PATTERNS
 
-    loaded = load_scene(scene)
+    loaded = _scene_of_drawing(scene) if scene.suffix.lower() in PATTERNS else load_scene(scene)
     for line in report(loaded):
         typer.echo(line)
     if not no_picture:
         typer.echo(f"wrote {draw(loaded, picture or Path(f'{loaded.name}-check.png'))}")
+
+
+def _scene_of_drawing(file: Path) -> Scene:
+    """What `bh fold` would begin with."""
+    from bh.scene.folding import proposals
+    from bh.scene.load import parse_scene
+
+    first = proposals(file, file.parent)[0]
+    for line in first.assumed:
+        typer.echo(f"assumed: {line}")
+    return parse_scene(first.text, file.parent, file.stem)
 
 
 @app.command()
