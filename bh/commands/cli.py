@@ -15,17 +15,16 @@ try:
     from collections.abc import Callable, Sequence
     from importlib.metadata import EntryPoint, entry_points, version
     from pathlib import Path
-    from typing import TYPE_CHECKING, Annotated
+    from typing import Annotated
 
     import typer
+
+    from bh.commands.fold_options import fold
+    from bh.runtime.consent import take_options
+    from bh.runtime.terminal import say
 except KeyboardInterrupt:  # `main` tells of it from here on
     sys.stderr.write("bh: interrupted\n")
     raise SystemExit(130) from None
-
-if TYPE_CHECKING:
-    from bh.analysis.contact import Contact
-    from bh.paths.path import Path as Trace
-    from bh.scene.load import Scene
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
@@ -52,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in (words[: words.index("--")] if "--" in words else words)
     if debug:  # it may stand anywhere, also behind a command
         words.remove("--debug")
+    take_back = take_options(words)
     try:
         code = app(args=words, prog_name="bh", standalone_mode=False)
         if code == 130:  # what typer makes of a KeyboardInterrupt
@@ -66,6 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except Exception as error:
         return _explain(error, debug)
+    finally:
+        take_back()
 
 
 class _InterruptedError(Exception):
@@ -87,7 +89,7 @@ def _explain(error: Exception, debug: bool) -> int:
 def _fail(message: str, code: int, debug: bool) -> int:
     if debug:
         traceback.print_exc()
-    typer.echo("bh: " + " ".join(message.split()), err=True)
+    say("bh: " + " ".join(message.split()), err=True)
     return code
 
 
@@ -96,7 +98,7 @@ def _fail(message: str, code: int, debug: bool) -> int:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"bh {version('curved-crease-workbench')}")
+        say(f"bh {version('curved-crease-workbench')}")
         raise typer.Exit
 
 
@@ -108,11 +110,19 @@ def _options(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit."),
     ] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show where an error comes from.")] = False,
+    allow_plugins: Annotated[
+        bool,
+        typer.Option("--allow-plugins", help="Run code that files name (module:name); if you trust them."),
+    ] = False,
+    allow_outside: Annotated[
+        bool, typer.Option("--allow-outside", help="Read files that lie outside the folder of the scene.")
+    ] = False,
 ) -> None:
     """Bar-and-hinge simulation of sheets folded along curved creases."""
-    del show_version, debug  # the one has its own callback, `main` looks for the other
+    # the first has its own callback, `main` looks for the others, wherever they stand
+    del show_version, debug, allow_plugins, allow_outside
     if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+        say(context.get_help())
 
 
 @app.command()
@@ -131,6 +141,7 @@ def run(
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
     from bh.commands.run import UNFINISHED, extras, holds_states, solve
+    from bh.commands.summary import summary
     from bh.errors import InputError
     from bh.scene.load import load_scene
 
@@ -146,7 +157,7 @@ def run(
             f"go on with: {again}" if holds_states(folder) else "nothing is kept"
         ) from None
     if before and not quiet:
-        typer.echo(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
+        say(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
     written = [folder / name for name in names]
     for name, write in extras(path, loaded, folder, pictures, vtu).items():
         try:
@@ -157,10 +168,10 @@ def run(
             ) from error
         written.append(folder / name)
     if not quiet:
-        _summary(path, loaded, written, contact)
+        summary(path, loaded, written, contact)
     if path.reached and path.accuracy is not None and not path.accuracy.met:
         why = "; ".join(note for note in path.accuracy.notes if note.startswith("ended"))
-        typer.echo(
+        say(
             f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}; {why}; "
             f"the path is in '{written[0]}'",
             err=True,
@@ -169,7 +180,7 @@ def run(
     if not path.reached:
         why = f" ({path.reason})" if path.reason else ""
         kept = "; the finished result of an earlier run is kept" if names == UNFINISHED else ""
-        typer.echo(
+        say(
             f"bh: {scene}: step {len(path.steps)} of {len(loaded.model.steps)} ended early: {path.outcome}{why}; "
             f"what was reached is in '{written[1]}'{kept}",
             err=True,
@@ -177,65 +188,7 @@ def run(
         raise typer.Exit(1)
 
 
-@app.command()
-def fold(  # noqa: PLR0913 - the options of a command line
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="SVG, DXF, FOLD, .cp or .opx.")],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Output folder; default FILE-folded.")
-    ] = None,
-    angle: Annotated[
-        str | None, typer.Option("--angle", metavar="60deg", help="Fold angle of every crease (deg or rad).")
-    ] = None,
-    percent: Annotated[
-        float | None,
-        typer.Option("--percent", help="Of the drawn angles, or of 180 degrees; default 80 of 180."),
-    ] = None,
-    material: Annotated[
-        str, typer.Option("--material", help="paper, card, board, pet, pp, aluminium or steel.")
-    ] = "card",
-    fit: Annotated[float | None, typer.Option("--fit", help="Longer side of the sheet, mm.")] = None,
-    scale: Annotated[float | None, typer.Option("--scale", help="mm a unit of the drawing.")] = None,
-    frame: Annotated[
-        str | None, typer.Option("--frame", help="Of a FOLD file: number (0 is the key frame) or title.")
-    ] = None,
-    write: Annotated[
-        list[str] | None,
-        typer.Option("--write", metavar="glb", help="Also glb, stl, obj, ...; may be repeated."),
-    ] = None,
-    seconds: Annotated[float, typer.Option("--seconds", help="Processor time to spend on it.")] = 60.0,
-    force: Annotated[bool, typer.Option("--force", help="Write over a scene that is there.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
-) -> None:
-    """Fold a drawing as it is: picture, result.json and the scene that did it."""
-    from bh.commands.fold import fold_file
-    from bh.scene.folding import Wish, radians_of
-
-    number = int(frame) if frame is not None and frame.isdigit() else frame
-    wish = Wish(
-        None if angle is None else radians_of(angle),
-        percent,
-        material,
-        fit,
-        scale,
-        number,
-        tuple(write or ()),
-    )
-    folder = Path(f"{file.stem}-folded") if output is None else output
-    done = fold_file(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
-    if not quiet:
-        for line in done.proposal.assumed:
-            typer.echo(f"assumed: {line}")
-        for line in done.notes:
-            typer.echo(f"tried: {line}")
-        typer.echo(f"mesh: {done.proposal.mesh}; {done.path.model.formulation}")
-        _summary(done.path, done.scene, done.written, None)
-    if not done.path.reached:
-        typer.echo(
-            f"bh: {file}: folded to {100 * done.path[-1].lam:.0f} % of what was wanted ({done.notes[-1]}); "
-            f"more time: --seconds; what was reached is in '{done.written[2]}'",
-            err=True,
-        )
-        raise typer.Exit(1)
+app.command()(fold)
 
 
 @app.command()
@@ -269,16 +222,16 @@ def view(
     import bh.plotting
 
     if vtu is not None:
-        typer.echo(f"wrote {bh.plotting.export_series(solved, vtu)}")
+        say(f"wrote {bh.plotting.export_series(solved, vtu)}")
     if picture is not None:
         bh.plotting.picture(solved[state], picture)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
     if animation is not None:
-        typer.echo(f"wrote {bh.plotting.animation(solved, animation)}")
+        say(f"wrote {bh.plotting.animation(solved, animation)}")
     if html is not None:
         import bh.plotting.interactive
 
-        typer.echo(f"wrote {bh.plotting.interactive.view(solved, title=path.name).save(html)}")
+        say(f"wrote {bh.plotting.interactive.view(solved, title=path.name).save(html)}")
     if picture is vtu is animation is html is None:
         try:
             bh.plotting.show(solved[state])
@@ -318,7 +271,7 @@ def export(
             done = write_flat(file, solved.model.mesh, facets)
         else:
             done = write_state(file, [solved[k] for k in range(last + 1)], source.stem)
-    typer.echo(f"wrote {done}")
+    say(f"wrote {done}")
 
 
 @app.command()
@@ -332,6 +285,7 @@ def init(
     """Write a commented example scene."""
     from bh.errors import InputError
     from bh.scene.example import example
+    from bh.scene.reading import is_inside
     from meshes.io.export import replacing
 
     if file.exists() and not force:
@@ -341,7 +295,8 @@ def init(
     text = example(drawing, file.parent)
     with replacing(file) as draft:
         draft.write_text(text, encoding="utf-8")
-    typer.echo(f"wrote {file}; next: bh check {shlex.quote(str(file))}")
+    outside = drawing is not None and not is_inside(file.parent, file.parent / drawing)
+    say(f"wrote {file}; next: bh check {shlex.quote(str(file))}{' --allow-outside' if outside else ''}")
 
 
 @app.command()
@@ -354,26 +309,16 @@ def check(
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
 ) -> None:
     """Check a scene, say what it is, and draw its flat pattern."""
+    from bh.commands.summary import scene_of_drawing
     from bh.scene.load import load_scene
     from bh.scene.report import draw, report
     from meshes.io.drawing import PATTERNS
 
-    loaded = _scene_of_drawing(scene) if scene.suffix.lower() in PATTERNS else load_scene(scene)
+    loaded = scene_of_drawing(scene) if scene.suffix.lower() in PATTERNS else load_scene(scene)
     for line in report(loaded):
-        typer.echo(line)
+        say(line)
     if not no_picture:
-        typer.echo(f"wrote {draw(loaded, picture or Path(f'{loaded.name}-check.png'))}")
-
-
-def _scene_of_drawing(file: Path) -> Scene:
-    """What `bh fold` would begin with."""
-    from bh.scene.folding import proposals
-    from bh.scene.load import parse_scene
-
-    first = proposals(file, file.parent)[0]
-    for line in first.assumed:
-        typer.echo(f"assumed: {line}")
-    return parse_scene(first.text, file.parent, file.stem)
+        say(f"wrote {draw(loaded, picture or Path(f'{loaded.name}-check.png'))}")
 
 
 @app.command()
@@ -395,7 +340,7 @@ def schema(
         return
     with replacing(output) as draft:
         draft.write_text(text, encoding="utf-8")
-    typer.echo(f"wrote {output}; name it in the first line of a scene: #:schema {output}")
+    say(f"wrote {output}; name it in the first line of a scene: #:schema {output}")
 
 
 @app.command()
@@ -404,7 +349,7 @@ def formulations() -> None:
     from bh.formulations.registry import names
 
     for name in names():
-        typer.echo(name)
+        say(name)
 
 
 def _add_commands() -> None:
@@ -438,45 +383,6 @@ def _proxy(entry: EntryPoint) -> Callable[[typer.Context], None]:
 
 
 _add_commands()
-
-
-def _summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact | None) -> None:
-    from math import degrees
-
-    from bh.formulations.registry import takes_nu
-
-    energy, last = path[-1].energy, path[-1]
-    typer.echo(
-        f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
-        f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
-    )
-    for remark in path.remarks[:6]:
-        typer.echo(remark)
-    model = path.model
-    if model.sheet.nu != 0.0 and not takes_nu(model.formulation):
-        typer.echo(f"{model.formulation} take Poisson's ratio as 0, not as nu = {model.sheet.nu:g}")
-    typer.echo(
-        f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
-        f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
-    )
-    creases = model.mesh.creases
-    for crease in creases[:6]:
-        a = last.fold_angle(crease)
-        typer.echo(
-            f"fold angle of {crease}: {a.mean():.4f} rad ({degrees(a.mean()):.1f} degrees), "
-            f"{a.min():.4f} to {a.max():.4f}"
-        )
-    if len(creases) > 6:
-        typer.echo(f"and {len(creases) - 6} more creases")
-    if contact is None:
-        typer.echo("self-contact: none")
-    else:
-        typer.echo(f"self-contact (reported, not prevented), first in {contact}")
-    if path.accuracy is not None:
-        typer.echo(f"accuracy: {path.accuracy}")
-    if path.estimate_reason:
-        typer.echo(f"accuracy: no estimate: {path.estimate_reason}")
-    typer.echo("files: " + " ".join(str(file) for file in written))
 
 
 if __name__ == "__main__":

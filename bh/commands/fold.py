@@ -97,8 +97,13 @@ def fold_file(
     target = folder / f"{file.stem}.toml"
     if target.exists() and not force:
         raise InputError(f"'{target}' is there already; run it (bh run {target}), or add --force")
-    offers = proposals(file, folder, wish)
+    offers = proposals(file, wish)
     made = make_folder(folder)
+    copy = folder / file.name  # a scene names no file outside its folder
+    own = copy.exists()
+    if not own or not copy.samefile(file):
+        with replacing(copy) as draft:
+            shutil.copyfile(file, draft)
     tried: list[tuple[Proposal, Scene, Trace, Path]] = []
     notes: list[str] = []
     failed: InputError | None = None
@@ -126,7 +131,7 @@ def fold_file(
             why = f"folds, but its accuracy is not met in the time for it: {path.accuracy}"
         notes.append(f"{offer.mesh}: {why}")
     if not tried:
-        take_back(None, made)
+        take_back(None if own else copy, made)
         raise failed or InputError(f"{file}: no mesh of it can be solved")
     best = max(enumerate(tried), key=lambda item: (item[1][2].reached, item[1][2][-1].lam, item[0]))[1]
     return _kept(best, folder, target, tuple(notes), began, [item[3] for item in tried])

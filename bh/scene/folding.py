@@ -88,12 +88,11 @@ class _Found:
     why: list[InputError] = field(default_factory=list)
 
 
-def proposals(file: str | os.PathLike[str], folder: Path, wish: Wish | None = None) -> list[Proposal]:
-    """Scenes that may fold a file, the most promising first.
+def proposals(file: str | os.PathLike[str], wish: Wish | None = None) -> list[Proposal]:
+    """Scenes that may fold a file, the most promising first; they look for it in their own folder.
 
     Args:
         file: .svg, .dxf, .fold, .cp or .opx.
-        folder: where the scene will lie: it names the file from there.
         wish: how to fold it; None for the defaults.
 
     Raises:
@@ -115,7 +114,7 @@ def proposals(file: str | os.PathLike[str], folder: Path, wish: Wish | None = No
         assumed.append(f"the file states no unit and would be absurdly small or large: fitted to {FIT:g} mm")
         options["fit"] = FIT
         found = _read(Path(file), options)
-    return _proposed(Path(file), folder, wish, found, options, assumed)
+    return _proposed(Path(file), wish, found, options, assumed)
 
 
 def radians_of(text: str) -> float:
@@ -184,7 +183,6 @@ def _bent(mesh: SheetMesh) -> bool:
 
 def _proposed(
     file: Path,
-    folder: Path,
     wish: Wish,
     found: _Found,
     options: Mapping[str, object],
@@ -213,7 +211,7 @@ def _proposed(
             "",
             *([mesh, ""] if mesh.startswith("accuracy") else []),
             "[pattern]",
-            f"file = {_quoted(os.path.relpath(file, folder))}",
+            f"file = {_quoted(file.name)}",
             *(f"{key} = {_toml(value)}" for key, value in options.items()),
             *(
                 [f"tolerance = {_tolerance(found):.3g}"]

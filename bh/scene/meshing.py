@@ -9,7 +9,7 @@ import numpy as np
 from bh.errors import SceneError
 from bh.model.plugins import made
 from bh.scene.patterns import LIBRARY, DrawingPattern
-from bh.scene.reading import as_table, nearest, read_table, shown, within, without
+from bh.scene.reading import as_table, inside, nearest, read_table, shown, within, without
 from bh.scene.tables import DrawnTable, GmshTable, MeshTable
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.choices import first_mesh
@@ -103,7 +103,7 @@ def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: 
     given = read_table(DrawingPattern, table, "pattern")
     if given.frame is not None and suffix != ".fold":
         raise SceneError("pattern.frame is for FOLD files; remove it")
-    file = folder / given.file
+    file = inside(folder, given.file, "pattern.file")
     options: DrawingOptions = {
         "scale": given.scale,
         "fit": given.fit,

@@ -86,15 +86,13 @@ class TestOneCommand:
         np.testing.assert_allclose(size, [100.0, 50.0, 0.0], atol=1e-9)
 
     def test_a_size_that_cannot_be_is_said(self, tmp_path):
-        first = proposals(fold(tmp_path), tmp_path)[0]
+        first = proposals(fold(tmp_path))[0]
         assert any("fitted to 200 mm" in line for line in first.assumed)
-        assert not any(
-            "fitted" in line for line in proposals(fold(tmp_path, frame_unit="cm"), tmp_path)[0].assumed[1:]
-        )
+        assert not any("fitted" in line for line in proposals(fold(tmp_path, frame_unit="cm"))[0].assumed[1:])
 
     def test_closed_angles_go_by_80_percent(self, tmp_path):
         file = fold(tmp_path, edges_foldAngle=[0, 0, 0, 0, 0, 0, 180.0])
-        assert "part = 0.8" in proposals(file, tmp_path)[0].text
+        assert "part = 0.8" in proposals(file)[0].text
 
     def test_a_cp_file(self, tmp_path):
         file = tmp_path / "x.cp"
@@ -106,7 +104,7 @@ class TestOneCommand:
 
     def test_a_curve_is_folded_on_a_finer_mesh(self, tmp_path):
         body = RIM + '<path d="M0 20 Q40 45 80 20" stroke="red" fill="none"/>'
-        offers = proposals(svg(tmp_path, body), tmp_path)
+        offers = proposals(svg(tmp_path, body))
         assert offers[0].text.count("accuracy")
         assert "staggered" in offers[1].text
         for offer in offers:
@@ -130,7 +128,7 @@ class TestOneCommand:
 
     def test_no_crease(self, tmp_path):
         with pytest.raises(InputError, match="no mountain or valley crease to fold"):
-            proposals(svg(tmp_path, RIM), tmp_path)
+            proposals(svg(tmp_path, RIM))
 
     def test_a_clock_ends_a_run(self):
         clock = _Clock(Silent(), -1.0)
