@@ -131,7 +131,7 @@ def test_bad_targets_are_one_line() -> None:
         (lambda: Until("energy", float("nan")), "finite number"),
         (lambda: Until("fold_angle", 1.0), "needs `of`, the name of a crease"),
         (lambda: bh.depth(-1.0), "positive length"),
-        (lambda: Until(lambda state: 1.0, 1.0), "top of a module"),  # type: ignore[arg-type]
+        (lambda: Until(lambda state: 1.0, 1.0), "top of a module"),
         (lambda: corrugation().step(until=bh.depth(1.0)), "at least one actuation"),
         (lambda: corrugation().step(bh.depth(1.0)), "give it by name"),  # type: ignore[arg-type]
         (lambda: corrugation().step("fold"), "takes actuations, not a str"),  # type: ignore[arg-type]
