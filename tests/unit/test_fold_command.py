@@ -56,7 +56,7 @@ def folds(folder: Path, crease: str = "valley") -> float:
 
 
 class TestOneCommand:
-    def test_a_drawing_folds_by_80_percent(self, tmp_path, capsys):
+    def test_a_drawing_folds_by_80_percent(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         out = tmp_path / "out"
         assert main(["fold", str(svg(tmp_path)), "-o", str(out), "--write", "glb", "--write", "stl"]) == 0
         assert folds(out) == pytest.approx(144.0, abs=0.01)
@@ -69,7 +69,7 @@ class TestOneCommand:
         energy = bh.trace(again.model)[-1].energy.total
         assert energy == pytest.approx(result(out)["energy"]["total"], abs=1e-9)  # type: ignore[index]
 
-    def test_the_scene_is_not_written_over(self, tmp_path, capsys):
+    def test_the_scene_is_not_written_over(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         file, out = svg(tmp_path), tmp_path / "out"
         assert main(["fold", str(file), "-o", str(out), "-q", "--angle", "60deg"]) == 0
         assert folds(out) == pytest.approx(60.0, abs=0.01)
@@ -78,23 +78,23 @@ class TestOneCommand:
         assert main(["fold", str(file), "-o", str(out), "-q", "--percent", "20", "--force"]) == 0
         assert folds(out) == pytest.approx(36.0, abs=0.01)
 
-    def test_angles_of_the_file_are_used(self, tmp_path):
+    def test_angles_of_the_file_are_used(self, tmp_path: Path) -> None:
         file = fold(tmp_path)
         assert main(["fold", str(file), "-o", str(tmp_path / "out"), "-q", "--fit", "100"]) == 0
         assert folds(tmp_path / "out") == pytest.approx(70.0, abs=0.01)
         size = np.ptp(load_scene(tmp_path / "out" / "strip.toml").model.mesh.points, axis=0)
         np.testing.assert_allclose(size, [100.0, 50.0, 0.0], atol=1e-9)
 
-    def test_a_size_that_cannot_be_is_said(self, tmp_path):
+    def test_a_size_that_cannot_be_is_said(self, tmp_path: Path) -> None:
         first = proposals(fold(tmp_path))[0]
         assert any("fitted to 200 mm" in line for line in first.assumed)
         assert not any("fitted" in line for line in proposals(fold(tmp_path, frame_unit="cm"))[0].assumed[1:])
 
-    def test_closed_angles_go_by_80_percent(self, tmp_path):
+    def test_closed_angles_go_by_80_percent(self, tmp_path: Path) -> None:
         file = fold(tmp_path, edges_foldAngle=[0, 0, 0, 0, 0, 0, 180.0])
         assert "part = 0.8" in proposals(file)[0].text
 
-    def test_a_cp_file(self, tmp_path):
+    def test_a_cp_file(self, tmp_path: Path) -> None:
         file = tmp_path / "x.cp"
         rim = [(0, 0, 80, 0), (80, 0, 80, 60), (80, 60, 0, 60), (0, 60, 0, 0)]
         rows = [(1, *row) for row in rim] + [(2, 40, 0, 40, 60)]
@@ -102,7 +102,7 @@ class TestOneCommand:
         assert main(["fold", str(file), "-o", str(tmp_path / "out"), "-q"]) == 0
         assert folds(tmp_path / "out", "mountain") == pytest.approx(144.0, abs=0.01)
 
-    def test_a_curve_is_folded_on_a_finer_mesh(self, tmp_path):
+    def test_a_curve_is_folded_on_a_finer_mesh(self, tmp_path: Path) -> None:
         body = RIM + '<path d="M0 20 Q40 45 80 20" stroke="red" fill="none"/>'
         offers = proposals(svg(tmp_path, body))
         assert offers[0].text.count("accuracy")
@@ -121,27 +121,29 @@ class TestOneCommand:
             (["--fit", "-1"], "fit = -1.0 cannot be"),
         ],
     )
-    def test_bad_wishes(self, tmp_path, capsys, arguments, words):
+    def test_bad_wishes(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+    ) -> None:
         assert main(["fold", str(svg(tmp_path)), "-o", str(tmp_path / "out"), *arguments]) == 2
         assert words in capsys.readouterr().err
         assert not (tmp_path / "out").exists()
 
-    def test_no_crease(self, tmp_path):
+    def test_no_crease(self, tmp_path: Path) -> None:
         with pytest.raises(InputError, match="no mountain or valley crease to fold"):
             proposals(svg(tmp_path, RIM))
 
-    def test_a_clock_ends_a_run(self):
+    def test_a_clock_ends_a_run(self) -> None:
         clock = _Clock(Silent(), -1.0)
         with pytest.raises(TimeUpError, match=r"lambda = 0\.50"):
             clock.update(0, 1, 0.5, 3, 1.0)
 
-    def test_angles(self):
+    def test_angles(self) -> None:
         assert radians_of("90deg") == pytest.approx(math.pi / 2)
         assert radians_of("1.5 rad") == 1.5
 
 
 class TestChecksAndScenes:
-    def test_check_takes_drawings(self, tmp_path, capsys):
+    def test_check_takes_drawings(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         picture = tmp_path / "flat.png"
         assert main(["check", str(fold(tmp_path)), "--picture", str(picture)]) == 0
         out = capsys.readouterr().out
@@ -149,12 +151,12 @@ class TestChecksAndScenes:
         assert "drawn to 70 degrees" in out
         assert "sheet: 200 x 100 mm" in out
 
-    def test_init_takes_fold_files(self, tmp_path):
+    def test_init_takes_fold_files(self, tmp_path: Path) -> None:
         fold(tmp_path)
         assert main(["init", str(tmp_path / "scene.toml"), "--drawing", str(tmp_path / "strip.fold")]) == 0
         assert load_scene(tmp_path / "scene.toml").accuracy is not None
 
-    def test_a_fold_file_is_meshed_anew(self, tmp_path):
+    def test_a_fold_file_is_meshed_anew(self, tmp_path: Path) -> None:
         fold(tmp_path, frame_unit="cm")
         tail = '[sheet]\nE = 4000.0\nt = 0.2\n[[steps]]\nfold = { crease = "all", by = "drawn" }\n'
         own = parse_scene(f'[pattern]\nfile = "strip.fold"\nscale = 30.0\n{tail}', tmp_path).model.mesh
@@ -168,7 +170,7 @@ class TestChecksAndScenes:
             assert mesh.folds["v1"] == "valley"
             np.testing.assert_allclose(mesh.fold_angles["v1"], -math.radians(70.0))
 
-    def test_the_hull_is_taken_in_a_scene(self, tmp_path):
+    def test_the_hull_is_taken_in_a_scene(self, tmp_path: Path) -> None:
         svg(tmp_path, CREASE + '<line x1="0" y1="30" x2="80" y2="30" stroke="red"/>')
         tail = '[sheet]\nE = 4000.0\nt = 0.2\n[[steps]]\nfold = { crease = "all", by = 0.1, Lstar = 9.0 }\n'
         text = f'[pattern]\nfile = "sheet.svg"\noutline = "hull"\n[mesh]\nkind = "gmsh"\nsize = 9.0\n{tail}'
@@ -176,26 +178,26 @@ class TestChecksAndScenes:
 
 
 class TestFoldFiles:
-    def test_frames_by_title(self, tmp_path):
+    def test_frames_by_title(self, tmp_path: Path) -> None:
         frame = {"frame_title": "wide", "frame_inherit": True, "frame_parent": 0, "frame_unit": "in"}
         file = fold(tmp_path, file_frames=[frame])
         assert np.ptp(read_fold(file, "wide").points[:, 0]) == pytest.approx(50.8)
         with pytest.raises(FileFormatError, match='no frame titled "high"; titles: "wide"'):
             read_fold(file, "high")
 
-    def test_an_open_frame_goes_before_a_folded_one(self, tmp_path):
+    def test_an_open_frame_goes_before_a_folded_one(self, tmp_path: Path) -> None:
         flat = {"vertices_coords": [[0, 0], [3, 0], [6, 0], [6, 3], [3, 3], [0, 3]]}
         frame = {**flat, "frame_classes": ["creasePattern"], "frame_inherit": True, "frame_parent": 0}
         file = fold(tmp_path, frame_classes=["foldedForm"], file_frames=[frame])
         assert np.ptp(read_fold(file).points[:, 0]) == pytest.approx(6.0)
 
-    def test_a_flat_folded_form_is_told(self, tmp_path):
+    def test_a_flat_folded_form_is_told(self, tmp_path: Path) -> None:
         over = [[0, 0], [1, 0], [0.1, 0], [0.1, 1], [1, 1], [0, 1]]
         with pytest.raises(FileFormatError, match="folded flat"):
             read_fold(fold(tmp_path, vertices_coords=over))
 
     @pytest.mark.parametrize("axis", [0, 1, 2])
-    def test_any_plane_is_laid_flat(self, tmp_path, axis):
+    def test_any_plane_is_laid_flat(self, tmp_path: Path, axis: int) -> None:
         flat = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [1, 1], [0, 1]], dtype=float)
         u, v = np.roll(np.eye(3), axis, axis=1)[[0, 1]]
         tilt = np.linalg.qr(np.array([[1.0, 0.2, 0.1], [0.3, 1.0, 0.4], [0.2, 0.5, 1.0]]))[0]
@@ -207,12 +209,10 @@ class TestFoldFiles:
             assert mesh.areas.sum() == pytest.approx(2.0)
             assert mesh.folds["v1"] == "valley"
 
-    def test_inches_and_scale(self, tmp_path):
+    def test_inches_and_scale(self, tmp_path: Path) -> None:
         file = fold(tmp_path, frame_unit="in")
-        for read in (read_fold, read_pattern):
-            sheet = read(file)
-            points = sheet.points if read is read_fold else sheet.rings[0]
-            assert np.ptp(points[:, 0]) == pytest.approx(50.8)
+        assert np.ptp(read_fold(file).points[:, 0]) == pytest.approx(50.8)
+        assert np.ptp(read_pattern(file).rings[0][:, 0]) == pytest.approx(50.8)
         assert np.ptp(read_fold(file, scale=10.0).points[:, 0]) == pytest.approx(20.0)
         assert np.ptp(read_pattern(file, scale=10.0).rings[0][:, 0]) == pytest.approx(20.0)
         with pytest.raises(FileFormatError, match="give one of them"):
@@ -220,7 +220,7 @@ class TestFoldFiles:
 
 
 class TestDrawnAngles:
-    def test_by_drawn_for_all_on_every_mesh(self, tmp_path):
+    def test_by_drawn_for_all_on_every_mesh(self, tmp_path: Path) -> None:
         """A crease that ends inside is one of 'all mountains', too: its angle counts under both names."""
         body = RIM + '<line x1="20" y1="30" x2="60" y2="30" stroke="red" stroke-opacity="0.35"/>'
         mesh = unstructured(read_pattern(svg(tmp_path, body)), size=10.0)
@@ -230,6 +230,6 @@ class TestDrawnAngles:
         assert path.reached
         assert np.median(path[-1].fold_angle("m1")) > 0.3
 
-    def test_a_part_of_drawn_angles_only(self):
+    def test_a_part_of_drawn_angles_only(self) -> None:
         with pytest.raises(bh.ModelError, match="part"):
             bh.Fold("all", by=0.5, part=0.5)
