@@ -24,7 +24,7 @@ from meshes.choices import choices, cut, panel_width
 PERCENT = 80.0  # of the way, where neither the user nor the file says how far
 FULLY = math.radians(170.0)  # drawn angles beyond that mean folded flat: then 80 % of them, too
 STIFFER = 8.0  # crease springs against the bending of a panel
-CREASES = 12  # curved creases side by side of which an accuracy can be afforded
+CREASES = 12  # curved creases of which an accuracy can be afforded
 ROWS = 4.0  # of cells in a panel between curved creases
 SECONDS = 15.0  # of a run to an accuracy
 FIT = 200.0  # mm, the longer side of a sheet whose file says no unit and whose numbers make an absurd size
@@ -290,7 +290,7 @@ def _meshes(found: _Found, width: float) -> list[tuple[str, str, str]]:
     if pattern is None:
         return [drawn]
     scenes = []
-    if pattern.rails and len(pattern.creases) <= CREASES:
+    if len(pattern.creases) <= CREASES:
         scenes.append(
             (
                 f"accuracy = {{ within = 0.05, seconds = {SECONDS:g} }}",
@@ -298,14 +298,14 @@ def _meshes(found: _Found, width: float) -> list[tuple[str, str, str]]:
                 "",
             )
         )
-        scenes += _ruled(pattern)
+        scenes += _ruled(pattern) if pattern.rails else []
     ruled = found.faces is not None and len(pattern.facets) >= len(pattern.creases)
     if ruled:
         scenes.append(drawn)
     size = max(width, math.sqrt(_area(pattern)) / 60.0)
     for finer in (1.0, 2.0, 4.0):
         words = f"triangles of {size / finer:.3g} mm by gmsh"
-        scenes.append((f'kind = "gmsh"\nsize = {size / finer:.4g}', words, "bars-and-hinges"))
+        scenes.append((f'kind = "gmsh"\nsize = {size / finer:.4g}', words, "consistent"))
     if found.faces is not None and not ruled:
         scenes.append(drawn)
     return scenes
