@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
-import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
-from multiprocessing import get_context, parent_process
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from bh.runtime.workers import Workers
 from bh.sweep.points import SweepError
 
 if TYPE_CHECKING:
@@ -141,8 +139,7 @@ class Local:
         self._start()
 
     def _start(self) -> None:
-        # spawned, not forked: the parent may have threads, and macOS and Windows can do nothing else
-        self._executor = ProcessPoolExecutor(self.slots, get_context("spawn"), _begin)
+        self._executor = Workers(self.slots)
         try:
             self._executor.submit(os.getpid).result()
         except BrokenExecutor as error:
@@ -176,9 +173,7 @@ class Local:
     def close(self) -> None:
         """End the processes, also in the middle of a point."""
         # an interrupted sweep does not wait for points of minutes: nothing of them would be kept
-        for process in list((getattr(self._executor, "_processes", None) or {}).values()):
-            process.terminate()
-        self._executor.shutdown(wait=True, cancel_futures=True)
+        self._executor.end()
 
 
 class Dask:
@@ -274,16 +269,3 @@ class Dask:
         if self._cluster is not None:
             with contextlib.suppress(Exception):
                 self._cluster.close(timeout=5)
-
-
-def _begin() -> None:
-    """A worker leaves interrupts to its parent, and ends when that has gone, also if it was killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is not None:
-
-        def follow() -> None:
-            parent.join()
-            os._exit(1)
-
-        threading.Thread(target=follow, daemon=True).start()
