@@ -27,7 +27,7 @@ class Workers(ProcessPoolExecutor):
 
     def submit(self, fn: Callable[..., Result], /, *args: Any, **options: Any) -> Future[Result]:
         """Have a process call `fn`; the processes are started here, deaf to interrupts from their first moment."""
-        with _interrupts_wait():
+        with interrupts_wait():
             return super().submit(fn, *args, **options)
 
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
@@ -55,7 +55,7 @@ def follow_parent() -> None:
 
 
 @contextmanager
-def _interrupts_wait() -> Iterator[None]:
+def interrupts_wait() -> Iterator[None]:
     """Ctrl-C goes to a whole group of processes; one that is only starting would print a traceback.
 
     What is started inside inherits that it waits, and this process hears of it right behind.

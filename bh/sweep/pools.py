@@ -9,11 +9,11 @@ from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from bh.runtime.workers import Workers
+from bh.runtime.workers import Workers, interrupts_wait
 from bh.sweep.points import SweepError
 
 if TYPE_CHECKING:
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
 
 Result = TypeVar("Result")
 ANSWER_S = 15.0  # until a scheduler counts as silent
@@ -190,18 +190,24 @@ class Dask:
     def __init__(self, address: str | None = None, workers: int = 0) -> None:
         """Connect to the scheduler."""
         try:
-            from distributed import Client, LocalCluster
+            from distributed import Client, LocalCluster, Security
         except ImportError as error:
             raise SweepError(
                 "Dask is not installed; add the extra: pip install 'curved-crease-workbench[cluster]'"
             ) from error
         self._cluster: LocalCluster | None = None
+        security: Security | None = None
         if address is None:
-            self._cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
-            )
+            security = _temporary_certificate(Security)
+            self._cluster = _local_cluster(LocalCluster, workers, security)
         try:
-            self._client: Client = Client(self._cluster or address, timeout=ANSWER_S, set_as_default=False)
+            self._client: Client = Client(
+                self._cluster or address, timeout=ANSWER_S, set_as_default=False, security=security
+            )
+        except KeyboardInterrupt:
+            if self._cluster is not None:
+                self._cluster.close(timeout=2)
+            raise
         except (OSError, ValueError) as error:  # a time-out is an OSError
             raise SweepError(
                 f"the scheduler '{address}' does not answer ({' '.join(str(error).split())}); start it with "
@@ -269,3 +275,49 @@ class Dask:
         if self._cluster is not None:
             with contextlib.suppress(Exception):
                 self._cluster.close(timeout=5)
+
+
+def _temporary_certificate(kind: type[Security]) -> Security:
+    """Keys that only this process has and hands to its workers.
+
+    A scheduler runs what it is sent: without them, whoever reaches its port on this machine runs code as this user.
+    """
+    try:
+        return kind.temporary()
+    except ImportError as error:
+        raise SweepError(
+            "a Dask cluster of one's own needs cryptography; add the extra: "
+            "pip install 'curved-crease-workbench[cluster]'"
+        ) from error
+
+
+def _local_cluster(kind: type[LocalCluster], workers: int, security: Security) -> LocalCluster:
+    """A cluster of processes on this machine, or nothing at all where its start is interrupted."""
+    import logging
+
+    from distributed.utils import LoopRunner
+
+    with (
+        interrupts_wait()
+    ):  # what the thread of this loop starts inherits it: workers leave Ctrl-C to this process
+        runner = LoopRunner()
+        runner.start()
+    cluster: LocalCluster = object.__new__(kind)
+    try:
+        kind.__init__(
+            cluster,
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=None,
+            silence_logs=50,
+            protocol="tls://",
+            loop=runner.loop,
+            security=security,
+        )
+    except KeyboardInterrupt:
+        # what is half begun cannot be closed in good order, as Dask would try at exit; its processes end with this one
+        cluster.shutdown_on_close = False
+        for name in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+        raise
+    return cluster
