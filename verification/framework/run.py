@@ -20,6 +20,7 @@ from meshes.errors import InputError
 from verification.framework.cases import BY_NAME, CASES, LONG_CASES, case
 from verification.framework.checks import CaseResult, Context
 from verification.framework.environment import environment
+from verification.framework.folder import refuse_links
 from verification.framework.records import KEYS
 
 OF_A_RUN = ("versions", "date", "machine", "quick")  # kept for every case, as cases may be run one by one
@@ -54,6 +55,7 @@ def run(
         raise InputError(
             f"cannot write the folder '{folder}' ({error.strerror}); choose another one"
         ) from error
+    refuse_links(folder)
     file, run_by = folder / "checks.json", _run_by(quick, jobs)
     found: list[CaseResult] = []
     with closing(_results(names, folder, quick, report, min(jobs, len(names)))) as results:
