@@ -253,6 +253,16 @@ def test_unstable_end_is_told() -> None:
     assert "the last state is not stable (1 negative mode)" in path.remarks
 
 
+def test_a_thin_ring_of_bars_and_hinges_leaves_the_plane() -> None:
+    """It stayed flat at 900 times the energy: modes as soft as a shift let Newton creep."""
+    mesh = meshes.structured(meshes.full_annulus(100.0, 5.0), along=48)
+    path = trace(Model(mesh, Sheet(E=4000.0, t=0.02)).fold("crease", to=2.2))
+    assert path.outcome == "reached"
+    assert path.stable
+    assert path[-1].energy.total == pytest.approx(0.003976, rel=0.01)
+    assert np.ptp(path[-1].points[:, 2]) > 40.0
+
+
 def two_panels() -> Model:
     """Two triangles joined by a crease; one of them is held."""
     points = [[0.0, 0.0], [10.0, 0.0], [5.0, 8.0], [5.0, -8.0]]

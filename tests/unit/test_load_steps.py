@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bh
 import meshes
 from bh import CreaseLaw, Displace, Fold, Force, Model, ModelError, Moment, Sheet
 from bh.loading.builder import load_steps
@@ -327,3 +328,31 @@ def test_release_of_a_held_crease_into_a_spring() -> None:
     assert "needs Lstar" not in refused
     if not refused:
         assert (found[1].law[crease_hinges(ONE, "crease")] == SPRING).all()
+
+
+def bent(formulation: str = "bars-and-hinges", by: float = 1.5) -> bh.Model:
+    """A strip that is pushed to an arch while its crease is still ordinary sheet."""
+    mesh = meshes.structured(meshes.strip(60.0, 20.0, creases=[10.0]), along=12, rows=2)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.3), formulation=formulation)
+    model = model.support("edge:inner", "xyz").support("edge:outer", "xyz")
+    return model.step(bh.Force("crease:crease", total=(0.0, 0.0, by)))
+
+
+def test_a_crease_that_was_bent_as_sheet_is_held_with_the_moment_of_the_sheet() -> None:
+    """The multiplier of an imposed angle begins with the bending moment of the hinge: the step begins in balance."""
+    path = bh.trace(bent().fold("crease", by=0.05))
+    system = path.system(1)
+    assert path.steps[0].outcome == "reached"
+    angle = np.abs(path[len(path) - 1].dihedral("crease") - np.pi)
+    assert angle.max() > 1e-3
+    assert system.evaluate(system.start(), 0.0).imbalance < 1e-6
+    assert path.outcome == "reached"
+
+
+def test_large_strains_get_a_remark() -> None:
+    mesh = meshes.structured(meshes.strip(60.0, 20.0), along=12, rows=2)
+    model = bh.Model(mesh, bh.Sheet(E=4.0, t=0.3)).support("edge:start", "xyz").support("edge:end", "yz")
+    small, large = (bh.trace(model.displace("edge:end", "x", by)) for by in (1.0, 6.0))
+    assert large[-1].strain.max() == pytest.approx(0.1, rel=0.2)
+    assert any("strains reach 10%" in line for line in large.remarks)
+    assert not any("strains" in line for line in small.remarks)

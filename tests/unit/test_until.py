@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path as FilePath
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from bh import Model, ModelError, Sheet, Until, trace
 from bh.formulations.observables import depth_of, measure
 from bh.formulations.state import State
 from bh.scene.load import parse_scene
+from bh.solvers.trace import Walk, _until
 
 SHEET = Sheet(E=4000.0, t=0.381)
 FORMULATIONS = ["bars-and-hinges", "consistent"]
@@ -172,3 +174,21 @@ def test_scene() -> None:
     ):
         with pytest.raises(bh.SceneError, match=message):
             parse_scene(SCENE.replace("UNTIL", text))
+
+
+def test_a_small_value_is_met_as_well_as_a_large_one() -> None:
+    """The tolerance is in parts of the value: an energy of 2e-5 N mm once was met with a twentieth of it."""
+    model = corrugation().fold("all", by=0.5, Lstar=25.0, until=Until("energy", 2e-5))
+    path = trace(model)
+    assert path.outcome == "reached"
+    assert path[-1].energy.total == pytest.approx(2e-5, rel=1e-5)
+
+
+def test_a_jump_over_the_value_is_told() -> None:
+    """A step whose states jump from one side of the value to the other has passed it, and says where."""
+    one = SimpleNamespace(point=SimpleNamespace(lam=0.5, value=1.0), reached=True, jumped=True)
+    start = SimpleNamespace(lam=0.0, value=-1.0)
+    task = Walk(None, None, (start,), goal=lambda at: at.value)  # type: ignore[arg-type]
+    *_, last = _until(task, iter([one]), task.goal)  # type: ignore[arg-type]
+    assert last.outcome == "target-missed"
+    assert "a jump at lambda 0.5 passed it" in last.note
