@@ -465,7 +465,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Pictures and series are told of, not made; `tests` of plotting make them."""
     import bh.plotting
 
-    calls = []
+    calls: list[tuple[Any, ...]] = []
     monkeypatch.setattr(
         bh.plotting, "picture", lambda state, file, **_: calls.append(("picture", state.lam, file))
     )

@@ -15,7 +15,7 @@ import meshes
 from bh import ArcLength, Automatic, DisplacementControl, LoadControl, Model, Newton, Sheet, trace
 from bh.solvers.arc_length import Displacement, Generalised
 from bh.solvers.automatic import behind_limit
-from bh.solvers.increments import ARC, DISPLACEMENT, LOAD, Increment, Point, fold_ahead, point
+from bh.solvers.increments import ARC, DISPLACEMENT, LOAD, Increment, Mode, Point, fold_ahead, point
 from bh.solvers.outcome import Outcome
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.stability import leave_saddle
@@ -158,7 +158,7 @@ def test_load_control_alone_names_the_limit_point() -> None:
     assert found[-1].point.lam * 0.5 < ARCH_LIMIT
 
 
-def at(lam: float, q: float, mode: str = LOAD, negative: int | None = 0) -> Point:
+def at(lam: float, q: float, mode: Mode = LOAD, negative: int | None = 0) -> Point:
     return Point(lam, np.array([q]), np.zeros(0), 0.0, 0.0, mode, negative)
 
 

@@ -13,7 +13,7 @@ import bh
 import meshes
 from bh import CreaseLaw, Displace, Fold, Force, Model, ModelError, Moment, Sheet
 from bh.loading.builder import load_steps
-from bh.loading.load_step import crease_hinges
+from bh.loading.load_step import LoadStep, crease_hinges
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.ramp import Ramp
 
@@ -23,7 +23,7 @@ ONE = meshes.structured(meshes.annulus_sector(40.0, 8.0, 0.6), along=4)
 TWO = meshes.structured(meshes.annulus_sector((40.0, 50.0), 8.0, 0.6, ("mountain", "valley")), along=4)
 
 
-def steps(model: Model) -> list:
+def steps(model: Model) -> list[LoadStep]:
     return list(load_steps(model))
 
 
@@ -89,7 +89,8 @@ def test_angles_follow_the_crease_whatever_the_numbering() -> None:
 def test_spring_from_length_scale_and_from_stiffness() -> None:
     """Eq. 3.12: stiffness a length is E t^3 / (12 L*)."""
     at = crease_hinges(ONE, "crease")
-    for how, expected in (({"Lstar": 5.0}, K / 5.0), ({"stiffness": 0.3}, 0.3)):
+    cases: list[tuple[dict[str, Any], float]] = [({"Lstar": 5.0}, K / 5.0), ({"stiffness": 0.3}, 0.3)]
+    for how, expected in cases:
         (step,) = steps(Model(ONE, STEEL).fold("crease", rest=2.0, **how))
         assert (step.law[at] == SPRING).all()
         assert step.stiffness[at] == pytest.approx(np.full(4, expected), rel=1e-14)
@@ -293,7 +294,9 @@ def test_numpy_numbers_are_numbers(E: Any) -> None:
 
 def test_crease_on_the_boundary_cannot_fold() -> None:
     mesh = meshes.SheetMesh(
-        [[0, 0], [2, 0], [2, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]], edge_sets={"crease:rim": np.array([[0, 1]])}
+        np.array([[0, 0], [2, 0], [2, 1], [0, 1]]),
+        np.array([[0, 1, 2], [0, 2, 3]]),
+        edge_sets={"crease:rim": np.array([[0, 1]])},
     )
     with pytest.raises(ModelError, match="boundary"):
         load_steps(Model(mesh, STEEL).fold("rim", to=2.0))
@@ -302,7 +305,7 @@ def test_crease_on_the_boundary_cannot_fold() -> None:
 # --------------------------------------------------------------------------------------- known faults
 
 
-def attempt(model: Model) -> tuple[list, str]:
+def attempt(model: Model) -> tuple[list[LoadStep], str]:
     """The program, or why there is none."""
     try:
         return steps(model), ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path as FilePath
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -133,7 +134,7 @@ def test_bad_targets_are_one_line() -> None:
         (lambda: Until("energy", float("nan")), "finite number"),
         (lambda: Until("fold_angle", 1.0), "needs `of`, the name of a crease"),
         (lambda: bh.depth(-1.0), "positive length"),
-        (lambda: Until(lambda state: 1.0, 1.0), "top of a module"),  # type: ignore[arg-type]
+        (lambda: Until(lambda state: 1.0, 1.0), "top of a module"),
         (lambda: corrugation().step(until=bh.depth(1.0)), "at least one actuation"),
         (lambda: corrugation().step(bh.depth(1.0)), "give it by name"),  # type: ignore[arg-type]
         (lambda: corrugation().step("fold"), "takes actuations, not a str"),  # type: ignore[arg-type]
@@ -186,9 +187,13 @@ def test_a_small_value_is_met_as_well_as_a_large_one() -> None:
 
 def test_a_jump_over_the_value_is_told() -> None:
     """A step whose states jump from one side of the value to the other has passed it, and says where."""
-    one = SimpleNamespace(point=SimpleNamespace(lam=0.5, value=1.0), reached=True, jumped=True)
+
+    def goal(at: Any) -> float:
+        return float(at.value)
+
+    one: Any = SimpleNamespace(point=SimpleNamespace(lam=0.5, value=1.0), reached=True, jumped=True)
     start = SimpleNamespace(lam=0.0, value=-1.0)
-    task = Walk(None, None, (start,), goal=lambda at: at.value)  # type: ignore[arg-type]
-    *_, last = _until(task, iter([one]), task.goal)  # type: ignore[arg-type]
+    task = Walk(None, None, (start,), goal=goal)  # type: ignore[arg-type]
+    *_, last = _until(task, iter([one]), goal)
     assert last.outcome == "target-missed"
     assert "a jump at lambda 0.5 passed it" in last.note
