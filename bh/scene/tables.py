@@ -172,6 +172,9 @@ class FoldTable(Table):
     )
     Lstar: Positive | None = Field(None, description=LSTAR)
     stiffness: Positive | None = Field(None, description="a positive stiffness a length, N mm / (mm rad)")
+    part: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        1.0, description='a part of the drawn angles from 0 to 1, with by = "drawn"'
+    )
 
 
 class PinchTable(Table):
@@ -235,7 +238,7 @@ class UntilTable(Table):
     )
     of: str | None = Field(None, description="the crease or place that it is of")
     tolerance: Positive = Field(
-        1e-4, description="how near the value must be met, a positive number in its unit"
+        1e-5, description="how near the value must be met, in parts of it (in its unit where it is 0)"
     )
 
     @model_validator(mode="after")
