@@ -45,7 +45,7 @@ def bent(mesh: SheetMesh, formulation: str) -> tuple[float, float]:
 @pytest.mark.parametrize(
     ("formulation", "near"), [("consistent", 1e-5), ("bars-and-hinges", 1e-9), ("shell", 1e-3)]
 )
-def test_a_slit_strip_bends_as_two_strips(formulation, near):
+def test_a_slit_strip_bends_as_two_strips(formulation: str, near: float) -> None:
     slit, other = bent(strip_of(WIDTH, slit=True), formulation)
     alone, _ = bent(strip_of(WIDTH / 2, slit=False), formulation)
     whole, _ = bent(strip_of(WIDTH, slit=False), formulation)
@@ -68,7 +68,7 @@ def pulled(formulation: str, size: float) -> tuple[float, float, float]:
     return state.energy.total, float(force), float(np.ptp(state.points[:, 2]))
 
 
-def test_kirigami_opens_as_its_shell():
+def test_kirigami_opens_as_its_shell() -> None:
     """Finer, they come together: 61.2 N mm and 32.4 N (consistent, 0.8 mm), 62.1 and 32.7 (shell, 2 mm)."""
     energy, force, height = pulled("consistent", 1.2)
     shell = pulled("shell", 3.5)
