@@ -95,17 +95,14 @@ def consistent_elements(
     measure: Measure = constant_strain,
     material: Material = LINEAR,
 ) -> ConsistentElements:
-    """Element arrays of a model in one step; `prescribed_start` and `moment_start` (m,) are what creases begin with.
-
-    Dihedral angles (rad) and total moments (N mm) of all hinges. With a `plane` they are those of the half of a
-    symmetric sheet (`bh.mechanics.shared.mirrored`). `measure` is what measures the strain of the `material`.
+    """Element arrays of a model in one step.
 
     Args:
         model: of the sheet.
         load_step: actuations of the step.
         prescribed_start: (m,) dihedral angles of all hinges at the start, rad.
         moment_start: (m,) total moments of all hinges at the start, N mm.
-        plane: of the symmetry, for the half of a sheet; None for all of it.
+        plane: of the symmetry, for the half of a sheet (`bh.mechanics.shared.mirrored`); None for all.
         measure: of the strain.
         material: laws of strain and of curvature.
 
