@@ -66,7 +66,11 @@ class Graph:
     remarks: tuple[str, ...] = ()
 
     def select(self, kinds: Sequence[str]) -> Ints:
-        """Numbers of the edges of some kinds, rising."""
+        """Numbers of the edges of some kinds, rising.
+
+        Returns:
+            (k,) numbers.
+        """
         return np.flatnonzero([kind in kinds for kind in self.kinds])
 
 
