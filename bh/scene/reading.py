@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import stat
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -251,6 +252,15 @@ def is_inside(folder: Path, place: Path) -> bool:
         return True
 
 
+def waits(place: Path) -> bool:
+    """Whether it is a pipe or socket: opening one waits until somebody writes, which may be for ever."""
+    try:
+        mode = place.stat().st_mode
+    except (OSError, ValueError):  # told where it is opened
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
+
+
 def inside(folder: Path, name: str, at: str) -> Path:
     """The place of a file that a file names: below the folder of the one that names it, unless the user said otherwise.
 
@@ -268,6 +278,8 @@ def inside(folder: Path, name: str, at: str) -> Path:
             f"{at} = {shown(name)} lies outside the folder of the file that names it; copy it there, or add "
             "--allow-outside (BH_ALLOW_OUTSIDE=1, or bh.allow_outside() in Python)"
         )
+    if waits(place):
+        raise SceneError(f"{at} = {shown(name)} is a pipe, which may never end; give a file")
     return place
 
 
