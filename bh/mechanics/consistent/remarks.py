@@ -9,7 +9,11 @@ from bh.model.model import Model
 
 
 def remarks(model: Model) -> tuple[Remark, ...]:
-    """What to know of a model that the consistent formulation solves; empty where there is nothing to say."""
+    """What to know of a model that the consistent formulation solves; empty where there is nothing to say.
+
+    Returns:
+        one remark each.
+    """
     stretched = _stretched(model)
     return () if stretched is None else (stretched,)
 
