@@ -96,7 +96,7 @@ class Task:
     span: float = 50.0
     along: int = 28
     rows: int = 1
-    formulation: str = "bars-and-hinges"
+    formulation: str = "consistent"
     directions: int = 12
 
     def __post_init__(self) -> None:

@@ -32,7 +32,7 @@ def fold(
     Lstar: float = LSTAR,
     along: int = 36,
     rows: int = 1,
-    formulation: str = "bars-and-hinges",
+    formulation: str = "consistent",
     strategy: Strategy | None = None,
 ) -> Folded:
     """Fold all creases as drawn, by one rest angle that grows until the corrugation is `depth_mm` deep.
