@@ -95,7 +95,7 @@ class Task:
     Lstar: float = LSTAR
     span: float = 50.0
     along: int = 28
-    rows: int = 1
+    rows: int = 2
     formulation: str = "consistent"
     directions: int = 12
 

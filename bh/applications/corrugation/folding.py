@@ -31,7 +31,7 @@ def fold(
     sheet: Sheet = POLYESTER,
     Lstar: float = LSTAR,
     along: int = 36,
-    rows: int = 1,
+    rows: int = 2,
     formulation: str = "consistent",
     strategy: Strategy | None = None,
 ) -> Folded:
