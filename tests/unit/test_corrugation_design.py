@@ -110,7 +110,9 @@ def test_wanted_ratio() -> None:
 
 
 def test_what_cannot_be_says_so_in_one_line() -> None:
-    deep = Task(along=16, rows=1, formulation="bars-and-hinges", depth=80.0).simulate(Design(2.0, 1.0, 0.0, 5))
+    deep = Task(along=16, rows=1, formulation="bars-and-hinges", depth=80.0).simulate(
+        Design(2.0, 1.0, 0.0, 5)
+    )
     assert deep.bending is None
     assert deep.why
     assert "\n" not in deep.why
