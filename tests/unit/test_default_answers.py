@@ -1,6 +1,6 @@
 """What a person gets who chooses nothing: no mesh, no formulation, no accuracy.
 
-References are the shell's on 48 x 8 mirrored cells (24 x 4 cells are 1.3, 0.7 and 0.1 % lower), which bars and hinges of
+References are the shell's on 48 x 8 mirrored cells (24 x 4: 1.3, 0.7 and 0.1 % lower), which bars and hinges of
 one staggered row miss by factors of tens in the first two sheets. The tolerance was set before: 5 %, the default
 accuracy of a scene, and an estimate that is not beaten by more than 1.5 times.
 """

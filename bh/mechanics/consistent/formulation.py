@@ -40,7 +40,7 @@ class Consistent:
     name = "consistent"
     takes_nu = True
     refinement: Refinement | None = Refinement(
-        "staggered", ((1.0, 0.17), (2.0, 0.065), (4.0, 0.017), (8.0, 0.0042)), 8.0, 1.9
+        "staggered", ((1.0, 0.171), (2.0, 0.066), (4.0, 0.017), (8.0, 0.0048)), 8.0, 1.9
     )
 
     def __init__(self, measure: Measure = smoothed_strain, material: Material = LINEAR) -> None:

@@ -19,7 +19,7 @@ from verification.studies.solver.hard_cases.pinching import PLEATS, Fan
 Array = NDArray[np.float64]
 SOURCE = "source 3.5.3, Fig. 3.11 (e, f)"
 FORMULATIONS = ("bars-and-hinges", "consistent")
-# Cells along and rows a pleat with the consistent formulation. Coarser pinched fans are other structures: with 16 x 2 the
+# Cells along and rows a pleat with the consistent formulation. Coarser pinched fans are other structures: of 16 x 2 the
 # pinch ends in a limit point (constant strains: 963 N mm, two bifurcations), with 32 x 4 it holds 1,295 N mm in 75
 # iterations without a critical point (constant strains: 1,323 N mm, 115 iterations).
 CONVERGED = (32, 4)
