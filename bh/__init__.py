@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from bh.model.until import Until, depth
     from bh.paths.estimate import Accuracy
     from bh.paths.path import Path
+    from bh.runtime.consent import allow_outside, allow_plugins
     from bh.scene.load import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
     from bh.solvers.automatic import Automatic
@@ -52,6 +53,7 @@ _NAMES = {
     "bh.model.until": "Until depth",
     "bh.paths.estimate": "Accuracy",
     "bh.paths.path": "Path",
+    "bh.runtime.consent": "allow_outside allow_plugins",
     "bh.scene.load": "load_scene",
     "bh.solvers.arc_length": "ArcLength DisplacementControl",
     "bh.solvers.automatic": "Automatic",
@@ -118,6 +120,8 @@ __all__ = [
     "Tether",
     "Until",
     "Zone",
+    "allow_outside",
+    "allow_plugins",
     "depth",
     "load_scene",
     "remarks",

@@ -64,7 +64,7 @@ def build(folder: Path, gallery: bool = True) -> int:
     for page in (source / "docs").glob("*.md"):
         text = page.read_text(encoding="utf-8")
         page.write_text(text.replace("](../examples/)", "](../examples/README.md)"), encoding="utf-8")
-    for name in ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE"):
+    for name in ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "SECURITY.md"):
         shutil.copyfile(ROOT / name, source / name)
     shutil.copyfile(ROOT / "docs" / "conf.py", source / "conf.py")
     write_reference(source / "reference")
@@ -86,7 +86,7 @@ def write_index(source: Path, gallery: bool) -> None:
     trees["Studies"] += [f"docs/{name}" for name in rest]
     trees["Use"].insert(1, "gallery/index" if gallery else "examples/README")
     trees["Use"] += ["examples/README"] if gallery else []
-    trees["Project"] = ["CONTRIBUTING", *trees["Project"], "CHANGELOG"]
+    trees["Project"] = ["CONTRIBUTING", *trees["Project"], "SECURITY", "CHANGELOG"]
     trees["Reference"] = ["reference/index"]
     for caption, pages in trees.items():
         lines = "\n".join(pages)

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from bh.runtime.terminal import say
+
 MOST_JOBS = 4  # cases at a time unless told otherwise; each takes half a gigabyte
 
 
@@ -41,7 +43,7 @@ def report(
         from verification.framework.run import run
 
         at_once = jobs or min(os.cpu_count() or 1, MOST_JOBS)
-        run(None, results, quick, lambda text: typer.echo(text, err=True), at_once)
+        run(None, results, quick, lambda text: say(text, err=True), at_once)
     written = build(results, page)
     printed = None
     if pdf:
@@ -51,11 +53,11 @@ def report(
     found = read(results / "checks.json")
     judged = [check.passed for check in found.checks if check.passed is not None]
     less = shortfall(found)
-    typer.echo(
+    say(
         f"{sum(judged)} of {len(judged)} checks passed, {len(found.checks) - len(judged)} reported"
         + (f" ({less})" if less else "")
     )
-    typer.echo(f"report: {written}")
+    say(f"report: {written}")
     if printed is not None:
-        typer.echo(f"PDF: {printed}")
-    typer.echo(written.as_uri())
+        say(f"PDF: {printed}")
+    say(written.as_uri())

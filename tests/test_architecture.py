@@ -62,7 +62,7 @@ RULES: dict[str, tuple[str, ...]] = {
     "bh": ("meshes", "bh"),  # the facade
     "fem": (*DESCRIPTION, "bh.paths"),  # the judge shares no mechanics with the judged
     "verification": ("meshes", "bh", "fem"),
-    "reports": ("meshes", "verification", "bh.plotting"),
+    "reports": ("meshes", "verification", "bh.plotting", "bh.runtime"),
 }
 # none of these knows a formulation by name
 DRIVERS = (

@@ -105,7 +105,8 @@ def _expressions(given: Given) -> list[object] | None:
 def _symbolic(what: str, items: list[object], u: Array, highest: int) -> Array:
     from sympy import Symbol, lambdify, sympify
 
-    expressions = [sympify(item) for item in items]
+    # strict: a text among them would be evaluated
+    expressions = [sympify(item, strict=True) for item in items]
     symbols = set().union(*(item.free_symbols for item in expressions))
     if len(symbols) != 1:
         names = ", ".join(sorted(map(str, symbols)))

@@ -18,6 +18,9 @@ try:
     from typing import TYPE_CHECKING, Annotated
 
     import typer
+
+    from bh.runtime.consent import take_options
+    from bh.runtime.terminal import say
 except KeyboardInterrupt:  # `main` tells of it from here on
     sys.stderr.write("bh: interrupted\n")
     raise SystemExit(130) from None
@@ -52,6 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in (words[: words.index("--")] if "--" in words else words)
     if debug:  # it may stand anywhere, also behind a command
         words.remove("--debug")
+    take_back = take_options(words)
     try:
         code = app(args=words, prog_name="bh", standalone_mode=False)
         if code == 130:  # what typer makes of a KeyboardInterrupt
@@ -66,6 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except Exception as error:
         return _explain(error, debug)
+    finally:
+        take_back()
 
 
 class _InterruptedError(Exception):
@@ -87,7 +93,7 @@ def _explain(error: Exception, debug: bool) -> int:
 def _fail(message: str, code: int, debug: bool) -> int:
     if debug:
         traceback.print_exc()
-    typer.echo("bh: " + " ".join(message.split()), err=True)
+    say("bh: " + " ".join(message.split()), err=True)
     return code
 
 
@@ -96,7 +102,7 @@ def _fail(message: str, code: int, debug: bool) -> int:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"bh {version('curved-crease-workbench')}")
+        say(f"bh {version('curved-crease-workbench')}")
         raise typer.Exit
 
 
@@ -108,11 +114,19 @@ def _options(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit."),
     ] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show where an error comes from.")] = False,
+    allow_plugins: Annotated[
+        bool,
+        typer.Option("--allow-plugins", help="Run code that files name (module:name); if you trust them."),
+    ] = False,
+    allow_outside: Annotated[
+        bool, typer.Option("--allow-outside", help="Read files that lie outside the folder of the scene.")
+    ] = False,
 ) -> None:
     """Bar-and-hinge simulation of sheets folded along curved creases."""
-    del show_version, debug  # the one has its own callback, `main` looks for the other
+    # the first has its own callback, `main` looks for the others, wherever they stand
+    del show_version, debug, allow_plugins, allow_outside
     if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+        say(context.get_help())
 
 
 @app.command()
@@ -146,7 +160,7 @@ def run(
             f"go on with: {again}" if holds_states(folder) else "nothing is kept"
         ) from None
     if before and not quiet:
-        typer.echo(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
+        say(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
     written = [folder / name for name in names]
     for name, write in extras(path, loaded, folder, pictures, vtu).items():
         try:
@@ -160,7 +174,7 @@ def run(
         _summary(path, loaded, written, contact)
     if path.reached and path.accuracy is not None and not path.accuracy.met:
         why = "; ".join(note for note in path.accuracy.notes if note.startswith("ended"))
-        typer.echo(
+        say(
             f"bh: {scene}: the accuracy that was asked for is not met: {path.accuracy}; {why}; "
             f"the path is in '{written[0]}'",
             err=True,
@@ -169,7 +183,7 @@ def run(
     if not path.reached:
         why = f" ({path.reason})" if path.reason else ""
         kept = "; the finished result of an earlier run is kept" if names == UNFINISHED else ""
-        typer.echo(
+        say(
             f"bh: {scene}: step {len(path.steps)} of {len(loaded.model.steps)} ended early: {path.outcome}{why}; "
             f"what was reached is in '{written[1]}'{kept}",
             err=True,
@@ -208,16 +222,16 @@ def view(
     import bh.plotting
 
     if vtu is not None:
-        typer.echo(f"wrote {bh.plotting.export_series(solved, vtu)}")
+        say(f"wrote {bh.plotting.export_series(solved, vtu)}")
     if picture is not None:
         bh.plotting.picture(solved[state], picture)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
     if animation is not None:
-        typer.echo(f"wrote {bh.plotting.animation(solved, animation)}")
+        say(f"wrote {bh.plotting.animation(solved, animation)}")
     if html is not None:
         import bh.plotting.interactive
 
-        typer.echo(f"wrote {bh.plotting.interactive.view(solved, title=path.name).save(html)}")
+        say(f"wrote {bh.plotting.interactive.view(solved, title=path.name).save(html)}")
     if picture is vtu is animation is html is None:
         try:
             bh.plotting.show(solved[state])
@@ -257,7 +271,7 @@ def export(
             done = write_flat(file, solved.model.mesh, facets)
         else:
             done = write_state(file, [solved[k] for k in range(last + 1)], source.stem)
-    typer.echo(f"wrote {done}")
+    say(f"wrote {done}")
 
 
 @app.command()
@@ -271,6 +285,7 @@ def init(
     """Write a commented example scene."""
     from bh.errors import InputError
     from bh.scene.example import example
+    from bh.scene.reading import is_inside
     from meshes.io.export import replacing
 
     if file.exists() and not force:
@@ -280,7 +295,8 @@ def init(
     text = example(drawing, file.parent)
     with replacing(file) as draft:
         draft.write_text(text, encoding="utf-8")
-    typer.echo(f"wrote {file}; next: bh check {shlex.quote(str(file))}")
+    outside = drawing is not None and not is_inside(file.parent, file.parent / drawing)
+    say(f"wrote {file}; next: bh check {shlex.quote(str(file))}{' --allow-outside' if outside else ''}")
 
 
 @app.command()
@@ -298,9 +314,9 @@ def check(
 
     loaded = load_scene(scene)
     for line in report(loaded):
-        typer.echo(line)
+        say(line)
     if not no_picture:
-        typer.echo(f"wrote {draw(loaded, picture or Path(f'{loaded.name}-check.png'))}")
+        say(f"wrote {draw(loaded, picture or Path(f'{loaded.name}-check.png'))}")
 
 
 @app.command()
@@ -322,7 +338,7 @@ def schema(
         return
     with replacing(output) as draft:
         draft.write_text(text, encoding="utf-8")
-    typer.echo(f"wrote {output}; name it in the first line of a scene: #:schema {output}")
+    say(f"wrote {output}; name it in the first line of a scene: #:schema {output}")
 
 
 @app.command()
@@ -331,7 +347,7 @@ def formulations() -> None:
     from bh.formulations.registry import names
 
     for name in names():
-        typer.echo(name)
+        say(name)
 
 
 def _add_commands() -> None:
@@ -373,37 +389,37 @@ def _summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contac
     from bh.formulations.registry import takes_nu
 
     energy, last = path[-1].energy, path[-1]
-    typer.echo(
+    say(
         f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
         f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
     )
     for remark in path.remarks[:6]:
-        typer.echo(remark)
+        say(remark)
     model = path.model
     if model.sheet.nu != 0.0 and not takes_nu(model.formulation):
-        typer.echo(f"{model.formulation} take Poisson's ratio as 0, not as nu = {model.sheet.nu:g}")
-    typer.echo(
+        say(f"{model.formulation} take Poisson's ratio as 0, not as nu = {model.sheet.nu:g}")
+    say(
         f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
         f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
     )
     creases = model.mesh.creases
     for crease in creases[:6]:
         a = last.fold_angle(crease)
-        typer.echo(
+        say(
             f"fold angle of {crease}: {a.mean():.4f} rad ({degrees(a.mean()):.1f} degrees), "
             f"{a.min():.4f} to {a.max():.4f}"
         )
     if len(creases) > 6:
-        typer.echo(f"and {len(creases) - 6} more creases")
+        say(f"and {len(creases) - 6} more creases")
     if contact is None:
-        typer.echo("self-contact: none")
+        say("self-contact: none")
     else:
-        typer.echo(f"self-contact (reported, not prevented), first in {contact}")
+        say(f"self-contact (reported, not prevented), first in {contact}")
     if path.accuracy is not None:
-        typer.echo(f"accuracy: {path.accuracy}")
+        say(f"accuracy: {path.accuracy}")
     if path.estimate_reason:
-        typer.echo(f"accuracy: no estimate: {path.estimate_reason}")
-    typer.echo("files: " + " ".join(str(file) for file in written))
+        say(f"accuracy: no estimate: {path.estimate_reason}")
+    say("files: " + " ".join(str(file) for file in written))
 
 
 if __name__ == "__main__":

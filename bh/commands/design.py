@@ -22,7 +22,8 @@ from bh.applications.inverse.simulate import Simulated, simulate
 from bh.applications.inverse.surrogate import Surrogate, read, shipped
 from bh.errors import InputError
 from bh.paths.provenance import versions
-from bh.scene.reading import Table, Vector, check_keys, one_line, read_table, read_toml
+from bh.runtime.terminal import say
+from bh.scene.reading import Table, Vector, check_keys, inside, one_line, read_table, read_toml
 from meshes import parallel_creases
 from meshes.curves import arc_lengths, interpolated
 from meshes.io import write_pattern
@@ -98,7 +99,9 @@ def solve(file: str | Path) -> Answer:
             raise DesignError("target is missing; add a table [target] with point, curve or move_tip")
         target = read_table(TargetTable, data["target"], "target")
         search = read_table(SearchTable, data.get("search", {}), "search")
-        surrogate = shipped() if search.data is None else read(file.parent / search.data)
+        surrogate = (
+            shipped() if search.data is None else read(inside(file.parent, search.data, "search.data"))
+        )
         if target.point is not None:
             return _point(target.point, search, surrogate)
         if target.curve is not None:
@@ -126,7 +129,7 @@ def _point(point: list[float], search: SearchTable, surrogate: Surrogate) -> Ans
 
 
 def _curve(name: str, search: SearchTable, folder: Path, surrogate: Surrogate) -> Answer:
-    curve = CURVES[name] if name in CURVES else read_curve(folder / name)
+    curve = CURVES[name] if name in CURVES else read_curve(inside(folder, name, "target.curve"))
     problem, top = fit_curve(curve, search.segments, seed=search.seed)[-1]
     design = problem.design(top.x)
     strip = simulate(*design.lists(), surrogate.setting)
@@ -283,12 +286,10 @@ def design(
     if not quiet:
         for row in answer.design.rows():
             state = "pinched" if row["pinched"] else "not pinched"
-            typer.echo(f"segment: k0 {row['k0']:+.6f} /mm, length {row['length']:.2f} mm, {state}")
+            say(f"segment: k0 {row['k0']:+.6f} /mm, length {row['length']:.2f} mm, {state}")
         for name, (value, unit) in answer.measure.items():
-            typer.echo(f"{name}: {value:.4g} {unit}")
+            say(f"{name}: {value:.4g} {unit}")
         turn = math.degrees(float(np.abs(answer.design.k0 * answer.design.length).sum()))
-        typer.echo(
-            f"total length {answer.design.total:.1f} mm, the flat crease turns by {turn:.0f} degrees in all"
-        )
-        typer.echo("files: " + " ".join(str(file) for file in files))
+        say(f"total length {answer.design.total:.1f} mm, the flat crease turns by {turn:.0f} degrees in all")
+        say("files: " + " ".join(str(file) for file in files))
     return 0

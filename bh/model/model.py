@@ -16,6 +16,7 @@ from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support
 from bh.model.until import Until
+from bh.runtime.consent import said
 from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
@@ -70,6 +71,8 @@ class Model:
                 raise ModelError(
                     f"a step of a model is a {type(step).__name__}; give bh.Step, or use model.step(...)"
                 )
+        if ":" in self.formulation:
+            said(self.formulation)
         if not isinstance(self.hinge_lock, bool):
             raise ModelError(f"hinge_lock = {self.hinge_lock!r} cannot be; give True or False")
 

@@ -15,11 +15,12 @@ from bh.errors import PathFileError
 from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
 from bh.model.model import Model
 from bh.model.pinch import Pinch
-from bh.model.plugins import named
+from bh.model.plugins import consent, from_file
 from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support
 from bh.model.until import Until
+from bh.runtime.consent import said
 from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
 
@@ -72,6 +73,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
 
     Raises:
         PathFileError: the data are of another version or incomplete.
+        ModelError: they name code that nobody has allowed to run.
     """
     if data.get("format") != FORMAT:
         raise PathFileError(
@@ -95,7 +97,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             supports=tuple(_constraint(s) for s in data["supports"]),
             steps=tuple(_stored_step(step) for step in data["steps"]),
             creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
-            formulation=data["formulation"],
+            formulation=_agreed(data["formulation"]),
             stiffness=ElementStiffness(arrays["stiffness/bars"], arrays["stiffness/hinges"], data["green"])
             if "stiffness/bars" in arrays
             else None,
@@ -122,11 +124,14 @@ def _plain(item: Any) -> dict[str, Any]:
 
 def _tagged(item: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
     """Fields and kind; a class of the user's own is "module:Class"."""
-    own = f"{type(item).__module__}:{type(item).__qualname__}"
-    return {"kind": next((name for name, cls in kinds.items() if type(item) is cls), own), **_plain(item)}
+    kind = next((name for name, cls in kinds.items() if type(item) is cls), None)
+    if kind is None:
+        kind = f"{type(item).__module__}:{type(item).__qualname__}"
+        said(kind)  # it is there as an object, so its name may be read again
+    return {"kind": kind, **_plain(item)}
 
 
-def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
+def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type], kind: type | None = None) -> Any:
     rest = {key: value for key, value in data.items() if key != "kind"}
     if data["kind"] == "polyline":
         rest["vertices"] = np.asarray(rest["vertices"])
@@ -136,7 +141,7 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type]) -> Any:
     if ":" not in data["kind"]:
         return kinds[data["kind"]](**rest)
     lists = {key: tuple(value) if isinstance(value, list) else value for key, value in rest.items()}
-    return named(data["kind"])(**lists)
+    return from_file(data["kind"], kind)(**lists)
 
 
 def _step(step: Step) -> dict[str, Any]:
@@ -147,8 +152,17 @@ def _step(step: Step) -> dict[str, Any]:
 
 
 def _stored_step(data: Mapping[str, Any]) -> Step:
+    if data["until"] is not None:
+        _agreed(data["until"]["observable"])
     until = None if data["until"] is None else Until(**data["until"])
-    return Step(tuple(_untagged(item, STEP_ITEMS) for item in data["actuations"]), until)
+    return Step(tuple(_untagged(item, STEP_ITEMS, Actuation) for item in data["actuations"]), until)
+
+
+def _agreed(name: str) -> str:
+    """A name from a file that may be one of the user's own code."""
+    if ":" in name:
+        consent(name)
+    return name
 
 
 def _support(item: Constraint) -> Any:
@@ -160,7 +174,7 @@ def _support(item: Constraint) -> Any:
 def _constraint(data: Any) -> Constraint:
     if data == "rigid-body":
         return RigidBody()
-    found: Constraint = _untagged(data, {}) if "kind" in data else Support(**data)
+    found: Constraint = _untagged(data, {}, Constraint) if "kind" in data else Support(**data)
     return found
 
 

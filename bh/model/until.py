@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
 from bh.errors import ModelError
+from bh.runtime.consent import said
 
 _OF_CREASE: Final = ("fold_angle", "largest_fold", "dihedral", "moment")
 _OF_PLACE: Final = tuple(f"{what}_{axis}" for what in ("reaction", "displacement") for axis in "xyz")
@@ -64,6 +65,8 @@ class Until:
             raise ModelError(
                 f"observable '{self.observable}' is not known; use one of {known}, or module:function"
             )
+        if ":" in self.observable:
+            said(self.observable)
         if not math.isfinite(self.value):
             raise ModelError(f"until {self.observable} = {self.value} cannot be; give a finite number")
         if not (math.isfinite(self.tolerance) and self.tolerance > 0.0):

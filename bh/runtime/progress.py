@@ -67,6 +67,10 @@ class Bar:
         """Say what is solved from here on, such as one of several meshes."""
         self._stage, self._step = f"{words}: ", -1
 
+    def note(self, words: str) -> None:
+        """Print a line of its own, above the bar if there is one."""
+        self._progress.console.print(words, markup=False, highlight=False, soft_wrap=True)
+
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
         """Move the bar, or print a line where there is no terminal."""
         new = step != self._step
@@ -112,6 +116,13 @@ class Bar:
 def stage(report: ProgressMeter, words: str) -> None:
     """Tell a meter what is solved from here on, if it has a method `stage` for that."""
     tell = getattr(report, "stage", None)
+    if tell is not None:
+        tell(words)
+
+
+def note(report: ProgressMeter, words: str) -> None:
+    """Tell a meter something in words, if it has a method `note` for that."""
+    tell = getattr(report, "note", None)
     if tell is not None:
         tell(words)
 

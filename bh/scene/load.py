@@ -16,7 +16,7 @@ from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
 from bh.model.actuations import Displace, Force
 from bh.model.model import Model
-from bh.model.plugins import made
+from bh.model.plugins import consent, made
 from bh.model.refinement import Goal
 from bh.model.serialise import ACTUATIONS as MAKERS
 from bh.model.sheet import CreaseLaw, Sheet
@@ -232,6 +232,9 @@ def _formulation(name: str) -> str:
         raise SceneError(
             f"model.formulation = {shown(name)} is not known{nearest(name, known)}; use one of {listed}"
         )
+    if ":" in name:
+        with within("model.formulation"):
+            consent(name)
     return name
 
 
@@ -288,6 +291,8 @@ def _until(item: object, at: str) -> Until:
             return Until("depth", table.depth, tolerance=table.tolerance)
         assert table.observable is not None
         assert table.value is not None
+        if ":" in table.observable:
+            consent(table.observable)
         return Until(table.observable, table.value, table.of, table.tolerance)
 
 

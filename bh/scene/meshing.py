@@ -9,7 +9,7 @@ import numpy as np
 from bh.errors import SceneError
 from bh.model.plugins import made
 from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
-from bh.scene.reading import as_table, nearest, read_table, shown, within, without
+from bh.scene.reading import as_table, inside, nearest, read_table, shown, within, without
 from bh.scene.tables import DrawnTable, GmshTable, MeshTable
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.choices import first_mesh
@@ -104,8 +104,9 @@ def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path) -> She
         raise SceneError(f"mesh: {name} brings its own faces, and they are the mesh; remove [mesh]")
     from meshes.io import read_fold
 
+    place = inside(folder, stored.file, "pattern.file")
     with within("pattern.file"):
-        return read_fold(folder / stored.file, stored.frame)
+        return read_fold(place, stored.frame)
 
 
 def _mesh_from_drawing(table: DrawingPattern, mesh: object, folder: Path) -> SheetMesh:
@@ -119,14 +120,15 @@ def _mesh_from_drawing(table: DrawingPattern, mesh: object, folder: Path) -> She
         "gap": table.gap,
         "lines": table.lines,
     }
+    place = inside(folder, table.file, "pattern.file")
     if mesh is None:
         with within("pattern.file"):
-            return first_mesh(read_pattern(folder / table.file, **options))
+            return first_mesh(read_pattern(place, **options))
     how = _mesh_table(as_table(mesh, "mesh"))
     with within("pattern.file"):
         if isinstance(how, DrawnTable):
-            return read_drawn(folder / table.file, **options)
-        drawn = read_pattern(folder / table.file, **options)
+            return read_drawn(place, **options)
+        drawn = read_pattern(place, **options)
     return _meshed(drawn, how)
 
 

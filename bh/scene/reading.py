@@ -7,11 +7,13 @@ import math
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bh.errors import InputError, SceneError
+from bh.runtime.consent import outside_allowed
 from meshes.pattern import FoldKind
 
 LONGEST, SHORTEST = 1e6, 1e-6  # mm; beyond, sampling a curve to a thousandth of a millimetre loses its sense
@@ -205,6 +207,34 @@ def one_line(text: str) -> str:
     words = " ".join(text.split())
     clean = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
     return clean if len(clean) <= 600 else clean[:596] + " ..."
+
+
+def is_inside(folder: Path, place: Path) -> bool:
+    """Whether a file lies below a folder, symbolic links followed."""
+    try:
+        return place.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # a loop of links, a null character: told where it is opened
+        return True
+
+
+def inside(folder: Path, name: str, at: str) -> Path:
+    """The place of a file that a file names: below the folder of the one that names it, unless the user said otherwise.
+
+    Args:
+        folder: of the file that names it.
+        name: as it stands there.
+        at: dotted path of the key.
+
+    Raises:
+        SceneError: it lies outside, directly or by a symbolic link.
+    """
+    place = folder / name
+    if not outside_allowed() and not is_inside(folder, place):
+        raise SceneError(
+            f"{at} = {shown(name)} lies outside the folder of the file that names it; copy it there, or add "
+            "--allow-outside (BH_ALLOW_OUTSIDE=1, or bh.allow_outside() in Python)"
+        )
+    return place
 
 
 def without(table: dict[str, object], key: str) -> dict[str, object]:

@@ -10,15 +10,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.branching import NO_BRANCH, Branch, onto_stable_branch
 from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point, power_rate
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import count_negative
-from bh.solvers.newton import Newton, Solution
+from bh.solvers.newton import INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
 from bh.solvers.stability import leave_saddle, locate
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
+LOOK = 2  # cuts of an increment before a bifurcation is looked for
+SHORT = 80  # iterations of globalised Newton before that
 AtBifurcation = Literal["stable", "primary", "stop"]
 
 
@@ -32,6 +35,7 @@ class _Trial:
     objection: str
     note: str
     iterations: int
+    branch: Branch = NO_BRANCH
 
     @property
     def failure(self) -> Outcome:
@@ -108,7 +112,7 @@ class LoadControl:
         first, largest = self.limits(system)
         step = first if increment is None else increment
         cuts: list[str] = []
-        iterations = 0
+        iterations, looked = 0, False
         while points[-1].lam < 1.0:
             here = points[-1]
             left = 1.0 - here.lam
@@ -123,8 +127,16 @@ class LoadControl:
                 return
             alone = len(points) == 1
             brisk = lam - here.lam > 0.5 * self.cautious(system) if alone else len(cuts) < self.brisk
-            tried = self._try(system, points, lam, brisk)
+            look = self.at_bifurcation == "stable" and len(cuts) >= LOOK and not looked
+            tried = self._try(system, points, lam, brisk, look)
             iterations += tried.iterations
+            looked = looked or bool(tried.branch.critical)
+            if tried.branch.points:
+                yield from tried.branch.increments(tuple(cuts), iterations)
+                points, looked = list(tried.branch.points[-3:]), False
+                step = max(2.0 * self.smallest, points[-1].lam - tried.branch.critical[0].lam)
+                cuts, iterations = [], 0
+                continue
             imbalance = tried.solution.evaluation.imbalance
             if tried.objection:
                 cuts.append(f"lambda {lam:.6g}: {tried.objection}")
@@ -158,21 +170,36 @@ class LoadControl:
                 tried.point, Outcome.REACHED, iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note),
                 critical,
             )  # fmt: skip
-            cuts, iterations = [], 0
+            cuts, iterations, looked = [], 0, False
 
-    def _try(self, system: System, points: Sequence[Point], lam: float, brisk: bool) -> _Trial:
+    def _try(self, system: System, points: Sequence[Point], lam: float, brisk: bool, look: bool) -> _Trial:
         """One solve at `lam`, from the branch's stable side if it is unstable there, and what is to be said against it.
 
-        A shorter increment is a cheaper remedy than globalised Newton, so that is left out where `brisk`.
+        A shorter increment is a cheaper remedy than globalised Newton, so that is left out where `brisk`. Where `look`,
+        a branch that is lost for an indefinite tangent is looked for behind a bifurcation first.
         """
         here = points[-1]
         newton = replace(self.newton, unstable=self.at_bifurcation != "stable")
-        method = replace(newton, globalised=0, hasty=True) if brisk else newton
+        method = replace(newton, globalised=0, hasty=True) if brisk or look else newton
         q, forces = extrapolate(points, lam)
         primary = found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
-        iterations, note = found.iterations, ""
+        iterations, note, branch = found.iterations, "", NO_BRANCH
+        downhill = look and not brisk and not found.converged
+        if downhill:
+            short = min(SHORT, newton.globalised)
+            primary = found = replace(newton, full=0, globalised=short, transient=None).solve(system, q, lam)
+            iterations += found.iterations
+        # with one state only the increments are still large, and cutting them costs less than looking
+        if look and (not found.converged if downhill else _lost(found) and len(points) > 1):
+            branch = onto_stable_branch(system, here, lam, self.newton)
+            iterations += branch.iterations
+            if branch.points:
+                return _Trial(here, found, primary, "", "", iterations, branch)
+        if downhill and not found.converged:
+            primary = found = replace(newton, full=0).solve(system, found.q, lam)
+            iterations += found.iterations
         if not found.converged:  # it may hold anything; nothing is asked of it
-            return _Trial(here, found, primary, found.reason, "", iterations)
+            return _Trial(here, found, primary, found.reason, "", iterations, branch)
         there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
         objection = self._jump(system, here, there)
         if not objection and not found.stable and self.at_bifurcation == "stable":
@@ -181,7 +208,7 @@ class LoadControl:
             there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
             # the stable state may be far, but not on the other side of a closed hinge
             objection = system.penetration(here.q, here.lam, there.q, lam) if note else found.reason
-        return _Trial(there, found, primary, objection, note, iterations)
+        return _Trial(there, found, primary, objection, note, iterations, branch)
 
     def _critical(
         self, system: System, here: Point, found: Solution, lam: float
@@ -245,3 +272,8 @@ class LoadControl:
             if not abs(gained - work) <= most:  # nor if the slopes are not known
                 return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
         return ""
+
+
+def _lost(found: Solution) -> bool:
+    """Whether a branch has no stable state where Newton's method went."""
+    return found.reason == INDEFINITE or found.stable is False

@@ -42,7 +42,10 @@ def dissect(indptr: Ints, indices: Ints, places: Array | None = None) -> Dissect
     keys = _graph_keys(indptr, indices)
     if places is not None and len(places):
         keys = np.column_stack((_lines(places), keys))
-    order, start, parent = _dissect(indptr, indices, np.ascontiguousarray(keys), LEAF)
+    # every set keeps the order of all its vertices along every key, so that nothing is sorted again
+    ranks = np.ascontiguousarray(np.argsort(keys, axis=0, kind="stable").T)
+    order = np.arange(len(keys))
+    start, parent = _dissect(order, indptr, indices, np.ascontiguousarray(keys), ranks, LEAF)
     return Dissection(order, start, parent)
 
 
@@ -54,42 +57,49 @@ def _lines(places: Array) -> Array:
     return np.asarray((centred @ axes) @ np.vstack((np.cos(angles), np.sin(angles)))[: axes.shape[1]])
 
 
-@njit(cache=True, nogil=True)
-def _dissect(indptr, indices, keys, leaf):  # type: ignore[no-untyped-def]
-    count = len(indptr) - 1
-    order = np.arange(count)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _dissect(order, indptr, indices, keys, ranks, leaf):  # type: ignore[no-untyped-def]
+    """First place and parent of every front; sorts `order` (v,), overwrites `ranks` (k, v), vertices by every key.
+
+    Compiled code copies no slices and sorts nothing: those would take longer to compile than all the rest.
+    """
+    count = len(order)
     side = np.full(count, -1, dtype=np.int8)  # -1 outside the set, 0 and 1 its halves, 2 the separator
     best = np.empty(count, dtype=np.int8)
     most = 2 * count + 2
     own_start, own_end, parents = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
     stack = np.empty((128, 3), np.int64)
-    stack[0] = 0, count, -1
+    stack[0, 0], stack[0, 1], stack[0, 2] = 0, count, -1
+    room, ends, at = np.empty(count, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
     depth, fronts = 1, 0
     while depth > 0:
         depth -= 1
-        lo, hi, parent = stack[depth]
+        lo, hi, parent = stack[depth, 0], stack[depth, 1], stack[depth, 2]
         here = fronts
         fronts += 1
         parents[here], own_end[here] = parent, hi
         if hi - lo <= leaf:
             own_start[here] = lo
             continue
-        members = order[lo:hi].copy()
-        _best_cut(members, indptr, indices, keys, side, best)
-        ends = np.zeros(3, dtype=np.int64)
-        for i in range(len(members)):
-            ends[best[members[i]]] += 1
-            side[members[i]] = -1
-        at = np.array([lo, lo + ends[0], lo + ends[0] + ends[1]])
-        own_start[here] = at[2]
+        _best_cut(lo, hi, indptr, indices, keys, ranks, side, best)
+        ends[0] = ends[1] = ends[2] = 0
+        for i in range(lo, hi):
+            ends[best[order[i]]] += 1
+            side[order[i]] = -1
+        own_start[here] = lo + ends[0] + ends[1]
         # the larger half on top: it is done first, and the other's update waits less
-        stack[depth] = at[0], at[1], here
-        stack[depth + 1] = at[1], at[2], here
+        stack[depth, 0], stack[depth, 1], stack[depth, 2] = lo, lo + ends[0], here
+        stack[depth + 1, 0], stack[depth + 1, 1], stack[depth + 1, 2] = lo + ends[0], own_start[here], here
         depth += 2
-        for i in range(len(members)):
-            half = best[members[i]]
-            order[at[half]] = members[i]
-            at[half] += 1
+        for row in range(-1, len(ranks)):
+            sorted_set = order if row < 0 else ranks[row]
+            at[0], at[1], at[2] = lo, lo + ends[0], own_start[here]
+            for i in range(lo, hi):
+                room[i] = sorted_set[i]
+            for i in range(lo, hi):
+                half = best[room[i]]
+                sorted_set[at[half]] = room[i]
+                at[half] += 1
     # parents were numbered before children, right halves before left ones: backwards it is a postorder
     start, parent_of = np.empty(fronts + 1, np.int64), np.empty(fronts, np.int64)
     for k in range(fronts):
@@ -97,36 +107,36 @@ def _dissect(indptr, indices, keys, leaf):  # type: ignore[no-untyped-def]
         before = parents[fronts - 1 - k]
         parent_of[k] = fronts - 1 - before if before >= 0 else -1
     start[fronts] = count
-    return order, start, parent_of
+    return start, parent_of
 
 
-@njit(cache=True, nogil=True)
-def _gap(key, ranks):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gap(keys, ranks, direction, lo, hi):  # type: ignore[no-untyped-def]
     """Where to cut so that the halves are most alike but rows of equal keys are not torn, if that can be."""
-    middle = len(ranks) // 2
-    tie = 1e-6 * (key[ranks[-1]] - key[ranks[0]])
-    for away in range(len(ranks) // 6 + 1):
-        for half in (middle - away, middle + away):
-            if key[ranks[half]] - key[ranks[half - 1]] > tie:
+    count = hi - lo
+    middle = lo + count // 2
+    tie = 1e-6 * (keys[ranks[direction, hi - 1], direction] - keys[ranks[direction, lo], direction])
+    for away in range(count // 6 + 1):
+        for after in range(2):
+            half = middle + away if after else middle - away
+            step = keys[ranks[direction, half], direction] - keys[ranks[direction, half - 1], direction]
+            if step > tie:
                 return half
     return middle
 
 
-@njit(cache=True, nogil=True)
-def _best_cut(members, indptr, indices, keys, side, best):  # type: ignore[no-untyped-def]
-    """Writes 0, 1 (halves) or 2 (separator) into `best` for all members, for the direction of fewest separators."""
-    fewest = len(members) + 1
-    key = np.empty(len(members))
+@njit(cache=True, nogil=True, error_model="numpy")
+def _best_cut(lo, hi, indptr, indices, keys, ranks, side, best):  # type: ignore[no-untyped-def]
+    """Writes 0, 1 (halves) or 2 (separator) into `best` for the set at lo:hi, by the cut of fewest separators."""
+    fewest = hi - lo + 1
+    touching = np.empty(2, np.int64)
     for direction in range(keys.shape[1]):
-        for i in range(len(members)):
-            key[i] = keys[members[i], direction]
-        ranks = np.argsort(key, kind="mergesort")
-        half = _gap(key, ranks)
-        for i in range(len(members)):
-            side[members[ranks[i]]] = 0 if i < half else 1
-        touching = np.zeros(2, np.int64)
-        for i in range(len(members)):
-            v = members[i]
+        half = _gap(keys, ranks, direction, lo, hi)
+        for i in range(lo, hi):
+            side[ranks[direction, i]] = 0 if i < half else 1
+        touching[0] = touching[1] = 0
+        for i in range(lo, hi):
+            v = ranks[0, i]
             for e in range(indptr[v], indptr[v + 1]):
                 if side[indices[e]] == 1 - side[v]:
                     touching[side[v]] += 1
@@ -135,8 +145,8 @@ def _best_cut(members, indptr, indices, keys, side, best):  # type: ignore[no-un
         if touching[lesser] >= fewest:
             continue
         fewest = touching[lesser]
-        for i in range(len(members)):
-            v = members[i]
+        for i in range(lo, hi):
+            v = ranks[0, i]
             best[v] = side[v]
             if side[v] == lesser:
                 for e in range(indptr[v], indptr[v + 1]):
@@ -145,7 +155,7 @@ def _best_cut(members, indptr, indices, keys, side, best):  # type: ignore[no-un
                         break
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _distances(indptr, indices, source):  # type: ignore[no-untyped-def]
     """Edges from `source` to every vertex; -1 where there is no way."""
     distance = np.full(len(indptr) - 1, -1, dtype=np.int64)

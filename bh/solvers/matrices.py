@@ -87,7 +87,7 @@ class BandFactor(Factor):
         return unpermuted(x, self.order)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def band_ldl(ab):  # type: ignore[no-untyped-def]
     """L D L^T of a symmetric band in place (unit L below, D in the first row), without pivoting.
 

@@ -17,6 +17,7 @@ from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
+INDEFINITE = "indefinite tangent"  # why full Newton gave up
 NEAR_SADDLE = 1e-3  # imbalance below which an indefinite tangent is that of a saddle
 
 
@@ -109,7 +110,7 @@ class Newton:
             tangent = system.tangent(q, lam, forces)
             factor = self._full_factor(tangent.matrix)
             if factor is None:
-                return Solution(q, now, iteration, False, "indefinite tangent")
+                return Solution(q, now, iteration, False, INDEFINITE)
             dq = -factor.solve(now.residual)
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, globalised=False)

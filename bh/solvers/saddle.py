@@ -22,7 +22,7 @@ MOST_BRISK = (
 MOST_DENSE = 1500  # constraints whose Schur complement is still formed as a dense matrix
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _times(values, columns, x, out):  # type: ignore[no-untyped-def]
     for i in range(len(values)):
         total = 0.0
@@ -32,7 +32,7 @@ def _times(values, columns, x, out):  # type: ignore[no-untyped-def]
         out[i] = total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _transpose_times(values, columns, y, out):  # type: ignore[no-untyped-def]
     for i in range(len(values)):
         for j in range(values.shape[1]):

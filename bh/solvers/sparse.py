@@ -77,9 +77,9 @@ class SparsePattern:
         graph = both.indptr.astype(np.int64), both.indices.astype(np.int64)
         tree = dissect(*graph, places)
         first = np.concatenate(([0], np.cumsum(sizes[tree.order])))
-        place = np.empty(count, dtype=np.int64)
-        place[tree.order] = np.arange(count)
-        indptr, indices = _lower(*graph, tree.order, place, first)
+        later = both[tree.order][:, tree.order]
+        later.sort_indices()
+        indptr, indices = _lower(later.indptr.astype(np.int64), later.indices.astype(np.int64), first)
         return cls(unknowns(tree.order), indptr, indices, tree, graph, first), tree.order
 
     @cached_property
@@ -181,7 +181,7 @@ class MultifrontalFactor(SignedFactor):
         return unpermuted(multifrontal.solve(self.L, self.pattern.fronts, b[order]), order)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _multiply(indptr, indices, data, x, out):  # type: ignore[no-untyped-def]
     for j in range(len(x)):
         at = indptr[j]
@@ -193,30 +193,29 @@ def _multiply(indptr, indices, data, x, out):  # type: ignore[no-untyped-def]
         out[j] += total
 
 
-@njit(cache=True, nogil=True)
-def _lower(indptr, indices, order, place, first):  # type: ignore[no-untyped-def]
-    """Compressed columns of the lower triangle, unknown by unknown, of a graph of nodes."""
-    n = first[len(order)]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _lower(indptr, indices, first):  # type: ignore[no-untyped-def]
+    """Compressed columns of the lower triangle, unknown by unknown, of a graph of places with ascending neighbours."""
+    count = len(first) - 1
+    n = first[count]
     starts = np.zeros(n + 1, dtype=np.int32)
-    for p in range(len(order)):
-        v = order[p]
+    for p in range(count):
         rows = 0
-        for e in range(indptr[v], indptr[v + 1]):
-            q = place[indices[e]]
+        for e in range(indptr[p], indptr[p + 1]):
+            q = indices[e]
             if q > p:
                 rows += first[q + 1] - first[q]
         for c in range(first[p], first[p + 1]):
             starts[c + 1] = starts[c] + first[p + 1] - c + rows
     found = np.empty(starts[n], dtype=np.int32)
-    for p in range(len(order)):
-        v = order[p]
-        later = np.sort(place[indices[indptr[v] : indptr[v + 1]]])
+    for p in range(count):
         for c in range(first[p], first[p + 1]):
             at = starts[c]
             for r in range(c, first[p + 1]):
                 found[at] = r
                 at += 1
-            for q in later:
+            for e in range(indptr[p], indptr[p + 1]):
+                q = indices[e]
                 if q > p:
                     for r in range(first[q], first[q + 1]):
                         found[at] = r

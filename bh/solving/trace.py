@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from bh.errors import ModelError
 from bh.model.model import Model
 from bh.paths.path import Path
+from bh.runtime.compiling import compilation_told
 from bh.runtime.progress import ProgressMeter, meter
 from bh.solvers.trace import Strategy
 from bh.solving.follow import follow
@@ -61,22 +62,29 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
         raise ModelError(f"trace takes a model, not a {type(model).__name__}; {what}")
     if not model.steps:
         raise ModelError("the model has no steps; add one, for example model.fold('crease', to=1.57)")
-    if accuracy is not None:
-        if after is not None or (resume and file is None):
-            raise ModelError(
-                "a run to a wanted accuracy begins anew on every mesh; leave out after, and resume it with its file"
-            )
-        return _to_accuracy(model, accuracy, symmetry, progress, strategy, file, resume)
+    if accuracy is not None and (after is not None or (resume and file is None)):
+        raise ModelError(
+            "a run to a wanted accuracy begins anew on every mesh; leave out after, and resume it with its file"
+        )
     report = meter(progress)
-    path = follow(
-        model, symmetry=symmetry, progress=report, strategy=strategy, file=file, resume=resume, after=after
-    )
-    if estimate and path.accuracy is None:
-        from bh.solving.given_mesh import add_estimate
+    with compilation_told(report):
+        if accuracy is not None:
+            return _to_accuracy(model, accuracy, symmetry, report, strategy, file, resume)
+        path = follow(
+            model,
+            symmetry=symmetry,
+            progress=report,
+            strategy=strategy,
+            file=file,
+            resume=resume,
+            after=after,
+        )
+        if estimate and path.accuracy is None:
+            from bh.solving.given_mesh import add_estimate
 
-        add_estimate(path, progress=report, strategy=strategy, symmetry=symmetry)
-        if file is not None:
-            path.save_accuracy(file)
+            add_estimate(path, progress=report, strategy=strategy, symmetry=symmetry)
+            if file is not None:
+                path.save_accuracy(file)
     return path
 
 
@@ -84,7 +92,7 @@ def _to_accuracy(
     model: Model,
     accuracy: float | Goal,
     symmetry: Plane | None,
-    progress: bool | ProgressMeter,
+    report: ProgressMeter,
     strategy: Strategy | None,
     file: str | FilePath | None,
     resume: bool,
@@ -96,7 +104,7 @@ def _to_accuracy(
 
     goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
     levels = None if file is None else Levels(file, resume)
-    path = solve(model, goal, progress=progress, strategy=strategy, symmetry=symmetry, levels=levels)
+    path = solve(model, goal, progress=report, strategy=strategy, symmetry=symmetry, levels=levels)
     if file is not None:
         path.save(file)
     return path

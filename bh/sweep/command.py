@@ -12,6 +12,7 @@ import typer
 
 import bh.sweep
 from bh.errors import InputError
+from bh.runtime.terminal import say
 from bh.solvers.outcome import Outcome
 from bh.sweep.pools import Pool
 
@@ -68,19 +69,17 @@ def sweep(
             )
     except KeyboardInterrupt:
         again = shlex.join(["bh", "sweep", str(file), "-o", str(place), "--resume"])
-        typer.echo(f"bh: interrupted; what is finished is kept, go on with: {again}", err=True)
+        say(f"bh: interrupted; what is finished is kept, go on with: {again}", err=True)
         return 130
     outcomes = data["outcome"].values.ravel().tolist()
     failed = [outcome for outcome in outcomes if outcome != Outcome.REACHED]
     if not quiet:
-        typer.echo(
+        say(
             f"{asked.name}: {len(outcomes) - len(failed):,} of {len(outcomes):,} points reached; wrote {place}"
         )
     if failed:
         kinds = ", ".join(f"{failed.count(kind):,} {kind}" for kind in dict.fromkeys(failed))
-        typer.echo(
-            f"bh: {file}: {len(failed):,} points have no values ({kinds}); see 'reason' in {place}", err=True
-        )
+        say(f"bh: {file}: {len(failed):,} points have no values ({kinds}); see 'reason' in {place}", err=True)
         return 1
     return 0
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from bh.errors import InputError
-from bh.scene.reading import Table, as_table, check_keys, one_line, read_table, read_toml
+from bh.scene.reading import Table, as_table, check_keys, inside, one_line, read_table, read_toml
 from bh.sweep import SceneTask, scene
 from bh.sweep.dataset import Label
 from bh.sweep.points import Points, SweepError, Value, grid, read_csv
@@ -123,14 +123,14 @@ def _sweep(data: dict[str, object], file: Path) -> Sweep:
         labels = {n: Label(a.unit, ", ".join(_listed(a.key))) for n, a in axes.items()}
     else:
         sample = read_table(SampleTable, data["table"], "table")
-        points, keys = read_csv(file.parent / sample.file), dict(sample.keys)
+        points, keys = read_csv(inside(file.parent, sample.file, "table.file")), dict(sample.keys)
         missing = [name for name in points.names if name not in keys]
         if missing or len(keys) > len(points.names):
             wrong = missing or [name for name in keys if name not in points.names]
             raise SweepError(
                 f"table.keys and the columns of '{sample.file}' do not fit: look at {', '.join(wrong)}"
             )
-    task = scene(file.parent / file_of_scene, keys, measure.places, measure.shape)
+    task = scene(inside(file.parent, file_of_scene, "scene"), keys, measure.places, measure.shape)
     return Sweep(task, points, labels, file.stem)
 
 

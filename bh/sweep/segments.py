@@ -17,6 +17,7 @@ import typer
 from bh.applications.inverse.segments import Domain, beyond, grid
 from bh.applications.inverse.simulate import SETTING, SegmentTask, Setting
 from bh.applications.inverse.surrogate import FORMAT, Surrogate
+from bh.runtime.terminal import say
 from bh.solvers.outcome import Outcome
 from bh.sweep import Label, Points, run, table
 from bh.sweep.pools import Pool
@@ -155,5 +156,5 @@ def segments(
 
     data = build(output, replace(SETTING, zone=zone), pool=workers, resume=resume, progress=True)
     failed = int((data["outcome"] != Outcome.REACHED).sum())
-    typer.echo(f"{data.sizes['point'] - failed:,} of {data.sizes['point']:,} segments; wrote {output}")
+    say(f"{data.sizes['point'] - failed:,} of {data.sizes['point']:,} segments; wrote {output}")
     return 1 if failed else 0

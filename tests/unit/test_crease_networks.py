@@ -108,7 +108,9 @@ def test_springs_of_a_folded_sheet_begin_at_its_angles():
     mesh = meshes.SheetMesh(
         points, triangles, {"crease:ridge": np.array([(2, 3)])}, folds={"ridge": "mountain"}
     )
-    angles = [hinge_geometry(np.array(mesh.points), hinge, np.empty(12))[0] for hinge in mesh.topology.hinges]
+    angles = [
+        hinge_geometry(np.array(mesh.points), *hinge, np.empty(12))[0] for hinge in mesh.topology.hinges
+    ]
     assert dihedral_angles(mesh.points, mesh.topology.hinges) == pytest.approx(np.array(angles), abs=1e-14)
     path = bh.trace(bh.Model(mesh, SHEET).fold("ridge", by=0.8, Lstar=10.0))
     assert path.outcome == "reached"

@@ -112,7 +112,8 @@ class TestInit:
         with pytest.raises(InputError, match="no drawing"):
             example(Path("scene.toml"), here)
 
-    def test_from_another_folder(self, here: Any) -> None:
+    def test_from_another_folder(self, here: Any, monkeypatch: Any) -> None:
+        monkeypatch.setenv("BH_ALLOW_OUTSIDE", "1")  # as the command that is printed says
         (here / "scenes").mkdir()
         assert main(["init", "scenes/wave.toml", "--drawing", "wave.svg"]) == 0
         assert load_scene(here / "scenes" / "wave.toml").model.mesh.kind == "staggered"

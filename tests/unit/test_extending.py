@@ -38,6 +38,7 @@ def write_page(folder: FilePath, text: str = PAGE) -> FilePath:
 def mine(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     write_page(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("BH_ALLOW_PLUGINS", "mine,mime,math")
     invalidate_caches()
     yield import_module("mine")
     sys.modules.pop("mine", None)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bh.runtime.terminal import say
 from bh.solvers.outcome import Outcome
 
 
@@ -33,23 +34,21 @@ def verify(
 
     if listing:
         for name in CASES:
-            typer.echo(name)
+            say(name)
         for name in LONG_CASES:
-            typer.echo(f"{name}: takes minutes, runs only when named")
+            say(f"{name}: takes minutes, runs only when named")
         return
-    data = run(
-        with_parts(cases) if cases else None, results, quick, lambda text: typer.echo(text, err=True), jobs
-    )
+    data = run(with_parts(cases) if cases else None, results, quick, lambda text: say(text, err=True), jobs)
     if json is not None:
         write_json(json, {"checks": data["checks"], "versions": data["versions"]})
     failed = [check for check in data["checks"] if check["passed"] is False]
     for check in failed:
-        typer.echo(
+        say(
             f"failed: {check['case']} {check['quantity']} {check['params']} = "
             f"{check['value'] if check['outcome'] == Outcome.REACHED else check['outcome']}",
             err=True,
         )
     judged = sum(check["passed"] is not None for check in data["checks"])
-    typer.echo(f"{judged - len(failed)} of {judged} checks passed, {len(data['checks']) - judged} reported")
+    say(f"{judged - len(failed)} of {judged} checks passed, {len(data['checks']) - judged} reported")
     if failed:
         raise typer.Exit(1)

@@ -28,10 +28,17 @@ from bh.mechanics.shared.hinge_lock import in_zone
 from bh.mechanics.shared.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
 
 NONE, OWN, TURN = 0, 1, 2
-FOUR = np.arange(4)
 
 
 # ------------------------------------------------------------------------------------------- bending
+
+
+@njit(**OPTIONS)
+def _clear(matrix):  # type: ignore[no-untyped-def]
+    """Set all entries to zero; an assignment to a slice takes longer to compile."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            matrix[i, j] = 0.0
 
 
 @njit(**OPTIONS)
@@ -42,7 +49,7 @@ def _turn_geometry(x, quad, ghost, xl, g):  # type: ignore[no-untyped-def]
             xl[p, i] = x[quad[p], i]
     for i in range(3):
         xl[3, i] += ghost[i]
-    return hinge_geometry(xl, FOUR, g)
+    return hinge_geometry(xl, np.int64(0), np.int64(1), np.int64(2), np.int64(3), g)
 
 
 @njit(**OPTIONS)
@@ -145,9 +152,10 @@ def bending_tangent(  # type: ignore[no-untyped-def]
     xl, g = np.empty((4, 3)), np.empty(12)
     for c in range(len(kind)):
         n = width[c]
-        H[:, :] = 0.0
+        _clear(H)
         for a in range(angles):
-            G[a, :n] = 0.0
+            for i in range(n):
+                G[a, i] = 0.0
             if kind[c, a] == OWN:
                 G[a, column[c, a]] = 1.0
             elif kind[c, a] == TURN:
@@ -158,11 +166,12 @@ def bending_tangent(  # type: ignore[no-untyped-def]
                         G[a, 3 * place[c, a, p] + i] += g[3 * p + i]
                 if rotation[c, a] >= 0:
                     G[a, column[c, a]] = -1.0
-                small[:, :] = 0.0
+                _clear(small)
                 add_hinge_hessian(geometry, M[c, a], small)
                 _add_placed(H, small, place[c, a])
         for a in range(angles):
-            W[a, :n] = 0.0
+            for i in range(n):
+                W[a, i] = 0.0
             for b in range(angles):
                 for j in range(n):
                     W[a, j] += B[c, a, b] * G[b, j]
@@ -210,7 +219,7 @@ def spring_forces(x, alpha, hinges, stiffness, rest, couple, rotation, f, r, S, 
     g = np.empty(12)
     energy, size, closing = 0.0, 0.0, False
     for h in range(len(hinges)):
-        geometry = hinge_geometry(x, hinges[h], g)
+        geometry = hinge_geometry(x, hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3], g)
         closing = closing or in_zone(geometry[0])
         turn = geometry[0] - alpha[rotation[h, 0]] - alpha[rotation[h, 1]] - rest[h]
         s = stiffness[h] * turn + couple[h]
@@ -231,9 +240,9 @@ def _spring_matrix(x, hinge, stiffness, s, H, small, g):  # type: ignore[no-unty
 
     Returns whether it is about to close.
     """
-    H[:, :] = 0.0
-    small[:, :] = 0.0
-    geometry = hinge_geometry(x, hinge, g)
+    _clear(H)
+    _clear(small)
+    geometry = hinge_geometry(x, hinge[0], hinge[1], hinge[2], hinge[3], g)
     add_hinge_hessian(geometry, s, small)
     for p in range(12):
         for q in range(p + 1):
@@ -252,7 +261,7 @@ def spring_tangent(x, hinges, stiffness, S, nodes, frame_of, frames, slots, data
         closing = _spring_matrix(x, hinges[h], stiffness[h], S[h], H, small, g) or closing
         if len(frames) > 0:
             rotate(H, nodes[h], frame_of, frames)
-        add_lower(H, 14, slots[h], data)
+        add_lower(H, np.int64(14), slots[h], data)
     return closing
 
 
@@ -261,7 +270,7 @@ def spring_rates(x, v, w, hinges, stiffness, rest_rate, couple_rate, rotation, o
     """Rates of the spring moments and of their turns (h,)."""
     g = np.empty(12)
     for h in range(len(hinges)):
-        hinge_geometry(x, hinges[h], g)
+        hinge_geometry(x, hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3], g)
         turn = -w[rotation[h, 0]] - w[rotation[h, 1]] - rest_rate[h]
         for p in range(4):
             for i in range(3):
@@ -285,7 +294,7 @@ def bending_force_rates(x, v, kind, quad, ghost, rotation, M, dM, f, r):  # type
                 r[rotation[c, a]] += dM[c, a] if kind[c, a] == OWN else -dM[c, a]
             if kind[c, a] == TURN:
                 geometry = _turn_geometry(x, quad[c, a], ghost[c, a], xl, g)
-                small[:, :] = 0.0
+                _clear(small)
                 add_hinge_hessian(geometry, M[c, a], small)
                 _add_hinge_rate(small, g, dM[c, a], quad[c, a], v, f)
 
@@ -297,8 +306,10 @@ def spring_force_rates(x, v, hinges, rotation, S, dS, f, r):  # type: ignore[no-
     for h in range(len(hinges)):
         r[rotation[h, 0]] -= dS[h]
         r[rotation[h, 1]] -= dS[h]
-        small[:, :] = 0.0
-        add_hinge_hessian(hinge_geometry(x, hinges[h], g), S[h], small)
+        _clear(small)
+        add_hinge_hessian(
+            hinge_geometry(x, hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3], g), S[h], small
+        )
         _add_hinge_rate(small, g, dS[h], hinges[h], v, f)
 
 

@@ -16,21 +16,23 @@ from bh.mechanics.shared.kinematics import OPTIONS
 # ------------------------------------------------------------------------------------------- once a step
 
 
-@njit(inline="always", **OPTIONS)
-def _add_strain_map(d, part, bars, out):  # type: ignore[no-untyped-def]
-    """Add to out (3, k) a part of the strain (xx, yy, 2 xy) that three `bars` with plane vectors d (k, 2) measure.
+@njit(**OPTIONS)
+def _add_strain_map(d, part, second, out):  # type: ignore[no-untyped-def]
+    """Add to out (3, k) a part of the strain (xx, yy, 2 xy) that bars 0, 1, 2 with plane vectors d (k, 2) measure.
 
-    The strain for which one bar alone has gamma is the symmetric product of the normals of the two others.
+    `second` (0 or 1): bars 0, 3, 4 instead. The strain for which one bar alone has gamma is the symmetric product of
+    the normals of the two others.
     """
     for k in range(3):
-        K, i, j = bars[k], bars[(k + 1) % 3], bars[(k + 2) % 3]
+        K, i, j = k, (k + 1) % 3, (k + 2) % 3
+        K, i, j = K + 2 * second * (K > 0), i + 2 * second * (i > 0), j + 2 * second * (j > 0)
         scale = part / ((d[i, 0] * d[K, 1] - d[i, 1] * d[K, 0]) * (d[j, 0] * d[K, 1] - d[j, 1] * d[K, 0]))
         out[0, K] += scale * d[i, 1] * d[j, 1]
         out[1, K] += scale * d[i, 0] * d[j, 0]
         out[2, K] -= scale * (d[i, 0] * d[j, 1] + d[i, 1] * d[j, 0])
 
 
-@njit(inline="always", **OPTIONS)
+@njit(**OPTIONS)
 def _beside(x, tail, head, wing, out):  # type: ignore[no-untyped-def]
     """Writes the place (2,) of a wing from the tail, along the edge and off it; returns the edge's length."""
     edge2 = arm2 = along = 0.0
@@ -54,14 +56,14 @@ def _beside(x, tail, head, wing, out):  # type: ignore[no-untyped-def]
 def triangle_strains(x, triangles):  # type: ignore[no-untyped-def]
     """(c, 3, 3) maps from gamma of the bars opposite the corners to the strain, x along bar 0; areas (c,), mm^2."""
     strain, areas = np.zeros((len(triangles), 3, 3)), np.empty(len(triangles))
-    d, wing, bars = np.empty((3, 2)), np.empty(2), np.arange(3)
+    d, wing = np.empty((3, 2)), np.empty(2)
     for c in range(len(triangles)):
         length = _beside(x, triangles[c, 1], triangles[c, 2], triangles[c, 0], wing)
         areas[c] = 0.5 * length * wing[1]
         d[0, 0], d[0, 1] = length, 0.0
         d[1, 0], d[1, 1] = wing[0] - length, wing[1]
         d[2, 0], d[2, 1] = wing[0], wing[1]
-        _add_strain_map(d, 1.0, bars, strain[c])
+        _add_strain_map(d, 1.0, np.int64(0), strain[c])
     return strain, areas
 
 
@@ -73,7 +75,6 @@ def edge_strains(x, hinges):  # type: ignore[no-untyped-def]
     """
     strain, areas = np.zeros((len(hinges), 3, 5)), np.empty((len(hinges), 2))
     d, one, two = np.empty((5, 2)), np.empty(2), np.empty(2)
-    first, second = np.array([0, 1, 2]), np.array([0, 3, 4])
     for c in range(len(hinges)):
         length = _beside(x, hinges[c, 1], hinges[c, 2], hinges[c, 0], one)
         _beside(x, hinges[c, 1], hinges[c, 2], hinges[c, 3], two)
@@ -84,8 +85,8 @@ def edge_strains(x, hinges):  # type: ignore[no-untyped-def]
         d[3, 0], d[3, 1] = two[0], -two[1]
         d[4, 0], d[4, 1] = two[0] - length, -two[1]
         part = one[1] / (one[1] + two[1])
-        _add_strain_map(d, part, first, strain[c])
-        _add_strain_map(d, 1.0 - part, second, strain[c])
+        _add_strain_map(d, part, np.int64(0), strain[c])
+        _add_strain_map(d, 1.0 - part, np.int64(1), strain[c])
     return strain, areas
 
 
@@ -115,7 +116,8 @@ def bar_rates(x, v, bars, rate):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def cell_forces(triangles, K3, edges, K5, gamma, N):  # type: ignore[no-untyped-def]
     """Writes the sums N (b,) of K gamma over the cells with bars `triangles` (c, 3) and `edges` (c, 5)."""
-    N[:] = 0.0
+    for b in range(len(N)):
+        N[b] = 0.0
     for c in range(len(triangles)):
         g0, g1, g2 = gamma[triangles[c, 0]], gamma[triangles[c, 1]], gamma[triangles[c, 2]]
         for k in range(3):
@@ -176,7 +178,7 @@ def triangle_tangent(x, nodes, bars, owned, K, N, frame_of, frames, source, slot
                     H[3 * p + i, 3 * q + i] += geometric
         if len(frames) > 0:
             rotate(H, nodes[c], frame_of, frames)
-        add_lower(H, 9, slots[source[c]], data)
+        add_lower(H, np.int64(9), slots[source[c]], data)
 
 
 @njit(**OPTIONS)
@@ -220,4 +222,4 @@ def edge_tangent(x, nodes, bars, owned, K, N, frame_of, frames, source, slots, d
             H[9 + i, 6 + i] -= own[4]
         if len(frames) > 0:
             rotate(H, nodes[c], frame_of, frames)
-        add_lower(H, 12, slots[source[c]], data)
+        add_lower(H, np.int64(12), slots[source[c]], data)

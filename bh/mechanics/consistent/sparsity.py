@@ -53,11 +53,11 @@ def rotation_pattern(
     rows[:] = np.where(column < first[:, None], column, 0)
     c, a = np.nonzero(has)
     rows[c, e.column[c, a]] = 3 * (corners.shape[1] + a)
-    of_spring = np.broadcast_to(np.append(np.arange(13), 15), (len(springs), 14))
+    of_spring = np.tile(np.append(np.arange(13), 15), (len(springs), 1))
     slots = (
         triangles,
         _some_rows(wide, rows, e.width),
-        _some_rows(wide_springs, np.ascontiguousarray(of_spring), np.full(len(springs), 14)),
+        _some_rows(wide_springs, of_spring, np.full(len(springs), 14)),
         *rest,
     )
     return replace(pattern, slots=slots)

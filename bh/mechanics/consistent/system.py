@@ -122,7 +122,9 @@ class ConsistentSystem(SupportedSheet):
         self.elements = consistent_elements(model, load_step, angles, moments, plane, measure, material)
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
-        self._start_points = start_points
+        self._start_points = np.array(
+            start_points
+        )  # of a kind with all other positions: kernels compile once
         self._frame_of = np.append(self.constraints.frame_of, -1)
 
     # ------------------------------------------------------------------------------- unknowns and positions

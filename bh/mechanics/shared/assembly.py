@@ -53,7 +53,7 @@ def nodal_forces(  # type: ignore[no-untyped-def]
         f[b, 2] += s * d2
     count += len(bars)
     for i in range(len(hinges)):
-        geometry = hinge_geometry(x, hinges[i], g)
+        geometry = hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g)
         turn = geometry[0] - rest[i]
         s = k_hinge[i] * turn + couple[i]
         turns[i] = turn
@@ -177,10 +177,10 @@ def tangent_values(  # type: ignore[no-untyped-def]
         d_bar[i, 0], d_bar[i, 1], d_bar[i, 2] = d[0], d[1], d[2]
         if turned:
             rotate(B, bars[i], frame_of, frames)
-        add_lower(B, 6, bar_slots[i], data)
+        add_lower(B, np.int64(6), bar_slots[i], data)
     for i in range(len(hinges)):
         g = g_hinge[i]
-        geometry = hinge_geometry(x, hinges[i], g)
+        geometry = hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g)
         k = k_hinge[i]
         if in_zone(geometry[0]):
             k += lock(geometry[0], k_lock[i])[2]
@@ -191,7 +191,7 @@ def tangent_values(  # type: ignore[no-untyped-def]
         add_hinge_hessian(geometry, s_hinge[i], H)
         if turned:
             rotate(H, hinges[i], frame_of, frames)
-        add_lower(H, 12, hinge_slots[i], data)
+        add_lower(H, np.int64(12), hinge_slots[i], data)
 
 
 @njit(**OPTIONS)
@@ -204,7 +204,7 @@ def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge,
         _bar_matrix(x, bars[i, 0], bars[i, 1], rest_length[i], k_bar[i], s_bar[i], green, B)
         add_product(B, bars[i], v, out)
     for i in range(len(hinges)):
-        geometry = hinge_geometry(x, hinges[i], g)
+        geometry = hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g)
         k = k_hinge[i]
         if in_zone(geometry[0]):
             k += lock(geometry[0], k_lock[i])[2]

@@ -259,7 +259,7 @@ def _tangent(  # type: ignore[no-untyped-def]
                             K[3 * i + c, 3 * j + e] = w * (second * n[c] * n[e] + slope * H[c, e])
             if len(frames) > 0:
                 rotate(K, corners, frame_of, frames)
-            add_lower(K, 9, slots[owner[k]], data)
+            add_lower(K, np.int64(9), slots[owner[k]], data)
     for v in range(len(home)):
         if spring[v, 0] + spring[v, 1] + spring[v, 2] > 0.0:
             K[:] = 0.0
@@ -267,7 +267,7 @@ def _tangent(  # type: ignore[no-untyped-def]
                 K[3 * home[v, 1] + c, 3 * home[v, 1] + c] = spring[v, c]
             if len(frames) > 0:
                 rotate(K, triangles[home[v, 0]], frame_of, frames)
-            add_lower(K, 9, slots[home[v, 0]], data)
+            add_lower(K, np.int64(9), slots[home[v, 0]], data)
 
 
 @njit(**OPTIONS)

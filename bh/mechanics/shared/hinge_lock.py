@@ -61,5 +61,6 @@ def lock_terms(phi: Array, k: Array) -> Array:
     out = np.zeros((len(phi), 3))
     for i in range(len(phi)):
         if in_zone(phi[i]):
-            out[i] = lock(phi[i], k[i])
+            energy, moment, stiffness = lock(phi[i], k[i])
+            out[i, 0], out[i, 1], out[i, 2] = energy, moment, stiffness
     return out

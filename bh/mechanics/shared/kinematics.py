@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import wraps
 from typing import TypeVar, cast
 
 import numpy as np
@@ -40,8 +41,17 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def compiled(function: F) -> F:
-    """A kernel that Python calls, compiled when it is first used; it keeps its signature for type checkers."""
-    return cast(F, njit(**OPTIONS)(function))
+    """A kernel that Python calls, compiled when it is first used; it keeps its signature for type checkers.
+
+    Read-only arrays are copied: numba takes them for a type of their own and would compile everything once more.
+    """
+    kernel = njit(**OPTIONS)(function)
+
+    @wraps(function)
+    def call(*arrays: Array) -> object:
+        return kernel(*(array if array.flags.writeable else array.copy() for array in arrays))
+
+    return cast(F, call)
 
 
 @njit(inline="never", **OPTIONS)
@@ -60,9 +70,8 @@ def triangle_frame(x, wing, j, k, side):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def hinge_geometry(x, hinge, g):  # type: ignore[no-untyped-def]
-    """Dihedral angle of one hinge; writes its gradient (12,) into `g` and returns what the Hessian needs."""
-    a, j, k, b = hinge[0], hinge[1], hinge[2], hinge[3]
+def hinge_geometry(x, a, j, k, b, g):  # type: ignore[no-untyped-def]
+    """Dihedral angle of hinge (a, j, k, b); writes its gradient (12,) into `g` and returns what the Hessian needs."""
     ex, ey, ez = x[k, 0] - x[j, 0], x[k, 1] - x[j, 1], x[k, 2] - x[j, 2]
     length = math.sqrt(ex * ex + ey * ey + ez * ez)
     ex, ey, ez = ex / length, ey / length, ez / length
@@ -118,7 +127,7 @@ def dihedral_angles(x: Array, hinges: NDArray[np.int64]) -> Array:
     phi = np.empty(len(hinges))
     g = np.empty(12)
     for i in range(len(hinges)):
-        phi[i] = hinge_geometry(x, hinges[i], g)[0]
+        phi[i] = hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g)[0]
     return phi
 
 
@@ -127,7 +136,7 @@ def dihedral_gradients(x: Array, hinges: NDArray[np.int64]) -> Array:
     """(m, 12) gradients of the dihedral angles with respect to (wing, edge, edge, wing), rad / mm."""
     g = np.empty((len(hinges), 12))
     for i in range(len(hinges)):
-        hinge_geometry(x, hinges[i], g[i])
+        hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g[i])
     return g
 
 
@@ -137,7 +146,9 @@ def dihedral_hessians(x: Array, hinges: NDArray[np.int64]) -> Array:
     H = np.zeros((len(hinges), 12, 12))
     g = np.empty(12)
     for i in range(len(hinges)):
-        add_hinge_hessian(hinge_geometry(x, hinges[i], g), 1.0, H[i])
+        add_hinge_hessian(
+            hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g), 1.0, H[i]
+        )
         for p in range(12):
             for q in range(p):
                 H[i, q, p] = H[i, p, q]

@@ -28,7 +28,7 @@ def lock_forces(x, hinges, k, f, L):  # type: ignore[no-untyped-def]
         L[h] = 0.0
         if k[h] == 0.0:
             continue
-        geometry = hinge_geometry(x, hinges[h], g)
+        geometry = hinge_geometry(x, hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3], g)
         if in_zone(geometry[0]):
             more, L[h], _ = lock(geometry[0], k[h])
             energy += more
@@ -40,7 +40,7 @@ def lock_forces(x, hinges, k, f, L):  # type: ignore[no-untyped-def]
 @njit(inline="always", **OPTIONS)
 def _lock_matrix(x, hinge, k, moment, g, H):  # type: ignore[no-untyped-def]
     """Tangent of one lock into the lower triangle of H (12, 12); False where there is nothing."""
-    geometry = hinge_geometry(x, hinge, g)
+    geometry = hinge_geometry(x, hinge[0], hinge[1], hinge[2], hinge[3], g)
     if k == 0.0 or not (in_zone(geometry[0]) or moment != 0.0):
         return False
     stiffness = lock(geometry[0], k)[2] if in_zone(geometry[0]) else 0.0
@@ -59,7 +59,7 @@ def lock_tangent(x, hinges, k, L, frame_of, frames, slots, data):  # type: ignor
         if _lock_matrix(x, hinges[h], k[h], L[h], g, H):
             if len(frames) > 0:
                 rotate(H, hinges[h], frame_of, frames)
-            add_lower(H, 12, slots[h], data)
+            add_lower(H, np.int64(12), slots[h], data)
 
 
 @njit(**OPTIONS)
@@ -68,7 +68,7 @@ def lock_rates(x, v, hinges, k, out):  # type: ignore[no-untyped-def]
     g = np.empty(12)
     for h in range(len(hinges)):
         out[h] = 0.0
-        geometry = hinge_geometry(x, hinges[h], g)
+        geometry = hinge_geometry(x, hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3], g)
         if k[h] > 0.0 and in_zone(geometry[0]):
             turn = 0.0
             for p in range(12):

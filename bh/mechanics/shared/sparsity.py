@@ -92,7 +92,7 @@ def _node_pairs(vertex: Ints, groups: tuple[Ints, ...]) -> tuple[Ints, Ints]:
     return unique // len(vertex), unique % len(vertex)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _rows(nodes, number, place, first, rows):  # type: ignore[no-untyped-def]
     """Rows (3 p,) of the unknowns of an element, -1 if prescribed."""
     for p in range(len(nodes)):
@@ -106,7 +106,7 @@ def _rows(nodes, number, place, first, rows):  # type: ignore[no-untyped-def]
                 rows[3 * p + c] = -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _band_slots(group, number, place, first, starts):  # type: ignore[no-untyped-def]
     width = 3 * group.shape[1]
     slots = np.empty((len(group), width * (width + 1) // 2), dtype=np.int32)
@@ -127,7 +127,7 @@ def _band_slots(group, number, place, first, starts):  # type: ignore[no-untyped
     return slots
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sparse_slots(group, number, place, first, indptr, indices):  # type: ignore[no-untyped-def]
     nodes = group.shape[1]
     width = 3 * nodes
@@ -157,7 +157,7 @@ def _sparse_slots(group, number, place, first, indptr, indices):  # type: ignore
     return slots
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _find(indices, low, high, row):  # type: ignore[no-untyped-def]
     while high - low > 1:
         middle = (low + high) // 2
