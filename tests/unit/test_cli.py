@@ -43,6 +43,7 @@ EARLY = (
     SECTOR
     + """
 [model]
+formulation = "bars-and-hinges"
 hinge_lock = false
 [creases.crease]
 stiffness = 0.1
