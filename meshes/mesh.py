@@ -13,6 +13,7 @@ import numpy as np
 from meshes.cells import Cells
 from meshes.curves import Array, Curve
 from meshes.errors import MeshError
+from meshes.fans import pieces
 from meshes.pattern import FOLD_KINDS, CreasePattern, FoldKind
 from meshes.topology import Ints, Topology, build
 
@@ -171,6 +172,11 @@ class SheetMesh:
         a, b, c = (self.points[self.triangles[:, k]] for k in range(3))
         return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
 
+    @cached_property
+    def pieces(self) -> Ints:
+        """(t,) number of the piece that each triangle belongs to; a sheet is one piece unless cuts part it."""
+        return pieces(self.triangles, self.topology)
+
     @property
     def flat(self) -> bool:
         """True if every node lies in z = 0 (to 1e-9 of the size)."""
@@ -189,7 +195,8 @@ class SheetMesh:
     def nodes(self, at: str) -> Ints:
         """Nodes of a place: "corner:inner-start", "edge:inner", "crease:NAME", "node:N", "near:X,Y" or "all".
 
-        "near:X,Y" is the node nearest to that place of the stress-free sheet, mm, seen from +z.
+        "near:X,Y" is the node nearest to that place of the stress-free sheet, mm, seen from +z. Where cuts doubled the
+        node of a corner, or the nearest one, all nodes at that place are meant; "node:N" is one of them.
 
         Returns:
             (k,) node numbers, in the order of the place.
@@ -200,7 +207,7 @@ class SheetMesh:
         if at == "all":
             return np.arange(len(self.points))
         if at in self.corners:
-            return np.array([self.corners[at]])
+            return self._there(self.corners[at])
         if at in self.edge_sets:
             pairs = self.edge_sets[at].ravel()
             return pairs[np.sort(np.unique(pairs, return_index=True)[1])]
@@ -210,9 +217,13 @@ class SheetMesh:
                 return np.array([int(text)])
             raise MeshError(f"'{at}' is not a node of the mesh; use node:0 to node:{len(self.points) - 1}")
         if at.startswith("near:"):
-            return np.array([self._nearest(at)])
+            return self._there(self._nearest(at))
         places = [*self.corners, *self.edge_sets, "node:N", "near:X,Y", "all"]
         raise MeshError(f"the sheet has no place '{at}'; use one of {', '.join(places)}")
+
+    def _there(self, node: int) -> Ints:
+        """A node and its copies at cuts."""
+        return np.flatnonzero((self.points == self.points[node]).all(axis=1))
 
     def _nearest(self, at: str) -> int:
         try:

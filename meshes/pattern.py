@@ -58,9 +58,11 @@ class CreasePattern:
         facets: lines that a mesh is to follow though the sheet does not fold there, such as drawn rulings.
         groups: names for several places together, such as ("crease:mountain", ("crease:m1", "crease:m2")).
         remarks: what was taken for granted when the pattern was read, one line each.
+        cuts: names and curves of the cuts inside the sheet, along which it opens, such as ("cut-1", Line(...)). They
+            may end anywhere, and on each other; a closed one leaves a hole. Meshes name their lips "edge:cut-1".
 
     Raises:
-        PatternError: a crease leaves the sheet, intersects itself or another one, or names are not unique.
+        PatternError: a crease or a cut leaves the sheet, intersects itself or another one, or names are not unique.
     """
 
     rings: tuple[Array, ...]
@@ -71,6 +73,7 @@ class CreasePattern:
     facets: tuple[Curve, ...] = ()
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     remarks: tuple[str, ...] = ()
+    cuts: tuple[tuple[str, Curve], ...] = ()
 
     def __post_init__(self) -> None:
         """Check names and geometry."""
@@ -80,7 +83,12 @@ class CreasePattern:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise PatternError(f"crease name '{twice[0]}' is used twice; give every crease its own name")
-        _check_geometry(self.rings, self.creases)
+        names = [name for name, _ in (*self.edges, *self.cuts)]
+        twice = sorted({name for name, _ in self.cuts if names.count(name) > 1})
+        if twice:
+            raise PatternError(f"name '{twice[0]}' of a cut is used twice; give every cut its own name")
+        lines = [(f"crease '{crease.name}'", crease.curve) for crease in self.creases]
+        _check_geometry(self.rings, lines + [(f"cut '{name}'", curve) for name, curve in self.cuts])
 
     @property
     def closed(self) -> bool:
@@ -138,8 +146,8 @@ def drawn_angles(pattern: CreasePattern, sets: Mapping[str, Ints]) -> dict[str, 
     }
 
 
-def _check_geometry(rings: Sequence[Array], creases: Sequence[Crease]) -> None:
-    """Creases inside the outline, simple and not crossing; predicates by shapely."""
+def _check_geometry(rings: Sequence[Array], curves: Sequence[tuple[str, Curve]]) -> None:
+    """Creases and cuts (in words) lie inside the outline, are simple and do not cross; predicates by shapely."""
     import shapely
 
     if not rings:
@@ -156,15 +164,15 @@ def _check_geometry(rings: Sequence[Array], creases: Sequence[Crease]) -> None:
     # chords of curved outlines cut the sheet short by up to the sampling tolerance
     grown = sheet.buffer(2e-3 + 1e-6 * size)
     lines = []
-    for crease in creases:
+    for what, curve in curves:
         # before sampling: an arc of radius 0 or nan cannot be sampled
-        if not 0.0 < crease.curve.length < np.inf or not np.all(np.isfinite(points := sample(crease.curve))):
-            raise PatternError(f"crease '{crease.name}' has no length; give it two distinct finite points")
+        if not 0.0 < curve.length < np.inf or not np.all(np.isfinite(points := sample(curve))):
+            raise PatternError(f"{what} has no length; give it two distinct finite points")
         line = shapely.LineString(points)
         if not line.is_simple:
-            raise PatternError(f"crease '{crease.name}' crosses itself; split or redraw it")
+            raise PatternError(f"{what} crosses itself; split or redraw it")
         if not grown.covers(line):
-            raise PatternError(f"crease '{crease.name}' leaves the sheet; move it inside the outline")
+            raise PatternError(f"{what} leaves the sheet; move it inside the outline")
         lines.append(line)
     shapes = np.array(lines, dtype=object)
     for i, j in shapely.STRtree(shapes).query(shapes, predicate="intersects").T.tolist():
@@ -172,6 +180,8 @@ def _check_geometry(rings: Sequence[Array], creases: Sequence[Crease]) -> None:
             continue
         first, second = lines[i], lines[j]
         if first.crosses(second) or (first.intersection(second).length > 1e-6 * size):
-            raise PatternError(
-                f"creases '{creases[j].name}' and '{creases[i].name}' cross; let them meet only at end points"
+            one, two = curves[j][0], curves[i][0]
+            both = (
+                f"creases {one[7:]} and {two[7:]}" if one[:6] == two[:6] == "crease" else f"{one} and {two}"
             )
+            raise PatternError(f"{both} cross; let them meet only at end points")

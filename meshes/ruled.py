@@ -25,7 +25,7 @@ LETTERS = {"mountain": "M", "valley": "V", "flat": "U"}
 def ruled(pattern: CreasePattern, rulings: Sequence[Array], spacing: float) -> SheetMesh:
     """Mesh a pattern along given rulings.
 
-    The names are those of `meshes.io.read_fold`; `edge:flat` are the rulings.
+    The names are those of `meshes.io.read_fold`; `edge:flat` are the rulings. Cuts are open.
 
     Args:
         pattern: of which edges and creases are cut.
@@ -43,6 +43,7 @@ def ruled(pattern: CreasePattern, rulings: Sequence[Array], spacing: float) -> S
         raise MeshError(f"spacing = {spacing} cannot be; use a positive length in mm")
     curves = [("B", curve) for _, curve in pattern.edges]
     curves += [(LETTERS[crease.fold], crease.curve) for crease in pattern.creases]
+    curves += [("C", curve) for _, curve in pattern.cuts]
     net = _Net(curves, rulings, spacing)
     edges, letters = net.edges()
     points = np.column_stack((net.points, np.zeros(len(net.points))))
@@ -52,7 +53,7 @@ def ruled(pattern: CreasePattern, rulings: Sequence[Array], spacing: float) -> S
         raise MeshError(
             f"the rulings do not make a mesh ({error}); use another spacing, or unstructured where a crease ends inside"
         ) from error
-    return replace(mesh, kind="ruled", remarks=pattern.remarks)
+    return replace(mesh, kind="ruled", remarks=pattern.remarks + mesh.remarks)
 
 
 class _Net:

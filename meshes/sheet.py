@@ -2,7 +2,7 @@
 
 The outline is the rim of what the lines enclose; a closed boundary that touches it nowhere is a hole. Creases are
 chains of edges of one kind (and one fold angle) from vertex to vertex, named m1, m2, ..., v1, ... and f1, ... (flat)
-in the order of the drawing.
+in the order of the drawing. Cuts inside the sheet are its cuts cut-1, ...; what they cut out falls out.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from meshes.curves import Array, Curve, Polyline
+from meshes.cuts import CUTS
 from meshes.errors import PatternError
+from meshes.mesh import count
 from meshes.pattern import Crease, CreasePattern, FoldKind
 from meshes.planar import RIM, DrawnLine, Graph, corners
 from meshes.rails import curve_through, find_rails
@@ -27,6 +29,7 @@ CREASES: dict[str, tuple[str, FoldKind]] = {
 }
 SIDES = 12  # with more corners than that the sides of an outline get no names
 NEARLY = 20.0  # times the gap: a crease that ends so near another line was perhaps meant to meet it
+NEARLY_CUT = 4.0  # the same of a cut
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,8 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
         lines: that its edges belong to.
 
     Raises:
-        PatternError: the outline is open, or there are two; a line leaves the sheet; a cut
-            lies inside it. One line, with the name of the line and the place.
+        PatternError: the outline is open, or there are two; a line leaves the sheet. One line, with the name of the
+            line and the place.
     """
     region = region_of(graph, lines)
     creases: list[Crease] = []
@@ -63,8 +66,11 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
         numbers = [e for e in region.inside.tolist() if graph.kinds[e] == kind]
         for i, chain in enumerate(_chains(graph, lines, numbers, _joints(graph, region))):
             creases.append(Crease(f"{letter}{i + 1}", curve_through(graph.points[chain[0]]), fold, chain[1]))
-    facets = [e for e in region.inside.tolist() if graph.kinds[e] in ("facet", *RIM)]
+    facets = [e for e in region.inside.tolist() if graph.kinds[e] in ("facet", "boundary")]
     facet_chains = _chains(graph, lines, facets, _met(graph, region.inside.tolist()))
+    numbers = [e for e in region.inside.tolist() if graph.kinds[e] == "cut"]
+    slits = _chains(graph, lines, numbers, _met(graph, numbers) | {n for ring in region.rings for n in ring})
+    cuts = tuple((f"cut-{i + 1}", curve_through(graph.points[chain])) for i, (chain, _) in enumerate(slits))
     edges, sides = _edges(graph.points, region.rings)
     groups = [
         ("crease:" + fold, tuple("crease:" + c.name for c in creases if c.fold == fold))
@@ -72,6 +78,7 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
     ]
     if sides:
         groups.append(("edge:boundary", sides))
+    groups.append((CUTS, tuple(f"edge:{name}" for name, _ in cuts)))
     pattern = CreasePattern(
         rings=tuple(graph.points[ring] for ring in region.rings),
         creases=tuple(creases),
@@ -79,8 +86,9 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
         facets=tuple(curve_through(graph.points[chain]) for chain, _ in facet_chains),
         groups=tuple((name, members) for name, members in groups if members),
         remarks=tuple(region.remarks),
+        cuts=cuts,
     )
-    return find_rails(pattern)
+    return pattern if cuts else find_rails(pattern)
 
 
 # --- the sheet ----------------------------------------------------------------------------------------------
@@ -99,7 +107,7 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
         ]
         for f in shapely.get_parts(shapely.polygonize_full(segments)[0])
     ]
-    _check_ends(graph, lines, segments)
+    _check_ends(graph, lines, segments, ("boundary",) if faces else RIM)
     if not faces:
         raise PatternError(
             "the drawing has no closed outline; draw one as a boundary (black) line, or take the hull of what is "
@@ -107,7 +115,8 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
         )
     number = {tuple(pair): e for e, pair in enumerate(np.sort(graph.edges, axis=1).tolist())}
     around = [[number[min(a, b), max(a, b)] for ring in face for a, b in _sides(ring)] for face in faces]
-    keep = _without_holes(graph, around)
+    solid = _without_holes(graph, around)
+    keep, fallen = _without_pieces(graph, around, solid)
     sheet_faces = [face for face, kept in zip(faces, keep, strict=True) if kept]
     polygon = shapely.union_all(
         [shapely.Polygon(graph.points[face[0]], [graph.points[r] for r in face[1:]]) for face in sheet_faces]
@@ -121,8 +130,12 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
         )
     rim = np.flatnonzero(used == 1)
     inside = np.setdiff1d(np.arange(len(graph.edges)), rim)
+    lost = [face for face, was, kept in zip(faces, solid, keep, strict=True) if was and not kept]
+    if lost:  # what is drawn on pieces that fell out goes with them
+        gone = shapely.union_all([shapely.Polygon(graph.points[face[0]]) for face in lost])
+        inside = inside[~shapely.contains_xy(gone, graph.points[graph.edges[inside]].mean(axis=1))]
     inside = _check_inside(graph, lines, polygon, inside)
-    remarks = _rim_remarks(graph, lines, rim, inside) + _remarks(graph, lines, inside)
+    remarks = fallen + _rim_remarks(graph, lines, rim, inside) + _remarks(graph, lines, inside)
     return Region(polygon, _rings(graph, rim), inside, remarks)
 
 
@@ -138,12 +151,41 @@ def _without_holes(graph: Graph, around: list[list[int]]) -> list[bool]:
     return keep
 
 
-def _check_ends(graph: Graph, lines: Sequence[DrawnLine], segments: Any) -> None:
-    """No boundary line ends loosely."""
+def _without_pieces(graph: Graph, around: list[list[int]], keep: list[bool]) -> tuple[list[bool], list[str]]:
+    """Which faces are sheet without those that closed cuts cut out of it, and a remark on these."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    beside: dict[int, list[int]] = {}
+    for face, at in enumerate(around):
+        for e in at:
+            beside.setdefault(e, []).append(face)
+    pairs = [
+        at
+        for e, at in beside.items()
+        if len(at) == 2 and graph.kinds[e] != "cut" and all(keep[f] for f in at)
+    ]
+    one, two = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    joined = coo_array((np.ones(len(one)), (one, two)), shape=(len(around),) * 2)
+    piece = connected_components(joined, directed=False)[1].tolist()
+    outside = {piece[at[0]] for at in beside.values() if len(at) == 1}
+    lost = {p for face, p in enumerate(piece) if keep[face]} - outside
+    if not lost:
+        return keep, []
+    first = next(face for face, p in enumerate(piece) if p in lost)
+    remark = (
+        f"{count(len(lost), 'piece')} within closed cuts (first at {_middle(graph, around[first][0])}) "
+        "fell out, leaving holes"
+    )
+    return [kept and p not in lost for kept, p in zip(keep, piece, strict=True)], [remark]
+
+
+def _check_ends(graph: Graph, lines: Sequence[DrawnLine], segments: Any, kinds: Sequence[str]) -> None:
+    """No line of these kinds, that make up the outline, ends loosely."""
     import shapely
 
     degree = np.bincount(graph.edges.ravel(), minlength=len(graph.points))
-    for e in graph.select(RIM).tolist():
+    for e in graph.select(kinds).tolist():
         for node in graph.edges[e].tolist():
             if degree[node] > 1:
                 continue
@@ -178,12 +220,6 @@ def _check_inside(graph: Graph, lines: Sequence[DrawnLine], polygon: Any, inside
             f"{_name(graph, lines, e)} ({graph.kinds[e]}) leaves the sheet at {_middle(graph, e)}; "
             f"end it at the outline{mend}"
         )
-    for e in inside.tolist():
-        if graph.kinds[e] == "cut":
-            raise PatternError(
-                f"{_name(graph, lines, e)} is a cut inside the sheet at {_middle(graph, e)}; slits cannot be opened: "
-                'draw it as a hole, or take it as something else: lines = { "green" = "ignore" }'
-            )
     return inside
 
 
@@ -214,15 +250,17 @@ def _remarks(graph: Graph, lines: Sequence[DrawnLine], inside: Ints) -> list[str
             "taken as facet lines, along which the sheet neither ends nor folds"
         )
     degree = np.bincount(graph.edges.ravel(), minlength=len(graph.points))
-    creases = [e for e in inside.tolist() if graph.kinds[e] in CREASES]
-    ends = [(e, n) for e in creases for n in graph.edges[e].tolist() if degree[n] == 1]
+    telling = [e for e in inside.tolist() if graph.kinds[e] in ("cut", *CREASES)]
+    ends = [(e, n) for e in telling for n in graph.edges[e].tolist() if degree[n] == 1]
     if ends:
         import shapely
 
         tree = shapely.STRtree(shapely.linestrings(graph.points[graph.edges]))
         for e, n in ends:
             point = shapely.Point(graph.points[n])
-            near = tree.query(point, predicate="dwithin", distance=NEARLY * graph.gap)
+            # slits leave narrow bridges on purpose
+            reach = graph.gap * (NEARLY_CUT if graph.kinds[e] == "cut" else NEARLY)
+            near = tree.query(point, predicate="dwithin", distance=reach)
             others = [k for k in near.tolist() if graph.lines[k] != graph.lines[e]]
             if others:
                 away = float(shapely.distance(point, tree.geometries[others]).min())
@@ -258,9 +296,11 @@ def _rings(graph: Graph, rim: Ints) -> list[list[int]]:
 
 
 def _joints(graph: Graph, region: Region) -> set[int]:
-    """Nodes where creases end: on the rim, and where other than two of them meet (facet lines end no crease)."""
+    """Nodes where creases end: at rim and cuts, and where other than two of them meet (facet lines end no crease)."""
     telling = [e for e in region.inside.tolist() if graph.kinds[e] in CREASES]
-    return _met(graph, telling) | {node for ring in region.rings for node in ring}
+    cuts = [e for e in region.inside.tolist() if graph.kinds[e] == "cut"]
+    ends = {node for ring in region.rings for node in ring} | set(graph.edges[cuts].ravel().tolist())
+    return _met(graph, telling) | ends
 
 
 def _met(graph: Graph, numbers: Sequence[int]) -> set[int]:

@@ -20,6 +20,7 @@ import numpy as np
 
 from meshes.cells import Kind, RuledCells
 from meshes.curves import Array, Curve
+from meshes.cuts import cut_along
 from meshes.errors import MeshError
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
@@ -86,7 +87,7 @@ def structured(
     edge_sets, corners = _named_sets(pattern, lines, first, rows)
     curves: dict[str, Curve] = {f"edge:{name}": curve for name, curve in pattern.edges}
     curves.update({f"crease:{crease.name}": crease.curve for crease in pattern.creases})
-    return SheetMesh(
+    mesh = SheetMesh(
         points=points,
         triangles=triangles,
         edge_sets=with_groups(pattern, edge_sets),
@@ -100,6 +101,7 @@ def structured(
         remarks=pattern.remarks,
         origin=Origin.of(pattern, RuledCells(kind, int(along), int(rows)), points, triangles),
     )
+    return cut_along(mesh, pattern)
 
 
 def _tapered(pattern: CreasePattern, along: int, rows: int, kind: Kind, alpha: float) -> SheetMesh:
@@ -122,7 +124,7 @@ def _tapered(pattern: CreasePattern, along: int, rows: int, kind: Kind, alpha: f
     curves: dict[str, Curve] = {f"edge:{name}": curve for name, curve in pattern.edges}
     curves.update({f"crease:{crease.name}": crease.curve for crease in pattern.creases})
     start, end = chains[-1][0], chains[-1][-1]
-    return SheetMesh(
+    mesh = SheetMesh(
         points=points,
         triangles=triangles,
         edge_sets=sets,
@@ -133,6 +135,7 @@ def _tapered(pattern: CreasePattern, along: int, rows: int, kind: Kind, alpha: f
         aspect_ratio=alpha,
         origin=Origin.of(pattern, RuledCells(kind, along, rows), points, triangles),
     )
+    return cut_along(mesh, pattern)
 
 
 Lines = list[tuple[Array, Array]]  # of each node line: points (k, 2) and parameters (k,)

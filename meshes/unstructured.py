@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import math
 import signal
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 
 from meshes.cells import GmshCells
 from meshes.curves import Array, Curve, Polyline
+from meshes.cuts import open_cuts
 from meshes.errors import MeshError
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
@@ -113,19 +114,21 @@ def unstructured(
     if not curves:
         raise MeshError("this pattern names no boundary curves; an unstructured mesh needs them")
     curves |= {f"crease:{crease.name}": crease.curve for crease in pattern.creases}
+    cuts = {f"edge:{name}": curve for name, curve in pattern.cuts}
+    curves |= cuts
     sizes = _sizes(curves, size, dict(near or {}), growth)
     facets = {f"facet:{i}": curve for i, curve in enumerate(pattern.facets)}
-    points, chains = _chains(curves | facets, sizes)
+    points, chains = _chains(curves | facets, sizes, cuts)
     segments = np.vstack(list(chains.values()))
     points, triangles = _fill(points, _faces(pattern, points, segments), sizes, chains, seed)
     drawn = [chains.pop(name) for name in facets]
     if drawn:
         chains["edge:facet"] = np.vstack(drawn)
-    return SheetMesh(
+    mesh = SheetMesh(
         points=points,
         triangles=triangles,
         edge_sets=with_groups(pattern, chains),
-        corners=_corners(chains),
+        corners=_corners({name: pairs for name, pairs in chains.items() if name not in cuts}),
         folds=pattern.folds,
         fold_angles=drawn_angles(pattern, chains),
         curves=curves,
@@ -133,6 +136,7 @@ def unstructured(
         remarks=pattern.remarks,
         origin=Origin.of(pattern, GmshCells(size, dict(near or {}), growth, seed), points, triangles),
     )
+    return open_cuts(mesh, list(cuts))
 
 
 def _sizes(curves: dict[str, Curve], size: float, near: dict[str, float], growth: float) -> Sizes:
@@ -158,8 +162,13 @@ def sheet_area(pattern: CreasePattern) -> float:
     return float(shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).area)
 
 
-def _chains(curves: dict[str, Curve], sizes: Sizes) -> tuple[Array, dict[str, Ints]]:
-    """Points (k, 2) on all curves, and each curve as a chain of node pairs; curves that meet share nodes."""
+def _chains(
+    curves: dict[str, Curve], sizes: Sizes, cuts: Collection[str] = ()
+) -> tuple[Array, dict[str, Ints]]:
+    """Points (k, 2) on all curves, and each curve as a chain of node pairs; curves that meet share nodes.
+
+    A curve of `cuts` has two edges at least, without which it could not open.
+    """
     ends = np.vstack([curve.point(np.array([0.0, 1.0])) for curve in curves.values()])
     near = 1e-6 * float(np.ptp(ends, axis=0).max() + sizes.largest)
     points: list[Array] = []
@@ -169,7 +178,9 @@ def _chains(curves: dict[str, Curve], sizes: Sizes) -> tuple[Array, dict[str, In
         breaks = _breaks(curve, ends, near)
         u = [breaks[0]]
         for a, b in pairwise(breaks):
-            u += sizes.divide(curve, a, b, least=3 if curve.closed and len(breaks) == 2 else 1)
+            whole = len(breaks) == 2
+            least = 3 if curve.closed and whole else 2 if name in cuts and whole else 1
+            u += sizes.divide(curve, a, b, least=least)
         fixed = set(breaks)
         nodes = [
             _node(points, joints, at, near) if value in fixed else _new(points, at)

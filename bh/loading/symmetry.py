@@ -19,6 +19,7 @@ from bh.loading.load_step import LoadStep
 from bh.model.model import Model
 from bh.model.supports import Constraints, RigidBody, Support
 from meshes import Arc, SheetMesh
+from meshes.fans import places
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -136,8 +137,16 @@ def _normal(mesh: SheetMesh, plane: Plane) -> Array:
 def _images(mesh: SheetMesh, normal: Array, offset: float, near: float) -> Ints:
     from scipy.spatial import cKDTree
 
-    reflected = mesh.points - 2.0 * np.outer(mesh.points @ normal - offset, normal)
-    distance, image = cKDTree(mesh.points).query(reflected)
+    known, reflected = mesh.points, _reflected(mesh.points, normal, offset)
+    if (
+        places(known) != np.arange(len(known))
+    ).any():  # nodes doubled at cuts differ by the triangles round them
+        middle = _middles(mesh)
+        known, reflected = (
+            np.hstack((known, middle)),
+            np.hstack((reflected, _reflected(middle, normal, offset))),
+        )
+    distance, image = cKDTree(known).query(reflected)
     if distance.max() > near:
         worst = int(np.argmax(distance))
         x, y, z = mesh.points[worst]
@@ -146,6 +155,20 @@ def _images(mesh: SheetMesh, normal: Array, offset: float, near: float) -> Ints:
             f"plane normal to ({normal[0]:.3g}, {normal[1]:.3g}, 0); mend the mesh, or leave out symmetry"
         )
     return np.asarray(image, dtype=np.int64)
+
+
+def _reflected(points: Array, normal: Array, offset: float) -> Array:
+    return np.asarray(points - 2.0 * np.outer(points @ normal - offset, normal))
+
+
+def _middles(mesh: SheetMesh) -> Array:
+    """(n, 3) mean of the centres of the triangles round every node, mm."""
+    centres = mesh.points[mesh.triangles].mean(axis=1)
+    total = np.zeros_like(mesh.points)
+    for corner in mesh.triangles.T:
+        np.add.at(total, corner, centres)
+    count = np.bincount(mesh.triangles.ravel(), minlength=len(total))
+    return np.asarray(total / count[:, None])
 
 
 def halved(model: Model, plane: Mirror, free: bool) -> Model:

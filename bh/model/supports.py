@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ MOTIONS = ("translation along x", "translation along y", "translation along z",
 UNBALANCED = (
     "the forces on a sheet without enough supports are not in equilibrium; add supports or balance them"
 )
+RIGID = "or a support at 'rigid-body' that takes them out without force"
 TURNED = "the forces turn the free sheet, so they do not stay in equilibrium; add supports"
 
 
@@ -251,9 +252,40 @@ def free_motions(points: Array, constraints: Constraints) -> Array:
 
 
 def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints) -> None:
+    """Nothing of the sheet is free, unless the rest is to be taken out; each piece of a parted sheet counts alone."""
+    count = int(mesh.pieces.max()) + 1
+    if constraints.rigid_body and count > 1:
+        raise ModelError(
+            f"cuts part the sheet into {count} pieces, and nothing holds them to each other: hold each of them by "
+            "supports of its own, or end the cuts inside the sheet"
+        )
     if constraints.rigid_body:
         return
-    left = free_motions(mesh.points, constraints)
+    for number in range(count):
+        triangles = mesh.triangles[mesh.pieces == number]
+        nodes = np.arange(len(mesh.points)) if count == 1 else np.unique(triangles)
+        x, y, _ = mesh.points[nodes].mean(axis=0)
+        where = f" of the piece at ({x:.4g}, {y:.4g})" if count > 1 else ""
+        _check_piece(mesh, _restricted(constraints, nodes), nodes, where)
+
+
+def _restricted(constraints: Constraints, nodes: Ints) -> Constraints:
+    """The constraints of some nodes (k,), which are all nodes of the edges that they have in common."""
+    number = np.full(len(constraints.fixed), -1, dtype=np.int64)
+    number[nodes] = np.arange(len(nodes))
+    clamped = number[constraints.clamped]
+    return replace(
+        constraints,
+        fixed=constraints.fixed[nodes],
+        start=constraints.start[nodes],
+        end=constraints.end[nodes],
+        frame_of=constraints.frame_of[nodes],
+        clamped=clamped[(clamped >= 0).all(axis=1)],
+    )
+
+
+def _check_piece(mesh: SheetMesh, constraints: Constraints, nodes: Ints, where: str) -> None:
+    left = free_motions(mesh.points[nodes], constraints)
     if left.shape[1] == 0:
         return
     size = np.ones(6)
@@ -264,8 +296,8 @@ def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints) -> None:
     if len(named) != left.shape[1]:  # none of them alone, such as a turn about a slanted line
         names = f"combinations of {names}"
     raise ModelError(
-        f"the supports leave {left.shape[1]} of 6 rigid motions free ({names}); "
-        "add supports, or a support at 'rigid-body' that takes them out without force"
+        f"the supports leave {left.shape[1]} of 6 rigid motions{where} free ({names}); "
+        + ("add supports there" if where else f"add supports, {RIGID}")
     )
 
 

@@ -1,6 +1,6 @@
 """Flat patterns as SVG and DXF in mm, for laser cutters and other programs; `meshes.io.read_pattern` reads them.
 
-One layer a kind of line: "boundary", "mountain", "valley", "flat" and "facet". Arcs stay arcs.
+One layer a kind of line: "boundary", "cut", "mountain", "valley", "flat" and "facet". Arcs stay arcs.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from meshes.curves import Arc, Array, Curve, Line, Polyline, sample
 from meshes.errors import FileFormatError
+from meshes.fans import lips
 from meshes.io.export import replacing, shown
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
@@ -28,6 +29,7 @@ NEAR = 5e-4  # mm that a written polyline may stay off its curve
 # what a line looks like: colour, dashes and gaps in mm, number of DXF's palette
 LOOKS: dict[str, tuple[str, tuple[float, ...], int]] = {
     "boundary": ("#000000", (), 7),
+    "cut": ("#00ff00", (), 3),
     "mountain": ("#ff0000", (6.0, 1.5, 1.0, 1.5), 1),
     "valley": ("#0000ff", (3.0, 1.5), 5),
     "flat": ("#ff00ff", (1.0, 1.5), 6),
@@ -103,15 +105,13 @@ def flat_lines(sheet: CreasePattern | SheetMesh) -> list[FlatLine]:
             FlatLine("boundary", f"ring-{i}", Polyline(np.vstack((ring, ring[:1]))))
             for i, ring in enumerate(sheet.rings)
         ]
+        lines += [FlatLine("cut", name, curve) for name, curve in sheet.cuts]
         lines += [FlatLine(crease.fold, crease.name, crease.curve, crease.angle) for crease in sheet.creases]
         return lines + [FlatLine("facet", f"facet-{i + 1}", curve) for i, curve in enumerate(sheet.facets)]
     if not sheet.flat:
         raise FileFormatError("the sheet is not flat; only flat sheets have a pattern to draw")
     xy, topology = sheet.points[:, :2], sheet.topology
-    lines = [
-        FlatLine("boundary", f"ring-{i}", Polyline(xy[[*loop, loop[0]]]))
-        for i, loop in enumerate(boundary_loops(topology))
-    ]
+    lines = _rims(sheet)
     free = np.ones(len(topology.edges), dtype=bool)
     free[topology.edge_triangles[:, 1] < 0] = False
     # of names that share edges (all mountains, and each chain of them) the shortest say most
@@ -127,6 +127,36 @@ def flat_lines(sheet: CreasePattern | SheetMesh) -> list[FlatLine]:
     return lines + [
         FlatLine("facet", "facet", Line(tuple(a), tuple(b))) for a, b in xy[topology.edges[free]].tolist()
     ]
+
+
+def _rims(sheet: SheetMesh) -> list[FlatLine]:
+    """The boundary of a flat mesh, and its cuts: lips that lie over each other are one line."""
+    import shapely
+
+    xy, topology = sheet.points[:, :2], sheet.topology
+    double = lips(sheet.points, topology)
+    if not double:
+        return [
+            FlatLine("boundary", f"ring-{i}", Polyline(xy[[*loop, loop[0]]]))
+            for i, loop in enumerate(boundary_loops(topology))
+        ]
+    rim = topology.edge_triangles[:, 1] < 0
+    rim[np.concatenate(double)] = False
+    found: list[FlatLine] = []
+    for layer, name, edges in (
+        ("boundary", "ring-{}", np.flatnonzero(rim)),
+        ("cut", "cut-{}", np.array([group[0] for group in double])),
+    ):
+        joined = shapely.line_merge(shapely.multilinestrings(list(xy[topology.edges[edges]])))
+        parts = sorted(
+            shapely.get_parts(joined), key=lambda part: -part.length if layer == "boundary" else 0.0
+        )
+        start = 0 if layer == "boundary" else 1
+        found += [
+            FlatLine(layer, name.format(start + i), Polyline(np.asarray(part.coords)))
+            for i, part in enumerate(parts)
+        ]
+    return found
 
 
 def _runs(pairs: Ints, angles: Array | None) -> Iterator[tuple[list[int], float | None]]:
@@ -148,7 +178,7 @@ def _runs(pairs: Ints, angles: Array | None) -> Iterator[tuple[list[int], float 
 def _perforated(lines: Iterable[FlatLine], cut: float, left: float) -> Iterator[FlatLine]:
     """Creases as dashes of about that length, one at either end, so that they open from the rim."""
     for line in lines:
-        if line.layer in ("boundary", "facet"):
+        if line.layer in ("boundary", "cut", "facet"):
             yield line
             continue
         length = line.curve.length

@@ -28,7 +28,7 @@ TOLERANCE, GAP = 2e-5, 5e-4  # of the drawing's diagonal
 SHORT = 0.4  # of its shortest line: a larger gap by default would swallow it
 LONGEST = 1e6  # mm
 SMALL, LARGE = 5.0, 5000.0  # mm; a longer side beyond these gets a remark
-LETTERS = {"mountain": "M", "valley": "V", "boundary": "B", "cut": "B", "facet": "F", "flat": "U"}
+LETTERS = {"mountain": "M", "valley": "V", "boundary": "B", "cut": "C", "facet": "F", "flat": "U"}
 
 Read = TypeVar("Read")
 
@@ -109,7 +109,7 @@ def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> S
     graph, lines, remarks = read_graph(path, **options)
     region = region_of(graph, lines)
     rim = np.setdiff1d(np.arange(len(graph.edges)), region.inside)
-    letters = ["F" if kind in ("boundary", "cut") else LETTERS[kind] for kind in graph.kinds]
+    letters = ["F" if kind == "boundary" else LETTERS[kind] for kind in graph.kinds]
     for e in rim.tolist():
         letters[e] = "B"
     sign = {"M": -1.0, "V": 1.0}
@@ -121,7 +121,7 @@ def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> S
     points = np.column_stack((graph.points, np.zeros(len(graph.points))))
     edges = [(int(a), int(b)) for a, b in graph.edges.tolist()]
     mesh = sheet_of_frame(Frame(points, edges, letters, angles if known else None, []))
-    return replace(mesh, kind="drawn", remarks=(*remarks, *region.remarks))
+    return replace(mesh, kind="drawn", remarks=(*remarks, *region.remarks, *mesh.remarks))
 
 
 def read_graph(

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes.curves import Array
+from meshes.cuts import CUTS, open_cuts
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import replacing, shown
 from meshes.io.fold_faces import area, faces_of_graph, orient, sides_of, triangulate
 from meshes.io.fold_frame import Frame, Side, check, load, select, show, side
+from meshes.io.loose_cuts import tie_cuts
 from meshes.mesh import SheetMesh
 from meshes.pattern import FoldKind
 from meshes.topology import boundary_loops, build
@@ -39,8 +41,9 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
 
     The edge sets are "crease:mountain" and "crease:valley" (all such edges), their chains "crease:m1", ...,
     "crease:v1", ... in the order of the file, "edge:boundary", and where there are any "edge:flat" (F),
-    "edge:unassigned" (U, or not in edges_vertices), "edge:join" (J) and "edge:facet" (added to cut faces into
-    triangles). `fold_angles` are there if the file has edges_foldAngle (nan for a null).
+    "edge:unassigned" (U, or not in edges_vertices), "edge:join" (J), "edge:cuts" (C: both lips, the sheet is open
+    there on doubled nodes) and "edge:facet" (added to cut faces into triangles). `fold_angles` are there if the file
+    has edges_foldAngle (nan for a null).
 
     Args:
         path: of the file.
@@ -70,6 +73,7 @@ def sheet_of_frame(frame: Frame) -> SheetMesh:
     Raises:
         FileFormatError: the frame is not one manifold sheet, or lies over itself.
     """
+    frame = frame if frame.faces else tie_cuts(frame)
     faces = frame.faces or faces_of_graph(frame)
     sides = sides_of(faces)
     _check_edges(frame, sides)
@@ -102,7 +106,7 @@ def sheet_of_frame(frame: Frame) -> SheetMesh:
     if added:
         edge_sets["edge:facet"] = np.array(added)
     creases = [name.removeprefix("crease:") for name in edge_sets if name.startswith("crease:")]
-    return SheetMesh(
+    mesh = SheetMesh(
         points=frame.points[used],
         triangles=triangles,
         edge_sets=edge_sets,
@@ -110,17 +114,16 @@ def sheet_of_frame(frame: Frame) -> SheetMesh:
         fold_angles={name: fold_angles[name] for name in creases if name in fold_angles},
         kind="imported",
     )
+    return open_cuts(mesh, [CUTS] if CUTS in edge_sets else [])
 
 
 def _check_edges(frame: Frame, sides: dict[Side, list[int]]) -> None:
-    """Every edge is the side of a face, creases lie inside the sheet, borders and cuts at its rim."""
+    """Every edge is the side of a face, creases lie inside the sheet, borders at its rim."""
     for number, ((a, b), letter) in enumerate(zip(frame.edges, frame.letters, strict=True)):
         edge = f"edge {number} ({a}-{b})"
         faces = sides.get(side(a, b))
         if faces is None:
             raise FileFormatError(f"{edge} is not a side of any face; remove it or add its faces")
-        if len(faces) == 2 and letter == "C":
-            raise FileFormatError(f"{edge} is a cut (C) inside the sheet; double its vertices to open it")
         if len(faces) == 2 and letter == "B":
             raise FileFormatError(f"{edge} is assigned B but has a face on both sides; assign M, V, F or U")
         if len(faces) == 1 and letter in FOLDS:
@@ -174,6 +177,8 @@ def _edge_sets(frame: Frame, sides: dict[Side, list[int]]) -> tuple[dict[str, li
     for letter, name in SETS.items():
         edges = (edge for edge, each in zip(frame.edges, frame.letters, strict=True) if each == letter)
         sets[name] = [edge for edge in edges if len(sides[side(*edge)]) == 2]
+    inner = zip(frame.edges, frame.letters, strict=True)
+    sets[CUTS] = [edge for edge, each in inner if each == "C" and len(sides[side(*edge)]) == 2]
     listed = {side(*edge) for edge in frame.edges}
     sets["edge:unassigned"] += [pair for pair, at in sides.items() if len(at) == 2 and pair not in listed]
     return sets, angles
@@ -242,9 +247,9 @@ def write_fold(
 ) -> None:
     """Write a mesh as the key frame of a FOLD file, and folded states as further frames; lengths in mm.
 
-    Edges are those of `mesh.topology.edges`: B on the boundary, M and V on creases as `mesh.folds` says, U
-    and J in "edge:unassigned" and "edge:join", else F. Fold angles are written if the mesh has any, null on a
-    crease without. The file appears whole or not at all.
+    Edges are those of `mesh.topology.edges`: B on the boundary (of a cut: both lips, on doubled vertices), M and V on
+    creases as `mesh.folds` says, U and J in "edge:unassigned" and "edge:join", else F. Fold angles are written if the
+    mesh has any, null on a crease without. The file appears whole or not at all.
 
     Args:
         path: of the file.

@@ -442,7 +442,6 @@ BAD = {
     "assignment lines": ({"edges_assignment": [*"BBBBMMV", "a\nb\ud800"]}, r'is "a\nb\ud800"'),
     "border inside": ({"edges_assignment": list("BBBBMMVB")}, "edge 7 (4-3) is assigned B but has a face on both"),
     "crease outside": ({"edges_assignment": list("MBBBMMVF")}, "edge 0 (0-1) is assigned M but has a face on one"),
-    "cut inside": ({"edges_assignment": list("BBBBMMVC")}, "edge 7 (4-3) is a cut (C) inside"),
     "angles short": ({"edges_foldAngle": [0]}, "edges_foldAngle has 1 entries for 8"),
     "angle text": ({"edges_foldAngle": [0] * 7 + ["x"]}, 'edges_foldAngle[7] is "x"'),
     "angle large": ({"edges_foldAngle": [0] * 7 + [181]}, "edges_foldAngle[7] is 181; give degrees"),
