@@ -398,7 +398,7 @@ def imported_all(source: ast.Module) -> set[str]:
 def too_long(source: ast.Module, most: int = LONGEST_FUNCTION) -> list[str]:
     """Functions of more lines than `most`."""
     return [
-        f"{node.name} ({node.end_lineno - node.lineno + 1} lines)"
+        f"{node.name} ({(node.end_lineno or 0) - node.lineno + 1} lines)"
         for node in ast.walk(source)
         if isinstance(node, ast.FunctionDef) and (node.end_lineno or 0) - node.lineno + 1 > most
     ]

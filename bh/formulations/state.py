@@ -106,6 +106,15 @@ class State:
         total: Array = self.reactions[self.mesh.nodes(at)].sum(axis=0)
         return total
 
+    @property
+    def strain(self) -> Array:
+        """(e,) strain of every edge of the mesh: change of length over stress-free length."""
+        ends = self.mesh.topology.edges
+        before, now = (
+            np.linalg.norm(x[ends[:, 1]] - x[ends[:, 0]], axis=1) for x in (self.mesh.points, self.points)
+        )
+        return np.asarray(now / before - 1.0)
+
     def nodal_energy_density(self, kind: str) -> Array:
         """(n,) energy density of a kind, averaged from the triangles to nodes by area, N mm / mm^2."""
         mesh = self.mesh

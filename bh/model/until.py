@@ -33,13 +33,13 @@ class Until:
             if it can be imported).
         value: wanted, in the observable's unit.
         of: the crease or place that it is of, where it needs one.
-        tolerance: on the value.
+        tolerance: on the value, in parts of it (in its unit where the value is 0).
     """
 
     observable: str
     value: float
     of: str | None = None
-    tolerance: float = 1e-4
+    tolerance: float = 1e-5
 
     if TYPE_CHECKING:  # a function is taken too, and kept by its name
 
@@ -48,9 +48,14 @@ class Until:
             observable: str | Callable[..., float],
             value: float,
             of: str | None = None,
-            tolerance: float = 1e-4,
+            tolerance: float = 1e-5,
         ) -> None:
             """See the attributes."""
+
+    @property
+    def margin(self) -> float:
+        """How far from the value the observable may be, in its unit."""
+        return self.tolerance * (abs(self.value) or 1.0)
 
     def __post_init__(self) -> None:
         """Refuse what cannot be met.
@@ -75,12 +80,12 @@ class Until:
             raise ModelError(f"until {self.observable} needs `of`, {NEEDS[self.observable]}")
 
 
-def depth(to: float, tolerance: float = 1e-4) -> Until:
+def depth(to: float, tolerance: float = 1e-5) -> Until:
     """Fold until a corrugation is `to` mm deep, highest mountain to lowest valley point.
 
     Args:
         to: depth in mm; how it is measured says `bh.formulations.observables.depth_of`.
-        tolerance: on it, mm.
+        tolerance: on it, in parts of it.
 
     Returns:
         what ends the step.

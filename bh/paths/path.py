@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from bh.paths.estimate import Accuracy
 
 Array = NDArray[np.float64]
+LARGE_STRAIN = 0.05  # of an edge; what is beyond gets a remark
 
 
 class Path:
@@ -139,6 +140,10 @@ class Path:
         if arc:
             found.append(f"{count(len(arc), 'state')} found by arc length")
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
+        if self.records:
+            strain = float(np.abs(self[-1].strain).max())
+            if strain > LARGE_STRAIN:
+                found.append(f"strains reach {strain:.0%}: the law of the sheet is one of small strains")
         ends = [line for step in self._load_steps for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
         if self.accuracy is not None:

@@ -235,7 +235,7 @@ class UntilTable(Table):
     )
     of: str | None = Field(None, description="the crease or place that it is of")
     tolerance: Positive = Field(
-        1e-4, description="how near the value must be met, a positive number in its unit"
+        1e-5, description="how near the value must be met, in parts of it (in its unit where it is 0)"
     )
 
     @model_validator(mode="after")

@@ -10,6 +10,7 @@ from bh.solvers.saddle import MultiplierMatrix
 
 Array = NDArray[np.float64]
 NEUTRAL = 1e-13  # shift, in parts of the diagonal, at which an eigenvalue is zero but for rounding
+ROUNDED = 1e-11  # one that takes off what rounding makes of neutral modes in a badly conditioned matrix
 
 
 def count_negative(matrix: Matrix) -> int:
@@ -42,7 +43,7 @@ def factorise_shifted(
             return matrix.factorise(shift), shift
         except IndefiniteError:
             # a matrix that is indefinite at zero has been looked at closely; go past what it calls rounding
-            shift = 1e-11 if shift == 0.0 else max(4.0 * shift, 1e-9)
+            shift = ROUNDED if shift < ROUNDED else max(4.0 * shift, 1e-9)
     return None, shift
 
 

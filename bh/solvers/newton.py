@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.factor import Descent, Factor, IndefiniteError, Matrix
-from bh.solvers.modes import count_negative, factorise_shifted, lowest_mode
+from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted, lowest_mode
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.system import Evaluation, System
 
@@ -138,12 +138,14 @@ class Newton:
     def solve_globalised(self, system: System, q: Array, lam: float) -> Solution:
         """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns."""
         now = system.evaluate(q, lam)
-        shift, before = 0.0, np.inf
+        shift, least, before = 0.0, ROUNDED, np.inf
         for iteration in range(self.globalised):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, globalised=True)
             matrix = system.tangent(q, lam, now.forces).matrix
-            factor, shift = factorise_shifted(matrix, shift, least=1e-11)
+            if shift < 1e-9 and 0.5 * before < now.imbalance < 0.1:
+                least = NEUTRAL  # modes as soft as the shift converge no better than linearly with it
+            factor, shift = factorise_shifted(matrix, shift, least=least)
             if factor is None:
                 return Solution(q, now, iteration, False, "singular tangent", globalised=True)
             descent = factor.descend(now.residual)

@@ -69,7 +69,7 @@ def walk(task: Walk) -> Iterator[Increment]:
 def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float]) -> Iterator[Increment]:
     """Increments up to the zero of `goal`; the last one is that state."""
     here = task.history[-1]
-    left = goal(here)
+    left, passed = goal(here), ""
     for item in items:
         if not item.reached:
             yield item
@@ -87,8 +87,10 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
             )
             return
         yield item
+        if left * now < 0.0:
+            passed = f"; a jump at lambda {item.point.lam:.6g} passed it, from {left:+.6g} to {now:+.6g}"
         here, left = item.point, now
         if abs(now) <= task.tolerance:
             return
-    note = f"the target is not met before the end of the step (missed by {left:.6g})"
+    note = f"the target is not met before the end of the step (missed by {left:.6g}{passed})"
     yield Increment(here, Outcome.TARGET_MISSED, 0, math.nan, 0.0, note=note)

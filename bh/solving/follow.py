@@ -21,6 +21,7 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.increments import LOAD, Point, point
 from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
+from meshes.mesh import count
 
 if TYPE_CHECKING:
     from bh.formulations.symmetry_reduction import Half
@@ -53,6 +54,8 @@ def follow(
         for step in range(len(path.steps), len(model.steps)):
             with one_blas_thread():
                 end = _run_step(path, step, strategy, report, target)
+                if end.reached and step == len(model.steps) - 1:
+                    end = _stable_end(path, strategy)
             path.steps.append(end)
             if target is not None:
                 target.finish_step(step, *astuple(end))
@@ -132,6 +135,22 @@ def _run_step(
     return StepOutcome(Outcome.REACHED)
 
 
+def _stable_end(path: Path, strategy: Strategy) -> StepOutcome:
+    """The last step's outcome: "unstable" where the sheet would leave the end state.
+
+    A strategy that was told to stay on such a branch (`at_bifurcation`), or knows no other, is taken at its word.
+    """
+    if getattr(strategy, "at_bifurcation", None) != "stable" or path.stable is not False:
+        return StepOutcome(Outcome.REACHED)
+    modes = count(path.records[-1].negative or 0, "negative mode")
+    why = (
+        ""
+        if path.half(len(path.steps)) is None
+        else "; the whole sheet would leave the symmetry of its halves"
+    )
+    return StepOutcome(Outcome.UNSTABLE, f"the end state is not stable ({modes}){why}")
+
+
 def _goal(path: Path, step: int, half: Half | None) -> tuple[Callable[[Point], float] | None, float]:
     """What is zero where the step ends early, and to which tolerance; None if nothing ends it early."""
     until = path.model.steps[step].until
@@ -143,7 +162,7 @@ def _goal(path: Path, step: int, half: Half | None) -> tuple[Callable[[Point], f
         state = path.observe(step, q, at.lam)
         return measure(until, state) - until.value
 
-    return missed, until.tolerance
+    return missed, until.margin
 
 
 def _recent(done: list[Record]) -> list[Record]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -111,11 +111,23 @@ def solved(name: str) -> bh.Path:
     return path
 
 
+def system_of(path: bh.Path, step: int) -> ConsistentSystem:
+    system = path.system(step)
+    assert isinstance(system, ConsistentSystem)
+    return system
+
+
+def first_system(model: Model) -> ConsistentSystem:
+    system = formulation(model.formulation).system(model, load_steps(model)[0], None)
+    assert isinstance(system, ConsistentSystem)
+    return system
+
+
 def systems(name: str) -> list[tuple[ConsistentSystem, Array, float]]:
     """System, unknowns and lambda of the last state of every step."""
     path = solved(name)
     last = {record.step: record for record in path.records}
-    return [(path.system(step), record.q, record.lam) for step, record in last.items()]
+    return [(system_of(path, step), record.q, record.lam) for step, record in last.items()]
 
 
 def disturbed(system: ConsistentSystem, q: Array, seed: int) -> Array:
@@ -148,7 +160,7 @@ def test_derivatives_of_a_thick_sheet_that_slides_in_its_clamp(seed: int) -> Non
         replace(sheet(mesh), sheet=replace(SHEET, t=20.0)).support("node:7", "xyz").support("node:9", "xy")
     )
     model = model.support("edge:start", [[0.0, 0.3, 1.0]], clamp=True).fold("crease", to=2.3)
-    system = formulation("consistent").system(model, load_steps(model)[0], None)
+    system = first_system(model)
     rng = np.random.default_rng(seed)
     q = np.concatenate((rng.normal(size=system.moving), 0.3 * rng.normal(size=system.size - system.moving)))
     assert max(differences(system, q, 0.37, rng).values()) < 1e-8
@@ -166,7 +178,7 @@ def test_energy_is_that_of_the_state(name: str) -> None:
     """Potential at equilibrium = energies of the state, by triangle and in total, less the work of the dead loads."""
     path = solved(name)
     for record, state in zip(path.records, path, strict=True):
-        system = path.system(record.step)
+        system = system_of(path, record.step)
         e, area = system.elements, state.mesh.areas
         for kind, density in state.energy_density.items():
             assert float(density @ area) == pytest.approx(state.energy.as_dict()[kind], rel=1e-9, abs=1e-15)
@@ -183,7 +195,7 @@ def test_states_are_in_equilibrium(name: str) -> None:
     path = solved(name)
     # a spring on a curved sheet is made flat: it does not begin in equilibrium
     for record in path.records[name == "curved, spring crease" :]:
-        system = path.system(record.step)
+        system = system_of(path, record.step)
         now = system.evaluate(record.q, record.lam)
         assert now.imbalance <= 1e-8
         rotations = np.abs(now.residual[system.moving :]).max(initial=0.0)
@@ -226,7 +238,7 @@ def nearly_closed(angle: float, held: bool) -> tuple[ConsistentSystem, Array]:
         Displace("corner:inner-end", (0.3, 0.2, 1.0), 0.02),
         Fold("crease", to=angle) if held else Fold("crease", rest=1.0, Lstar=3.0),
     )
-    system = formulation("consistent").system(model, load_steps(model)[0], None)
+    system = first_system(model)
     x = mesh.points.copy()
     turned = x[:, 1] > 2.0
     y = x[turned, 1] - 2.0
@@ -248,7 +260,9 @@ def test_locks_belong_to_their_derivatives(angle: float) -> None:
         errors
     )  # the law of the lock is steep beside the step of the differences
     assert "touch" in system.contact(q, 0.4)
-    assert system.obstacle(q, 0.4)[0] == "contact"
+    obstacle = system.obstacle(q, 0.4)
+    assert obstacle is not None
+    assert obstacle[0] == "contact"
     tangent = system.tangent(q, 0.4, now.forces)
     v = np.random.default_rng(6).normal(size=system.size)
     wrong = []
@@ -342,7 +356,7 @@ def test_patches_do_not_matter(name: str, monkeypatch: pytest.MonkeyPatch) -> No
         monkeypatch.setattr(
             consistent_elements,
             "patches",
-            lambda *args, joined=joined, **more: patches(*args, joined=joined, **more),
+            partial(patches, joined=joined),
         )
         found.append(trace(KINDS[name]))
     sizes = [path.unknowns for path in found]
@@ -364,7 +378,7 @@ def test_pairs_condense_exactly() -> None:
     """B of a pair is the minimum over the rotation inside, for random angles, free edges included."""
     mesh = sector(4)
     model = sheet(mesh).fold("crease", to=2.0)
-    system = formulation("consistent").system(model, load_steps(model)[0], None)
+    system = first_system(model)
     e = system.elements
     rng = np.random.default_rng(0)
     theta = rng.normal(size=e.rotation.shape) * (e.patches.kind != 0)
@@ -380,7 +394,7 @@ def test_pairs_condense_exactly() -> None:
 
         def cost(h: Array, members: Array = members) -> float:
             return sum(
-                0.5 * h[3 * m : 3 * m + 3] @ e.B_triangle[t] @ h[3 * m : 3 * m + 3]
+                0.5 * float(h[3 * m : 3 * m + 3] @ e.B_triangle[t] @ h[3 * m : 3 * m + 3])
                 for m, t in enumerate(members)
             )
 
@@ -403,7 +417,7 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     responses = []
     for banded in (True, False):
         monkeypatch.setattr(pattern, "band_is_cheaper", lambda n, bandwidth, banded=banded: banded)
-        system = formulation(model.formulation).system(model, load_steps(model)[0], None)
+        system = first_system(model)
         assert system._pattern.banded is banded
         q = solved(name).records[0].q
         A = dense(system.tangent(q, 0.0, system.evaluate(q, 0.0).forces).matrix, system.size)

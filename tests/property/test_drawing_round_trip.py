@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import shapely
@@ -16,11 +17,12 @@ from meshes import CreasePattern
 from meshes.curves import sample
 from meshes.io import read_pattern, write_pattern
 from meshes.io.draw import flat_lines
+from meshes.pattern import FoldKind
 from meshes.planar import DrawnLine, heal
 from meshes.sheet import pattern_of
 from meshes.unstructured import sheet_area
 
-FOLDS = st.sampled_from(["mountain", "valley", "flat"])
+FOLDS: st.SearchStrategy[FoldKind] = st.sampled_from(get_args(FoldKind))
 SLOW = settings(max_examples=15, deadline=None)
 
 
@@ -85,7 +87,7 @@ def test_round_trip(pattern: CreasePattern, suffix: str) -> None:
 def test_gaps_below_the_tolerance_heal(seed: int, count: int, gap: float) -> None:
     """A triangulated square whose lines all miss each other by less than the gap has its vertices and faces back."""
     random = np.random.default_rng(seed)
-    inside = []
+    inside: list[np.ndarray] = []
     while len(inside) < count:  # at least 8 mm apart
         point = random.uniform(8.0, 92.0, 2)
         if all(np.linalg.norm(point - other) > 8.0 for other in inside):
@@ -117,7 +119,7 @@ def test_gaps_below_the_tolerance_heal(seed: int, count: int, gap: float) -> Non
     for a, b in sorted(pairs):
         ends = [points[a] + jitter(), points[b] + jitter()]
         lines.append(DrawnLine(np.array(ends[:: int(random.choice([1, -1]))]), kinds[a, b], f"{a}-{b}"))
-    random.shuffle(lines)  # type: ignore[arg-type]
+    random.shuffle(lines)
     graph = heal(lines, gap)
     assert (len(graph.points), len(graph.edges)) == (len(points), len(pairs))
     away = np.linalg.norm(graph.points[:, None] - points, axis=2)

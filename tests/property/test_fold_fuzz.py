@@ -21,7 +21,7 @@ FUZZ = settings(
 )
 
 
-def _crossed_square() -> dict:
+def _crossed_square() -> dict[str, Any]:
     """Four triangles round a vertex, two creases, drawn fold angles, a folded state that inherits."""
     return {
         "file_spec": 1.2,
@@ -42,7 +42,7 @@ def _crossed_square() -> dict:
     }
 
 
-def _ring() -> dict:
+def _ring() -> dict[str, Any]:
     """An annulus without faces: holes, curved sides, faces with inner rings."""
     count = 8
     rings = [
@@ -55,7 +55,7 @@ def _ring() -> dict:
     return {"vertices_coords": points, "edges_vertices": edges, "edges_assignment": letters}
 
 
-def _polygons() -> dict:
+def _polygons() -> dict[str, Any]:
     """A concave face, a quadrilateral and vertices on straight sides."""
     return {
         "vertices_coords": [[0, 0], [1, 0], [2, 0], [3, 0], [3, 2], [2, 1], [0, 2], [0, 1], [3, -1], [0, -1]],
@@ -86,7 +86,7 @@ VALUES = st.one_of(
 )
 
 
-def _places(value: object, place: tuple = ()) -> list[tuple]:
+def _places(value: object, place: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """The path of keys and indices to everything inside `value`."""
     found = [place] if place else []
     if isinstance(value, dict):
@@ -99,15 +99,15 @@ def _places(value: object, place: tuple = ()) -> list[tuple]:
 
 
 @st.composite
-def damaged(draw: st.DrawFn) -> dict:
+def damaged(draw: st.DrawFn) -> dict[str, Any]:
     """A seed with a few entries deleted, doubled, exchanged or replaced."""
-    data = copy.deepcopy(draw(st.sampled_from(SEEDS)))
+    data: dict[str, Any] = copy.deepcopy(draw(st.sampled_from(SEEDS)))
     for _ in range(draw(st.integers(1, 3))):
         places = _places(data)
         if not places:
             break
         *way, key = draw(st.sampled_from(places))
-        inside = data
+        inside: Any = data
         for step in way:
             inside = inside[step]
         action = draw(st.sampled_from(["replace", "replace", "delete", "double", "swap"]))

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,14 +95,14 @@ def test_grows_without_bound() -> None:
 # --------------------------------------------------------------------------------------- in a sheet
 
 
-def flap(stiffness: float = 0.01, along: int = 4, **how: float) -> Model:
+def flap(stiffness: float = 0.01, along: int = 4, **how: Any) -> Model:
     """A strip with a soft crease at rest flat, one panel of it clamped."""
     mesh = meshes.structured(meshes.strip(20.0, 10.0, [5.0]), along=along)
-    model = Model(mesh, SHEET, **how, formulation="bars-and-hinges").crease("crease", stiffness=stiffness)  # type: ignore[arg-type]
+    model = Model(mesh, SHEET, **how, formulation="bars-and-hinges").crease("crease", stiffness=stiffness)
     return model.support("crease:crease", "xyz").support("edge:inner", "xyz")
 
 
-def closing(force: float = 0.5, **how: float) -> Model:
+def closing(force: float = 0.5, **how: Any) -> Model:
     """Dead forces turn the free panel down, then push it up against the clamped one and on."""
     return (
         flap(**how)
@@ -120,7 +121,15 @@ def mirrored(model: Model) -> Model:
 
 
 def first_system(model: Model) -> BarsAndHingesSystem:
-    return formulation(model.formulation).system(model, load_steps(model)[0], None)  # type: ignore[no-any-return]
+    system = formulation(model.formulation).system(model, load_steps(model)[0], None)
+    assert isinstance(system, BarsAndHingesSystem)
+    return system
+
+
+def system_of(path: bh.Path, step: int) -> BarsAndHingesSystem:
+    system = path.system(step)
+    assert isinstance(system, BarsAndHingesSystem)
+    return system
 
 
 def bent_to(model: Model, angle: float) -> tuple[BarsAndHingesSystem, Array]:
@@ -199,7 +208,7 @@ def test_what_is_in_contact_is_named() -> None:
     mesh = flap().mesh
     held = trace(Model(mesh, SHEET, formulation="bars-and-hinges").fold("crease", to=0.2 * ZONE))
     assert held.outcome == "reached"
-    assert held.system(0).contact(held.records[-1].q, 1.0) == ""
+    assert system_of(held, 0).contact(held.records[-1].q, 1.0) == ""
     plain = (
         Model(mesh, SHEET, formulation="bars-and-hinges")
         .support("crease:crease", "xyz")
@@ -257,9 +266,9 @@ def test_soft_crease_stops(stiffness: float, force: float, other_way: bool) -> N
     left = until_closed(path[-1].dihedral("crease"))
     assert left.max() < 0.5 * ZONE
     assert path[-1].energy.lock > 0.0
-    said = path.system(1).contact(path.records[-1].q, 1.0)
+    said = system_of(path, 1).contact(path.records[-1].q, 1.0)
     assert said.startswith("the panels at crease 'crease' (edge ")
-    assert path.system(0).contact(path.records[0].q, 0.0) == ""
+    assert system_of(path, 0).contact(path.records[0].q, 0.0) == ""
 
 
 def test_harder_pressed_is_closer() -> None:
@@ -278,7 +287,7 @@ def test_without_the_lock_nothing_passes(other_way: bool) -> None:
     assert "would pass through each other" in path.reason
     assert path[-1].energy.lock == 0.0
     assert until_closed(path[-1].dihedral("crease")).min() < 1e-3
-    assert "touch" in path.system(1).contact(path.records[-1].q, path.records[-1].lam)
+    assert "touch" in system_of(path, 1).contact(path.records[-1].q, path.records[-1].lam)
 
 
 @pytest.mark.parametrize("small", [1e-9, 0.01, 0.6])
@@ -298,7 +307,7 @@ def test_work_is_total_plus_lock() -> None:
     path = trace(closing(5.0), strategy=bh.LoadControl(largest=0.02))
     assert path.outcome == "reached"
     for record, state in zip(path.records, path, strict=True):
-        system = path.system(record.step)
+        system = system_of(path, record.step)
         loads = float(np.vdot(system.force.at(record.lam), state.points - state.mesh.points))
         held = state.energy.total + state.energy.lock
         assert system.evaluate(record.q, record.lam).energy == pytest.approx(
@@ -306,7 +315,7 @@ def test_work_is_total_plus_lock() -> None:
         )
     near = [state for state in path if state.energy.lock > 0.0]
     assert len(near) > 5
-    force = path.system(1).force
+    force = system_of(path, 1).force
     work = sum(
         float(np.vdot(0.5 * (force.at(a.lam) + force.at(b.lam)), b.points - a.points))
         for a, b in pairwise(near)
@@ -340,7 +349,7 @@ def test_released_in_the_zone() -> None:
     model = flap(0.05).fold("crease", to=0.5 * ZONE).fold("crease", rest=1.0, stiffness=0.05)
     path = trace(model)
     assert path.outcome == "reached", path.reason
-    system = path.system(1)
+    system = system_of(path, 1)
     assert system.elements.lock[system.elements.bending :].all()
     assert system.evaluate(system.start(), 0.0).imbalance < 1e-7
     assert path[-1].dihedral("crease").mean() == pytest.approx(1.0, abs=0.05)

@@ -208,7 +208,7 @@ def test_valley_mirrors_mountain(kind: str, how: str) -> None:
 
 @every
 def test_fold_by_is_mountain_or_valley_as_drawn(kind: str, how: str) -> None:
-    fold = {"by": 1.0} if how == "held" else {"by": 1.0, "Lstar": 25.0}
+    fold: dict[str, Any] = {"by": 1.0} if how == "held" else {"by": 1.0, "Lstar": 25.0}
     up = solve(free(sector(kind, "mountain")).fold("crease", **fold))
     down = solve(free(sector(kind, "valley")).fold("crease", **fold))
     assert_same_energies(up, down)
@@ -238,7 +238,7 @@ def test_left_and_right_with_loads_and_supports() -> None:
 
     def model(mesh: SheetMesh, s: Array) -> Model:
         def vector(*v: float) -> list[float]:
-            return (np.array(v) * s).tolist()
+            return [float(x) for x in np.array(v) * s]
 
         supported = (
             Model(mesh, SHEET, formulation="bars-and-hinges")

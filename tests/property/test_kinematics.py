@@ -34,7 +34,7 @@ def hinge(dihedral: float, length: float, heights: tuple[float, float], feet: tu
 def rotation(seed: int) -> Array:
     Q, R = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     Q = Q * np.sign(np.diag(R))
-    return Q * np.sign(np.linalg.det(Q))
+    return np.asarray(Q * np.sign(np.linalg.det(Q)))
 
 
 def angle(x: Array) -> float:
@@ -53,16 +53,17 @@ def reference_angles(x: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
 
     def height(wing: NDArray[np.longdouble]) -> NDArray[np.longdouble]:
         w = wing - j
-        return w - (w * e).sum(axis=1)[:, None] * e
+        return np.asarray(w - (w * e).sum(axis=1)[:, None] * e)
 
     ua, ub = height(a), height(b)
     cross = np.cross(ua, ub)
     opening = np.arctan2(np.sqrt((cross * cross).sum(axis=1)), (ua * ub).sum(axis=1))
     upper_normal_b = np.cross(ub, e)  # triangle (k, j, b) is counter-clockwise from above
     above = (ua * upper_normal_b).sum(axis=1) > 0
-    return np.where(above, 2 * np.arctan2(LONG(0), LONG(-1)) - opening, opening)
+    return np.asarray(np.where(above, 2 * np.arctan2(LONG(0), LONG(-1)) - opening, opening))
 
 
+Pair = tuple[float, float]
 WEIGHTS = ((1, LONG(8) / 12), (-1, LONG(-8) / 12), (2, LONG(-1) / 12), (-2, LONG(1) / 12))
 
 
@@ -76,7 +77,7 @@ def reference_gradient(x: Array, steps: Array) -> Array:
             moved.append(y)
             weights.append(weight / LONG(steps[i // 3]))
     terms = reference_angles(np.array(moved)) * np.array(weights)
-    return terms.reshape(12, 4).sum(axis=1).astype(float)
+    return np.asarray(terms.reshape(12, 4).sum(axis=1), dtype=float)
 
 
 def differenced_gradient(x: Array, steps: Array) -> Array:
@@ -90,7 +91,7 @@ def differenced_gradient(x: Array, steps: Array) -> Array:
             weights.append(float(weight) / steps[i // 3])
     hinges = np.arange(4 * len(moved)).reshape(-1, 4)
     g = kinematics.dihedral_gradients(np.concatenate(moved), hinges)
-    return (g * np.array(weights)[:, None]).reshape(12, 4, 12).sum(axis=1)
+    return np.asarray((g * np.array(weights)[:, None]).reshape(12, 4, 12).sum(axis=1))
 
 
 def sizes(x: Array) -> Array:
@@ -135,7 +136,7 @@ seeds = st.integers(0, 10_000)
 
 @CHECK
 @given(dihedrals, st.tuples(heights, heights), st.tuples(feet, feet), seeds)
-def test_angle_is_the_one_that_was_folded(dihedral: float, h: tuple, s: tuple, seed: int) -> None:
+def test_angle_is_the_one_that_was_folded(dihedral: float, h: Pair, s: Pair, seed: int) -> None:
     x = hinge(dihedral, 1.3, h, s) @ rotation(seed).T
     assert angle(x) == pytest.approx(dihedral, abs=1e-12 * (1.0 + 1.0 / min(h)))
 
@@ -151,7 +152,7 @@ def test_angle_of_random_hinges(seed: int) -> None:
 
 @QUICK
 @given(st.floats(0.02, 2 * math.pi - 0.02), st.tuples(heights, heights), st.tuples(feet, feet), seeds)
-def test_rigid_motion_changes_nothing(dihedral: float, h: tuple, s: tuple, seed: int) -> None:
+def test_rigid_motion_changes_nothing(dihedral: float, h: Pair, s: Pair, seed: int) -> None:
     x = hinge(dihedral, 1.0, h, s)
     Q, shift = rotation(seed), np.random.default_rng(seed).normal(size=3)
     moved = x @ Q.T + shift
@@ -165,7 +166,7 @@ def test_rigid_motion_changes_nothing(dihedral: float, h: tuple, s: tuple, seed:
 
 @QUICK
 @given(st.floats(0.02, 2 * math.pi - 0.02), st.tuples(heights, heights), st.tuples(feet, feet))
-def test_derivatives_do_no_work_on_rigid_motions(dihedral: float, h: tuple, s: tuple) -> None:
+def test_derivatives_do_no_work_on_rigid_motions(dihedral: float, h: Pair, s: Pair) -> None:
     x = hinge(dihedral, 1.0, h, s)
     g = kinematics.dihedral_gradients(x, HINGE)[0].reshape(4, 3)
     scale = float(np.abs(g).max())
@@ -181,7 +182,7 @@ def test_derivatives_do_no_work_on_rigid_motions(dihedral: float, h: tuple, s: t
 
 @QUICK
 @given(dihedrals, st.tuples(heights, heights), st.tuples(feet, feet))
-def test_mirror_image_has_the_explementary_angle(dihedral: float, h: tuple, s: tuple) -> None:
+def test_mirror_image_has_the_explementary_angle(dihedral: float, h: Pair, s: Pair) -> None:
     x = hinge(dihedral, 1.0, h, s)
     mirrored = x * np.array([1.0, 1.0, -1.0])
     assert angle(x) + angle(mirrored) == pytest.approx(2.0 * math.pi, abs=1e-13)
@@ -228,7 +229,7 @@ def test_both_ends_of_the_turn_are_read() -> None:
 
 @CHECK
 @given(dihedrals, st.tuples(heights, heights), st.tuples(feet, feet), seeds)
-def test_derivatives_of_folded_hinges(dihedral: float, h: tuple, s: tuple, seed: int) -> None:
+def test_derivatives_of_folded_hinges(dihedral: float, h: Pair, s: Pair, seed: int) -> None:
     """All angles, also flat and nearly closed; wings from 1/1000 to 10 edges high, feet far outside the edge."""
     check_derivatives(hinge(dihedral, 1.3, h, s) @ rotation(seed).T, gradient=1e-9)
 

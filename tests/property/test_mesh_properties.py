@@ -16,6 +16,7 @@ from meshes import CreasePattern, SheetMesh, annulus_sector, full_annulus, strip
 from meshes.cells import Kind
 from meshes.curves import Arc
 from meshes.io import read_fold, write_fold
+from meshes.pattern import FoldKind
 from meshes.topology import boundary_loops
 
 PROPERTY = settings(
@@ -32,7 +33,7 @@ def patterns(draw: st.DrawFn) -> CreasePattern:
     steps = draw(st.lists(st.floats(0.1, 1.0), min_size=0, max_size=4))
     name = draw(st.sampled_from(["strip", "sector", "annulus"]))
     creases = len(steps) if name == "strip" else len(steps[:3]) + 1
-    folds = [draw(st.sampled_from(["mountain", "valley"])) for _ in range(creases)]
+    folds: list[FoldKind] = [draw(st.sampled_from(get_args(FoldKind)[:2])) for _ in range(creases)]
     if name == "strip":
         heights = [scale * h for h in np.cumsum(steps)]
         width = (heights[-1] if heights else 0.0) + scale * draw(st.floats(0.1, 1.0))
@@ -226,7 +227,7 @@ def _letter(mesh: SheetMesh, name: str) -> str:
     return "B" if name.startswith("edge:") else mesh.folds[name.removeprefix("crease:")][0].upper()
 
 
-def _read(data: dict) -> SheetMesh:
+def _read(data: dict[str, Any]) -> SheetMesh:
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "sheet.fold"
         path.write_text(json.dumps(data))

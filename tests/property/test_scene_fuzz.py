@@ -184,7 +184,7 @@ def test_the_scenes_are_right(scene: Any, folder: Any) -> None:
     assert isinstance(parse_scene(text_of(scene), folder), Scene)
 
 
-COMMON = {
+COMMON: dict[str, Any] = {
     "deadline": None,
     "suppress_health_check": [HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 }

@@ -147,11 +147,17 @@ def solved(name: str) -> bh.Path:
     return path
 
 
+def system_of(path: bh.Path, step: int) -> BarsAndHingesSystem:
+    system = path.system(step)
+    assert isinstance(system, BarsAndHingesSystem)
+    return system
+
+
 def systems(name: str) -> list[tuple[BarsAndHingesSystem, Array, float]]:
     """System, unknowns and lambda of the last state of every step."""
     path = solved(name)
     last = {record.step: record for record in path.records}
-    return [(path.system(step), record.q, record.lam) for step, record in last.items()]
+    return [(system_of(path, step), record.q, record.lam) for step, record in last.items()]
 
 
 def disturbed(system: BarsAndHingesSystem, q: Array, seed: int) -> Array:
@@ -207,7 +213,7 @@ def test_energy_is_that_of_the_state(name: str) -> None:
     """Potential at equilibrium = elastic energy of the state less the work of the dead loads."""
     path = solved(name)
     for record, state in zip(path.records, path, strict=True):
-        system = path.system(record.step)
+        system = system_of(path, record.step)
         e = system.elements
         turn = state.dihedral_angles[e.source] - e.rest.at(record.lam)
         loads = float(e.couple.at(record.lam) @ turn)
@@ -229,7 +235,7 @@ def test_states_are_in_equilibrium(name: str) -> None:
     """Every accepted state satisfies its equations, and says whether it is stable."""
     path = solved(name)
     for record in path.records:
-        system = path.system(record.step)
+        system = system_of(path, record.step)
         now = system.evaluate(record.q, record.lam)
         assert now.imbalance <= 1e-8
         # relative to the bars' forces, above what rounding of 1e-14 makes of stiffness times size
@@ -255,7 +261,7 @@ def test_band_and_sparse_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> No
         force_storage(monkeypatch, banded)
         path = trace(model)
         assert path.outcome == "reached"
-        assert path.system(0)._pattern.banded is banded  # the choice was forced
+        assert system_of(path, 0)._pattern.banded is banded  # the choice was forced
         found.append(path)
     one, two = found
     assert len(one) == len(two)
@@ -309,7 +315,7 @@ def test_free_body_solves_the_singular_system(
     force_storage(monkeypatch, banded)
     model = KINDS[name]
     path = trace(model)
-    system = path.system(0)
+    system = system_of(path, 0)
     loaded = np.abs(system.force.end).max() > 0.0
     for record in (path.records[0], path.records[-1]):
         matrix = system.tangent(record.q, record.lam, system.evaluate(record.q, record.lam).forces).matrix
@@ -375,7 +381,7 @@ def test_linear_response_is_exact_enough(name: str) -> None:
     path = solved(name)
     for index in (0, len(path) - 1):
         record = path.records[index]
-        system = path.system(record.step)
+        system = system_of(path, record.step)
         matrix = system.tangent(record.q, record.lam, system.evaluate(record.q, record.lam).forces).matrix
         rate = system.control_rate(record.q, record.lam)
         n, A = system.primal, dense(matrix, system.size)

@@ -14,6 +14,7 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from bh.solvers.outcome import Outcome
 from verification.framework import cases, command
 from verification.framework.alignment import aligned, hausdorff
 from verification.framework.checks import CaseResult, Check, Context
@@ -123,7 +124,7 @@ def test_what_was_not_reached_is_no_value() -> None:
     assert record["outcome"] == "stalled"
 
 
-def solved(outcome: str = "reached") -> folding.Solved:
+def solved(outcome: Outcome = Outcome.REACHED) -> folding.Solved:
     return replace(folding.solve("a", 8, 1), outcome=outcome)
 
 
@@ -131,7 +132,7 @@ def test_an_unconverged_mesh_spoils_the_table() -> None:
     """One of three meshes fails, not the finest: no limit, no rate, no value in any record."""
     result = CaseResult("appendix_b_shell", "t", "q", "s")
     meshes = ((8, 1), (16, 2), (32, 4))
-    table.record(result, "a", [solved(), solved("stalled"), solved()], meshes)
+    table.record(result, "a", [solved(), solved(Outcome.STALLED), solved()], meshes)
     records = [check.record() for check in result.checks]
     assert len(records) == 5
     for record in records:
@@ -151,7 +152,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, module: Any, actuation: str, formul
         if (which, by) not in known:
             known[which, by] = real(which, 8, 1, by)
         failed = (which, by) == (actuation, formulation)
-        return replace(known[which, by], outcome="limit-point") if failed else known[which, by]
+        return replace(known[which, by], outcome=Outcome.LIMIT_POINT) if failed else known[which, by]
 
     monkeypatch.setattr(module, "solve", solve)
 

@@ -195,7 +195,7 @@ def test_the_base_scene_is_right() -> None:
     assert parse_scene(text_of()).model.steps
 
 
-SQUARE = {
+SQUARE: dict[str, Any] = {
     "file_spec": 1.2,
     "vertices_coords": [[0, 0], [10, 0], [10, 10], [0, 10]],
     "faces_vertices": [[0, 1, 2], [0, 2, 3]],

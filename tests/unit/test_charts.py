@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ def tip(path: bh.Path) -> str:
 
 
 def lines(figure: Any) -> list[Any]:
-    return figure.axes[0].get_lines()
+    return list(figure.axes[0].get_lines())
 
 
 def test_fold_angles_are_those_of_the_states(path: bh.Path) -> None:
@@ -88,7 +89,9 @@ def test_pattern_shows_creases_and_supports() -> None:
     )
     model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127)).support("edge:start", "xyz").support("node:3", "z")
     figure = plotting.pattern(model)
-    words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    legend = figure.axes[0].get_legend()
+    assert legend is not None
+    words = [text.get_text() for text in legend.get_texts()]
     assert words == ["mountain crease", "valley crease", "edge:start: xyz", "node:3: z"]
     held = next(line for line in lines(figure) if line.get_label() == "edge:start: xyz")
     assert np.column_stack(held.get_data()) == pytest.approx(mesh.points[mesh.nodes("edge:start")][:, :2])
@@ -117,15 +120,12 @@ def test_bad_requests_are_refused_in_one_line(path: bh.Path, draw: Any, message:
 
 @needs_opengl
 def test_animation_moves_and_stays_in_the_picture(path: bh.Path, tmp_path: Path) -> None:
-    from PIL import Image
+    from PIL import Image, ImageSequence
 
     file = plotting.animation(path, tmp_path / "lift.gif", size=(301, 240), fps=10, states=[0, 2, -1])
     with Image.open(file) as image:
         assert image.size == (300, 240)
-        frames = []
-        for index in range(image.n_frames):
-            image.seek(index)
-            frames.append(np.asarray(image.convert("RGB"), dtype=int))
+        frames = [np.asarray(one.convert("RGB"), dtype=int) for one in ImageSequence.Iterator(image)]
         assert len(frames) >= 3
     inside = [frame[40:160] for frame in frames[:3]]  # below the line of text, above the colour bar
     for one, two in itertools.pairwise(inside):
@@ -136,7 +136,7 @@ def test_animation_moves_and_stays_in_the_picture(path: bh.Path, tmp_path: Path)
 
 
 def test_mp4_needs_ffmpeg(path: bh.Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(moving.shutil, "which", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
     with pytest.raises(offscreen.PlotError, match="needs ffmpeg"):
         plotting.animation(path, tmp_path / "lift.mp4")

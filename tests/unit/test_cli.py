@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import bh.runtime.progress
+import meshes
 from bh.commands.cli import ABOUT, app, main
 from bh.paths.path import Path as Trace
 
@@ -142,6 +143,49 @@ def test_path_that_ends_early(here: Any, capsys: pytest.CaptureFixture[str]) -> 
     assert err.count("\n") == 1
     assert f"early.toml: step 2 of 3 ended early: {data['outcome']} ({data['reason']})" in err
     assert "out/result.json" in err
+
+
+def test_an_unstable_end_is_no_result(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    """A strip held in the middle buckles to opposite waves, which its half cannot: told everywhere."""
+    scene = """
+    symmetry = "x"
+    [pattern]
+    kind = "strip"
+    length = 60.0
+    width = 6.0
+    [sheet]
+    E = 4000.0
+    t = 0.5
+    [mesh]
+    kind = "alternating"
+    along = 32
+    [model]
+    formulation = "bars-and-hinges"
+    [[supports]]
+    at = "edge:start"
+    fix = "yz"
+    [[supports]]
+    at = "edge:end"
+    fix = "yz"
+    [[supports]]
+    at = MIDDLE
+    fix = "z"
+    [[steps]]
+    displace = [
+        { at = "edge:start", direction = "x", by = 0.0095 },
+        { at = "edge:end", direction = "x", by = -0.0095 },
+    ]
+    """
+    mesh = meshes.structured(meshes.strip(60.0, 6.0), along=32, kind="alternating")
+    middle = np.flatnonzero(np.abs(mesh.points[:, 0] - 30.0) < 1e-9).tolist()
+    (here / "squeezed.toml").write_text(scene.replace("MIDDLE", str(middle)))
+    assert main(["run", "squeezed.toml", "-o", "out", "--quiet", "--no-estimate"]) == 1
+    data = result("out/result.json")
+    assert data["outcome"] == data["steps"][0]["outcome"] == "unstable"
+    assert data["stable"] is False
+    assert "leave the symmetry" in data["reason"]
+    assert "ended early: unstable" in capsys.readouterr().err
+    assert Trace.load("out/path.bh").outcome == "unstable"
 
 
 def test_locked_hinges_let_it_reach_its_end(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
@@ -423,7 +467,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Pictures and series are told of, not made; `tests` of plotting make them."""
     import bh.plotting
 
-    calls = []
+    calls: list[tuple[Any, ...]] = []
     monkeypatch.setattr(
         bh.plotting, "picture", lambda state, file, **_: calls.append(("picture", state.lam, file))
     )

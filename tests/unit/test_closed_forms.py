@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -200,9 +201,14 @@ def test_rectangle_bent_by_its_middle_hinge() -> None:
     assert 0.5 * k * theta**2 == pytest.approx(2.0 * E * T**3 / 24.0 * L_h * theta**2 / W)
 
 
+def square_cell() -> meshes.SheetMesh:
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    return meshes.SheetMesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
 def test_square_cell_folded_along_its_diagonal() -> None:
     """Two triangles, one hinge: imposed out-of-plane displacement turns it by w / h, energy 1/2 k (w / h)^2."""
-    mesh = meshes.SheetMesh([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]])
+    mesh = square_cell()
     w = 1e-5
     model = (
         Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
@@ -216,7 +222,7 @@ def test_square_cell_folded_along_its_diagonal() -> None:
 
 def test_square_cell_is_dead_loaded() -> None:
     """The same hinge under a dead force: w = F h^2 / k, potential - F w / 2."""
-    mesh = meshes.SheetMesh([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]])
+    mesh = square_cell()
     model = (
         Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
         .support([0, 1, 2], "xyz")
@@ -244,7 +250,7 @@ def folded_strip(kind: Kind, rows: int, fold: str = "mountain") -> Model:
 @pytest.mark.parametrize(
     "how", [{"to": 1.0}, {"to": 5.0}, {"rest": 1.0, "Lstar": 5.0}], ids=["up", "down", "spring"]
 )
-def test_straight_crease_folds_for_nothing(kind: Kind, rows: int, how: dict) -> None:
+def test_straight_crease_folds_for_nothing(kind: Kind, rows: int, how: dict[str, Any]) -> None:
     """Panels stay rigid: no bending, no stretching (relative to what the plates would store at one radian)."""
     path = trace(folded_strip(kind, rows).fold("crease", **how))
     assert path.outcome == "reached", path.reason

@@ -49,10 +49,12 @@ def model() -> bh.Model:
     return bh.Model(mesh, bh.Sheet(E=1.0, t=0.1)).fold("crease", to=math.pi - 0.1)
 
 
-def test_a_compilation_is_told_once(model, monkeypatch, caplog) -> None:
+def test_a_compilation_is_told_once(
+    model: bh.Model, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr(compiling, "_told", False)
 
-    def compile_two(model, **_):
+    def compile_two(model: bh.Model, **_: object) -> SimpleNamespace:
         njit(lambda x: x + 1.0)(1.0)
         njit(lambda x: x + 2.0)(1.0)
         return SimpleNamespace(accuracy=None)
@@ -69,7 +71,7 @@ def test_a_compilation_is_told_once(model, monkeypatch, caplog) -> None:
     assert len(meter.notes) == 1
 
 
-def test_nothing_is_told_where_nothing_is_compiled(model, monkeypatch) -> None:
+def test_nothing_is_told_where_nothing_is_compiled(model: bh.Model, monkeypatch: pytest.MonkeyPatch) -> None:
     bh.trace(model)  # from now on all is there
     monkeypatch.setattr(compiling, "_told", False)
     meter = Listener()

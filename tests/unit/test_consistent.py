@@ -333,7 +333,9 @@ def test_scene_with_a_clamp(tmp_path: Any) -> None:
     from bh.scene.load import parse_scene
 
     scene = parse_scene(SCENE)
-    assert scene.model.supports[0].clamp is True
+    (support,) = scene.model.supports
+    assert isinstance(support, Support)
+    assert support.clamp is True
     free = replace(scene.model, supports=(Support("edge:start", "xyz"),))
     assert fingerprint(free) != fingerprint(scene.model)
     path = trace(scene.model, file=tmp_path / "path.bh")

@@ -59,7 +59,7 @@ def bent(mesh: meshes.SheetMesh, curve: Callable[[Array], Array]) -> State:
 def rotation(seed: int) -> Array:
     Q, R = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     Q = Q * np.sign(np.diag(R))
-    return Q * np.sign(np.linalg.det(Q))
+    return np.asarray(Q * np.sign(np.linalg.det(Q)))
 
 
 # --------------------------------------------------------------------------------------- two triangles
@@ -138,7 +138,7 @@ def crossing_by_orientation(A: Array, B: Array) -> bool:
     for one, two in ((A, B), (B, A)):
         for i in range(3):
             p, q = one[i], one[(i + 1) % 3]
-            if volume(*two, p) * volume(*two, q) < 0.0:
+            if volume(two[0], two[1], two[2], p) * volume(two[0], two[1], two[2], q) < 0.0:
                 signs = {volume(p, q, two[k], two[(k + 1) % 3]) > 0.0 for k in range(3)}
                 if len(signs) == 1:
                     return True

@@ -15,7 +15,7 @@ import meshes
 from bh import ArcLength, Automatic, DisplacementControl, LoadControl, Model, Newton, Sheet, trace
 from bh.solvers.arc_length import Displacement, Generalised
 from bh.solvers.automatic import behind_limit
-from bh.solvers.increments import ARC, DISPLACEMENT, LOAD, Increment, Point, fold_ahead, point
+from bh.solvers.increments import ARC, DISPLACEMENT, LOAD, Increment, Mode, Point, fold_ahead, point
 from bh.solvers.outcome import Outcome
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.stability import leave_saddle
@@ -158,7 +158,7 @@ def test_load_control_alone_names_the_limit_point() -> None:
     assert found[-1].point.lam * 0.5 < ARCH_LIMIT
 
 
-def at(lam: float, q: float, mode: str = LOAD, negative: int | None = 0) -> Point:
+def at(lam: float, q: float, mode: Mode = LOAD, negative: int | None = 0) -> Point:
     return Point(lam, np.array([q]), np.zeros(0), 0.0, 0.0, mode, negative)
 
 
@@ -255,6 +255,16 @@ def test_unstable_end_is_told() -> None:
     assert path.stable is False
     assert path.records[-1].negative == 1
     assert "the last state is not stable (1 negative mode)" in path.remarks
+
+
+def test_a_thin_ring_of_bars_and_hinges_leaves_the_plane() -> None:
+    """It stayed flat at 900 times the energy: modes as soft as a shift let Newton creep."""
+    mesh = meshes.structured(meshes.full_annulus(100.0, 5.0), along=48)
+    path = trace(Model(mesh, Sheet(E=4000.0, t=0.02), formulation="bars-and-hinges").fold("crease", to=2.2))
+    assert path.outcome == "reached"
+    assert path.stable
+    assert path[-1].energy.total == pytest.approx(0.003976, rel=0.01)
+    assert np.ptp(path[-1].points[:, 2]) > 40.0
 
 
 def two_panels() -> Model:

@@ -119,7 +119,7 @@ def test_what_cannot_be_says_so_in_one_line() -> None:
     assert deep.weakest == deep.isotropy == 0.0
     for how in ({"depth": 0.0}, {"area": -1.0}, {"panels": ()}):
         with pytest.raises(ModelError):
-            Task(**how)  # type: ignore[arg-type]
+            Task(**how)
     with pytest.raises(ModelError, match="k_x / k_y = -1"):
         with_ratio(-1.0)
     with pytest.raises(ModelError, match="both supports"):

@@ -11,7 +11,8 @@ import pytest
 import bh
 from bh import ModelError
 from bh.applications.corrugation.bending import Rig, _turn, second_stage, settle, three_point
-from bh.applications.corrugation.folding import POLYESTER, Folded, fold
+from bh.applications.corrugation.folded import Folded
+from bh.applications.corrugation.folding import POLYESTER, fold
 from bh.applications.corrugation.sections import bottom_up, rectangles, section_moments, top_down
 from bh.formulations.observables import depth_of
 

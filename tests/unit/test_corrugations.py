@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from bh import Model, Sheet, trace
 from bh.errors import SceneError
 from bh.scene.load import parse_scene
 from meshes import PatternError
+from meshes.cells import Kind
 from meshes.corrugations import KINDS
 from meshes.curves import sample
 from meshes.tapered import smallest_angles
@@ -45,7 +48,7 @@ def test_curves_are_those_of_the_equations(kind: str) -> None:
 @pytest.mark.parametrize("kind", CURVED)
 @pytest.mark.parametrize("mesh_kind", ["staggered", "alternating"])
 @pytest.mark.parametrize(("along", "rows"), [(24, 1), (40, 3), (64, 6)])
-def test_meshes_of_tapering_panels(kind: str, mesh_kind: str, along: int, rows: int) -> None:
+def test_meshes_of_tapering_panels(kind: str, mesh_kind: Kind, along: int, rows: int) -> None:
     """They cover the sheet, nodes lie on the curves, and slivers are only next to the corners."""
     pattern = meshes.corrugation(kind)
     mesh = meshes.structured(pattern, along=along, rows=rows, kind=mesh_kind)
@@ -92,7 +95,7 @@ def test_family_holds_the_four_curved_ones() -> None:
     ):
         x = np.linspace(-49.0, 49.0, 99)
         for i, rail in enumerate(meshes.curved_corrugation(p, q, s).rails[1:]):
-            y = np.interp(x, *sample(rail).T, left=0.0, right=0.0)
+            y = np.interp(x, sample(rail)[:, 0], sample(rail)[:, 1], left=0.0, right=0.0)
             assert np.abs(y - formula(kind, i, x)).max() < 2e-3
 
 
@@ -129,7 +132,7 @@ def test_impossible_parameters_are_one_line(arguments: dict[str, object], messag
 @pytest.mark.parametrize(
     "bad", [{"exponent": 0.5}, {"root": 0.0}, {"spread": 1.5}, {"spread": float("nan")}, {"exponent": 1e4}]
 )
-def test_impossible_family_members(bad: dict[str, float]) -> None:
+def test_impossible_family_members(bad: dict[str, Any]) -> None:
     with pytest.raises(PatternError, match="cannot be; give a number"):
         meshes.curved_corrugation(**bad)
 

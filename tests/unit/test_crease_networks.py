@@ -39,7 +39,7 @@ def vertex(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_a_vertex_of_four_creases(tmp_path, formulation):
+def test_a_vertex_of_four_creases(tmp_path: Path, formulation: str) -> None:
     """Flat-foldable vertex: opposite fold angles are equal, tan(a/2) / tan(b/2) is constant (Tachi 2009, Eq. 3).
 
     One crease is folded, the others turn freely; faces may bend but need not, so there is no energy.
@@ -69,7 +69,7 @@ def test_a_vertex_of_four_creases(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_creases_that_end_inside_fold_as_springs(tmp_path, formulation):
+def test_creases_that_end_inside_fold_as_springs(tmp_path: Path, formulation: str) -> None:
     file = tmp_path / "dart.svg"
     file.write_text(
         '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="60mm" viewBox="0 0 100 60">'
@@ -85,7 +85,7 @@ def test_creases_that_end_inside_fold_as_springs(tmp_path, formulation):
     assert angle[0] > angle[-1]
 
 
-def test_a_closed_crease_folds(tmp_path):
+def test_a_closed_crease_folds(tmp_path: Path) -> None:
     """A circle in a square: the disc inside cannot bend with it, so the sheet stretches or buckles, and it is told."""
     file = tmp_path / "ring.svg"
     file.write_text(
@@ -99,7 +99,7 @@ def test_a_closed_crease_folds(tmp_path):
     assert path[-1].energy.stretching > 0.0
 
 
-def test_springs_of_a_folded_sheet_begin_at_its_angles():
+def test_springs_of_a_folded_sheet_begin_at_its_angles() -> None:
     """A tent that is made with a fold of 0.8 rad: a spring asked for that angle has nothing to do."""
     height = 20.0 * math.sin(0.4)
     half = 20.0 * math.cos(0.4)
@@ -124,14 +124,14 @@ class TestFilesOfOtherPrograms:
 
     @pytest.mark.parametrize("formulation", FORMULATIONS)
     @pytest.mark.parametrize("name", ["cone_pleat", "cones", "miura", "fan", "ring_pleats"])
-    def test_own_faces(self, name, formulation):
+    def test_own_faces(self, name: str, formulation: str) -> None:
         mesh = read_drawn(DATA / f"{name}.svg", fit=200.0)
         path = bh.trace(bh.Model(mesh, SHEET, formulation=formulation).fold("all", by=0.8, Lstar=25.0))
         assert path.outcome == "reached"
         assert path.stable
         assert first_contact(path) is None
 
-    def test_as_drawn(self):
+    def test_as_drawn(self) -> None:
         """The opacity of the lines of this one says 90 degrees."""
         mesh = read_drawn(DATA / "fan.svg", fit=200.0)
         path = bh.trace(bh.Model(mesh, SHEET, formulation="consistent").fold("all", by="drawn", Lstar=5.0))
@@ -139,14 +139,14 @@ class TestFilesOfOtherPrograms:
         assert path[-1].fold_angle("mountain").mean() == pytest.approx(0.5 * math.pi, rel=0.05)
 
     @pytest.mark.parametrize("formulation", FORMULATIONS)
-    def test_pleats_on_rulings(self, formulation):
+    def test_pleats_on_rulings(self, formulation: str) -> None:
         mesh = structured(read_pattern(DATA / "pleats.svg", fit=200.0), aspect_ratio=8.0)
         path = bh.trace(bh.Model(mesh, SHEET, formulation=formulation).fold("all", by=1.2, Lstar=5.0))
         assert path.outcome == "reached"
         assert path.stable
         assert first_contact(path) is None
 
-    def test_miura_imposed(self):
+    def test_miura_imposed(self) -> None:
         """Its angles do not fit together all at once, so panels bend; the driver takes it all the same."""
         mesh = read_drawn(DATA / "miura.svg", fit=200.0)
         path = bh.trace(bh.Model(mesh, SHEET, formulation="consistent").fold("all", by=0.8))
@@ -155,7 +155,7 @@ class TestFilesOfOtherPrograms:
             np.full(len(mesh.crease_edges("mountain")), 0.8)
         )
 
-    def test_a_rigid_fold_unfolds_and_folds_further(self):
+    def test_a_rigid_fold_unfolds_and_folds_further(self) -> None:
         mesh = read_fold(DATA / "rigid_miura.fold")
         model = bh.Model(mesh, SHEET, formulation="consistent")
         flat = bh.trace(model.fold("all", by=0.0))
@@ -167,7 +167,7 @@ class TestFilesOfOtherPrograms:
         assert more.outcome == "reached"
         assert more[-1].fold_angle("mountain").mean() > flat[0].fold_angle("mountain").mean()
 
-    def test_layers_that_lie_on_each_other_are_told(self):
+    def test_layers_that_lie_on_each_other_are_told(self) -> None:
         """Two of the four faces of this file lie on the other two: it begins in contact."""
         path = bh.trace(bh.Model(read_fold(DATA / "layers.fold"), SHEET).fold("all", by=0.3, Lstar=25.0))
         assert path.outcome != "reached" or first_contact(path) is not None

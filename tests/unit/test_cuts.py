@@ -26,6 +26,7 @@ from meshes import (
     structured,
     unstructured,
 )
+from meshes.curves import Curve
 from meshes.cuts import CUTS
 from meshes.fans import lips, places, take_apart
 from meshes.io import read_fold, read_pattern, write_fold, write_pattern
@@ -35,7 +36,7 @@ CORNERS = ((0.0, 0.0), (100.0, 0.0), (100.0, 60.0), (0.0, 60.0))
 SHEET = '<rect x="0" y="0" width="100" height="60" stroke="black" fill="none"/>'
 
 
-def sheet(*cuts: object, creases: tuple[Crease, ...] = ()) -> CreasePattern:
+def sheet(*cuts: Curve, creases: tuple[Crease, ...] = ()) -> CreasePattern:
     """A sheet of 100 x 60 mm with these cuts."""
     sides = tuple((f"side-{k + 1}", Line(CORNERS[k], CORNERS[(k + 1) % 4])) for k in range(4))
     named = tuple((f"cut-{k + 1}", cut) for k, cut in enumerate(cuts))
@@ -66,7 +67,8 @@ def red(x1: float, y1: float, x2: float, y2: float) -> str:
     return f'<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" stroke="#ff0000"/>'
 
 
-KINDS = {
+Spots = tuple[tuple[float, float, int], ...]
+KINDS: dict[str, tuple[tuple[Curve, ...], int, int, Spots]] = {
     # cuts, Euler characteristic, pieces, copies of the nodes at some place: (x, y, how many nodes)
     "inside": ((cut(20, 30, 80, 30),), 0, 1, ((20, 30, 1), (80, 30, 1))),
     "from the rim": ((cut(0, 30, 80, 30),), 1, 1, ((0, 30, 2), (80, 30, 1))),
@@ -88,7 +90,7 @@ KINDS = {
 
 class TestMeshes:
     @pytest.mark.parametrize("name", KINDS)
-    def test_kinds(self, name):
+    def test_kinds(self, name: str) -> None:
         cuts, characteristic, pieces, spots = KINDS[name]
         mesh = unstructured(sheet(*cuts), size=8.0)
         assert mesh.areas.sum() == pytest.approx(6000.0)
@@ -105,7 +107,7 @@ class TestMeshes:
         assert (rim < 0).all()
         assert len(lips(mesh.points, mesh.topology)) == len(every) / 2
 
-    def test_left_lip_first(self):
+    def test_left_lip_first(self) -> None:
         mesh = unstructured(sheet(cut(20, 30, 80, 30)), size=8.0)
         pairs = mesh.edge_sets["edge:cut-1"]
         edges = mesh.topology.find_edges(pairs)
@@ -115,7 +117,7 @@ class TestMeshes:
         assert (side[half:] < 0.0).all()
         assert (mesh.points[pairs[:, 0], 0] < mesh.points[pairs[:, 1], 0]).all()
 
-    def test_closed_cuts_leave_holes(self):
+    def test_closed_cuts_leave_holes(self) -> None:
         mesh = unstructured(sheet(Arc((50.0, 30.0), 15.0, 0.0, 2.0 * math.pi)), size=5.0)
         assert euler(mesh) == 0
         assert mesh.areas.sum() == pytest.approx(6000.0 - math.pi * 15.0**2, rel=5e-3)
@@ -123,14 +125,14 @@ class TestMeshes:
         (remark,) = mesh.remarks
         assert "1 piece within closed cuts" in remark
 
-    def test_a_crease_on_a_piece_that_falls_out_goes_with_it(self):
+    def test_a_crease_on_a_piece_that_falls_out_goes_with_it(self) -> None:
         lines = [cut(30, 20, 70, 20), cut(70, 20, 70, 40), cut(70, 40, 30, 40), cut(30, 40, 30, 20)]
         creases = (Crease("in", cut(30, 20, 70, 40)), Crease("out", cut(70, 40, 100, 60)))
         mesh = unstructured(sheet(*lines, creases=creases), size=40.0)
         assert mesh.creases == ("out",)
         assert mesh.areas.sum() == pytest.approx(6000.0 - 800.0)
 
-    def test_creases_end_at_cuts(self):
+    def test_creases_end_at_cuts(self) -> None:
         creases = (Crease("a", cut(0, 30, 20, 30)), Crease("b", cut(50, 0, 50, 30)))
         mesh = unstructured(sheet(cut(20, 30, 80, 30), creases=creases), size=8.0)
         assert len(mesh.nodes("near:50,30")) == 2
@@ -140,25 +142,26 @@ class TestMeshes:
         below = mesh.triangles[(mesh.triangles == end).any(axis=1)]
         assert (mesh.points[below][..., 1] <= 30.0 + 1e-9).all()
 
-    def test_corners_are_all_nodes_there(self):
+    def test_corners_are_all_nodes_there(self) -> None:
         mesh = unstructured(sheet(cut(0, 0, 50, 30)), size=8.0)
         at = mesh.nodes("corner:side-1-side-4")
         assert len(at) == 2
         assert not mesh.points[at].any()
         assert len(mesh.nodes(f"node:{at[1]}")) == 1
 
-    def test_structured_where_cuts_follow_cells(self):
+    def test_structured_where_cuts_follow_cells(self) -> None:
         pattern = replace(strip(100, 20, [10.0]), cuts=(("cut-1", cut(50, 0, 50, 10)),))
         mesh = structured(pattern, along=20, rows=2, kind="alternating")
         whole = structured(strip(100, 20, [10.0]), along=20, rows=2, kind="alternating")
         assert len(mesh.points) == len(whole.points) + 2
         assert len(mesh.triangles) == len(whole.triangles)
         assert mesh.pattern is pattern
+        assert mesh.spans is not None
         assert mesh.spans.shape == mesh.topology.edges.shape
         with pytest.raises(MeshError, match="does not run along the edges"):
             structured(pattern, along=19, rows=2, kind="alternating")
 
-    def test_structured_rings(self):
+    def test_structured_rings(self) -> None:
         from meshes import full_annulus
 
         pattern = full_annulus([20.0, 30.0], 8.0)
@@ -170,7 +173,7 @@ class TestMeshes:
         assert mesh.pieces.max() == 0
         assert "fell out" in mesh.remarks[0]
 
-    def test_shell_nodes_are_doubled_too(self):
+    def test_shell_nodes_are_doubled_too(self) -> None:
         from meshes.curved import lift
 
         mesh = unstructured(sheet(Arc((50.0, 30.0), 15.0, 0.0, math.pi)), size=8.0)
@@ -182,13 +185,13 @@ class TestMeshes:
         assert (middle[:half] == middle[half:]).all()
         assert len(lips(lifted.nodes, lifted.linear.topology)) == len(pairs)
 
-    def test_ruled(self):
+    def test_ruled(self) -> None:
         pattern = sheet(cut(50, 0, 50, 30), creases=(Crease("m1", cut(0, 30, 100, 30)),))
         mesh = ruled(pattern, [np.array([[50.0, 30.0], [50.0, 60.0]])], spacing=20.0)
         assert mesh.areas.sum() == pytest.approx(6000.0)
         assert len(lips(mesh.points, mesh.topology)) == 2
 
-    def test_what_cannot_be(self):
+    def test_what_cannot_be(self) -> None:
         with pytest.raises(PatternError, match="cut 'cut-1' and cut 'cut-2' cross"):
             sheet(cut(20, 30, 80, 30), cut(50, 10, 50, 50))
         with pytest.raises(PatternError, match="crease 'm' and cut 'cut-1' cross"):
@@ -198,7 +201,7 @@ class TestMeshes:
         with pytest.raises(PatternError, match="name 'a' of a cut is used twice"):
             replace(sheet(), cuts=(("a", cut(20, 30, 80, 30)), ("a", cut(20, 40, 80, 40))))
 
-    def test_a_cut_of_one_edge_gets_a_node(self):
+    def test_a_cut_of_one_edge_gets_a_node(self) -> None:
         points = np.array([[0, 0], [6, 0], [3, 5], [2, 2], [4, 2.0]])
         triangles = np.array([[0, 1, 4], [0, 4, 3], [3, 4, 2], [1, 2, 4], [0, 3, 2]])
         opened = take_apart(points, triangles, np.array([[3, 4]]))
@@ -212,7 +215,7 @@ class TestMeshes:
 
 
 class TestFiles:
-    def test_drawn_cuts(self, tmp_path):
+    def test_drawn_cuts(self, tmp_path: Path) -> None:
         body = green(20, 20, 80, 20) + green(50, 10, 50, 30) + red(0, 40, 100, 40) + green(30, 40, 30, 60)
         pattern = read_pattern(drawn(tmp_path, body))
         assert len(pattern.cuts) == 5  # the crossing parts both
@@ -227,7 +230,7 @@ class TestFiles:
         assert facets.areas.sum() == pytest.approx(6000.0)
         assert len(lips(facets.points, facets.topology)) >= 5
 
-    def test_pieces_within_closed_cuts_fall_out(self, tmp_path):
+    def test_pieces_within_closed_cuts_fall_out(self, tmp_path: Path) -> None:
         square = '<rect x="30" y="20" width="40" height="20" stroke="#00ff00" fill="none"/>'
         pattern = read_pattern(drawn(tmp_path, square + red(0, 30, 100, 30)))
         assert len(pattern.rings) == 2
@@ -235,7 +238,7 @@ class TestFiles:
         assert [crease.curve.length for crease in pattern.creases] == pytest.approx([30.0, 30.0])
         assert any("1 piece within closed cuts" in remark for remark in pattern.remarks)
 
-    def test_an_outline_of_cut_lines_must_close(self, tmp_path):
+    def test_an_outline_of_cut_lines_must_close(self, tmp_path: Path) -> None:
         file = tmp_path / "open.svg"
         head = 'xmlns="http://www.w3.org/2000/svg" width="100mm" height="60mm" viewBox="0 0 100 60"'
         lines = green(0, 0, 100, 0) + green(100, 0, 100, 60) + green(100, 60, 0, 60) + green(0, 60, 0, 9)
@@ -245,7 +248,7 @@ class TestFiles:
 
     @pytest.mark.parametrize("suffix", [".svg", ".dxf"])
     @pytest.mark.parametrize("of", ["pattern", "mesh"])
-    def test_written_and_read(self, tmp_path, suffix, of):
+    def test_written_and_read(self, tmp_path: Path, suffix: str, of: str) -> None:
         cuts = (cut(0, 30, 50, 30), cut(50, 30, 70, 45), cut(50, 30, 50, 10), cut(80, 20, 90, 20))
         pattern = sheet(*cuts, creases=(Crease("m1", cut(90, 20, 100, 20)),))
         file = tmp_path / f"again{suffix}"
@@ -258,7 +261,7 @@ class TestFiles:
         )
         assert [crease.fold for crease in again.creases] == ["mountain"]
 
-    def test_fold_cuts_in(self, tmp_path):
+    def test_fold_cuts_in(self, tmp_path: Path) -> None:
         data = {
             "vertices_coords": [[0, 0], [2, 0], [4, 0], [4, 3], [2, 3], [0, 3], [2, 1.5]],
             "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 0], [1, 6], [6, 4]],
@@ -277,7 +280,7 @@ class TestFiles:
         assert (again.triangles == mesh.triangles).all()
 
     @pytest.mark.parametrize("faces", [True, False])
-    def test_fold_loose_cuts(self, tmp_path, faces):
+    def test_fold_loose_cuts(self, tmp_path: Path, faces: bool) -> None:
         """A slit that touches nothing: with faces its one edge gets a node, without faces it is tied first."""
         data = {
             "vertices_coords": [[0, 0], [9, 0], [9, 9], [0, 9], [3, 4], [6, 4]],
@@ -295,7 +298,7 @@ class TestFiles:
 
 
 class TestModels:
-    def test_nodes_in_one_place_keep_apart_in_symmetry(self):
+    def test_nodes_in_one_place_keep_apart_in_symmetry(self) -> None:
         pattern = replace(strip(80, 20, [10.0]), cuts=(("a", cut(20, 0, 20, 10)), ("b", cut(60, 0, 60, 10))))
         mesh = structured(pattern, along=16, rows=2, kind="alternating")
         plane = mirror(mesh, "x")
@@ -303,7 +306,7 @@ class TestModels:
         twice = np.flatnonzero(places(mesh.points) != np.arange(len(mesh.points)))
         assert len(twice) == 4
 
-    def test_pieces_that_nothing_holds_are_refused(self):
+    def test_pieces_that_nothing_holds_are_refused(self) -> None:
         mesh = unstructured(sheet(cut(0, 30, 100, 30)), size=15.0)
         model = bh.Model(mesh, bh.Sheet(E=4000, t=0.2)).force("near:50,60", each=(0.0, 0.0, 1e-3))
         with pytest.raises(ModelError, match="cuts part the sheet into 2 pieces"):

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bh.applications.inverse.segments import DesignError
+
 pytest.importorskip("xarray")
 import bh.commands.design
 from bh.commands.cli import main
@@ -74,5 +76,5 @@ def test_bad_targets(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: s
 
 def test_curves_begin_at_the_origin(tmp_path: Path) -> None:
     (tmp_path / "off.csv").write_text("10,10\n20,20\n")
-    with pytest.raises(bh.commands.design.DesignError, match="begin at the origin"):
+    with pytest.raises(DesignError, match="begin at the origin"):
         bh.commands.design.read_curve(tmp_path / "off.csv")

@@ -15,7 +15,7 @@ from urllib.parse import unquote
 import pytest
 
 import bh
-from bh.formulations.registry import Formulation
+from bh.formulations.protocols import Formulation
 from bh.solvers.system import System
 from reports.pdf import browser
 from tests.unit.test_plotting import needs_opengl

@@ -7,13 +7,14 @@ import io
 import os
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-import ezdxf
 import numpy as np
 import pytest
 import shapely
 from ezdxf.document import Drawing
+from ezdxf.filemanagement import new
 
 from meshes import CreasePattern
 from meshes.curves import sample
@@ -231,7 +232,7 @@ def test_one_line_by_its_own_name(tmp_path: Path) -> None:
 
 
 def dxf(folder: Path, draw: Callable[[Drawing], None], units: int | None = 4) -> Path:
-    drawing = ezdxf.new("R2010", units=units or 0)
+    drawing = new("R2010", units=units or 0)
     space = drawing.modelspace()
     space.add_lwpolyline([(0, 0), (120, 0), (120, 80), (0, 80)], close=True)
     draw(drawing)
@@ -335,7 +336,7 @@ def test_dimensions_and_what_has_no_length_are_skipped(tmp_path: Path) -> None:
 
 
 def test_an_empty_model_space_names_the_paper_space(tmp_path: Path) -> None:
-    drawing = ezdxf.new("R2010")
+    drawing = new("R2010")
     drawing.layout("Layout1").add_line((0, 0), (10, 0))
     file = tmp_path / "paper.dxf"
     drawing.saveas(file)
@@ -408,7 +409,7 @@ def test_bombs_are_refused_within_seconds(tmp_path: Path) -> None:
         file = tmp_path / f"{name}.svg"
         file.write_text(text, encoding="utf-8")
         began = time.perf_counter()
-        refused(lambda file=file: read_pattern(file))
+        refused(partial(read_pattern, file))
         assert time.perf_counter() - began < 20.0, name  # a bomb that goes off takes hours
     packed = io.BytesIO()
     with gzip.GzipFile(fileobj=packed, mode="wb") as file_:

@@ -146,7 +146,7 @@ def test_a_snap_that_the_next_mesh_does_not_repeat_is_left_out() -> None:
     told, _ = estimate(trusted(mark_doubtful(values), "consistent"))
     assert told == pytest.approx(estimate([np.array([v]) for v in (5.0, 5.5, 5.6)])[0])
     assert not any(t.doubtful for t in mark_doubtful([trial(1.0, True), trial(1.1, True), trial(1.2, True)]))
-    ended = [trial(1.0, True), trial(math.nan, outcome="limit-point")]
+    ended = [trial(1.0, True), trial(math.nan, outcome=Outcome.LIMIT_POINT)]
     assert not any(t.doubtful for t in mark_doubtful(ended))
 
 

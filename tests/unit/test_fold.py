@@ -7,6 +7,7 @@ import math
 import os
 import pathlib
 from collections.abc import Callable
+from typing import Any
 
 import meshio
 import numpy as np
@@ -18,7 +19,7 @@ from meshes.io.export import FORMATS
 
 DATA = pathlib.Path(__file__).parents[1] / "data"
 
-SQUARE = {
+SQUARE: dict[str, Any] = {
     "vertices_coords": [[0, 0], [2, 0], [2, 2], [0, 2], [1, 1]],
     "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [4, 2], [1, 4], [4, 3]],
     "edges_assignment": ["B", "B", "B", "B", "M", "M", "V", "F"],
@@ -33,7 +34,9 @@ Read = Callable[..., SheetMesh]
 def read(tmp_path: pathlib.Path) -> Read:
     """Read a FOLD object; keys that are given override it, None deletes them."""
 
-    def from_object(data: dict | None = None, /, frame: int | None = None, **changes: object) -> SheetMesh:
+    def from_object(
+        data: dict[str, Any] | None = None, /, frame: int | None = None, **changes: object
+    ) -> SheetMesh:
         whole = {key: value for key, value in ({**(data or {}), **changes}).items() if value is not None}
         path = tmp_path / "sheet.fold"
         path.write_text(json.dumps(whole))
@@ -43,7 +46,7 @@ def read(tmp_path: pathlib.Path) -> Read:
 
 
 def pairs(mesh: SheetMesh, name: str) -> list[list[int]]:
-    return mesh.edge_sets[name].tolist()
+    return [list(pair) for pair in mesh.edge_sets[name].tolist()]
 
 
 def undirected(pairs: np.ndarray) -> set[tuple[int, int]]:
@@ -56,7 +59,7 @@ def winding(mesh: SheetMesh) -> np.ndarray:
 
 
 class TestSets:
-    def test_assignments(self, read):
+    def test_assignments(self, read: Read) -> None:
         mesh = read(SQUARE)
         assert mesh.kind == "imported"
         assert mesh.points[:, :2].tolist() == SQUARE["vertices_coords"]
@@ -74,24 +77,24 @@ class TestSets:
             "crease:mountain", "crease:m1", "crease:valley", "crease:v1", "edge:flat", "edge:boundary",
         }  # fmt: skip
 
-    def test_fold_angles_are_mountain_positive_radians(self, read):
+    def test_fold_angles_are_mountain_positive_radians(self, read: Read) -> None:
         mesh = read(SQUARE)
         np.testing.assert_allclose(mesh.fold_angles["m1"], np.radians([90.0, 60.0]), rtol=1e-15)
         np.testing.assert_allclose(mesh.fold_angles["mountain"], np.radians([90.0, 60.0]), rtol=1e-15)
         np.testing.assert_allclose(mesh.fold_angles["v1"], np.radians([-45.0]), rtol=1e-15)
         assert not read(SQUARE, edges_foldAngle=None).fold_angles
 
-    def test_unknown_fold_angles_are_nan(self, read):
+    def test_unknown_fold_angles_are_nan(self, read: Read) -> None:
         angles = read(SQUARE, edges_foldAngle=[0, 0, 0, 0, None, -60, 45, 0]).fold_angles["m1"]
         assert np.isnan(angles).tolist() == [True, False]
 
-    def test_angles_stand_in_for_assignments(self, read):
+    def test_angles_stand_in_for_assignments(self, read: Read) -> None:
         mesh = read(SQUARE, edges_assignment=None)
         assert pairs(mesh, "crease:mountain") == [[0, 4], [4, 2]]
         assert pairs(mesh, "crease:valley") == [[1, 4]]
         assert undirected(mesh.edge_sets["edge:unassigned"]) == {(3, 4)}
 
-    def test_unassigned_join_and_unlisted(self, read):
+    def test_unassigned_join_and_unlisted(self, read: Read) -> None:
         mesh = read(
             SQUARE,
             edges_vertices=SQUARE["edges_vertices"][4:7],
@@ -105,12 +108,12 @@ class TestSets:
         assert undirected(mesh.edge_sets["edge:join"]) == {(2, 4)}
         assert len(mesh.edge_sets["edge:boundary"]) == 4
 
-    def test_cut_on_the_boundary_is_boundary(self, read):
+    def test_cut_on_the_boundary_is_boundary(self, read: Read) -> None:
         mesh = read(SQUARE, edges_assignment=["C", "U", "J", "F", "M", "M", "V", "F"])
         assert len(mesh.edge_sets["edge:boundary"]) == 4
         assert not {"edge:unassigned", "edge:join"} & set(mesh.edge_sets)
 
-    def test_vertices_without_faces_are_dropped(self, read):
+    def test_vertices_without_faces_are_dropped(self, read: Read) -> None:
         coords = [[7, 7], *SQUARE["vertices_coords"]]
         mesh = read(
             vertices_coords=coords,
@@ -123,7 +126,7 @@ class TestSets:
 
 
 class TestChains:
-    def test_a_bend_is_passed_and_the_first_edge_gives_the_direction(self, read):
+    def test_a_bend_is_passed_and_the_first_edge_gives_the_direction(self, read: Read) -> None:
         """A crease of three edges with corners, listed out of order and in mixed directions."""
         mesh = read(
             vertices_coords=[[0, 0], [3, 0], [3, 2], [0, 2], [0, 1], [1, 1.5], [2, 0.5], [3, 1]],
@@ -135,7 +138,7 @@ class TestChains:
         assert pairs(mesh, "crease:m1") == [[4, 5], [5, 6], [6, 7]]
         assert "crease:m2" not in mesh.edge_sets
 
-    def test_a_chain_that_starts_in_its_middle(self, read):
+    def test_a_chain_that_starts_in_its_middle(self, read: Read) -> None:
         """The first edge of the file has two neighbours behind it and one ahead."""
         mesh = read(
             vertices_coords=[[0, 0], [4, 0], [4, 2], [0, 2], [0, 1], [1, 1.5], [2, 0.5], [3, 1.5], [4, 1]],
@@ -146,7 +149,7 @@ class TestChains:
         )  # fmt: skip
         assert pairs(mesh, "crease:v1") == [[4, 5], [5, 6], [6, 7], [7, 8]]
 
-    def test_straight_lines_go_through_a_crossing(self, read):
+    def test_straight_lines_go_through_a_crossing(self, read: Read) -> None:
         """Four mountains at a vertex: two straight lines, not four, however they are listed."""
         coords = [[0, 0], [2, 0], [4, 0], [0, 2], [2, 2], [4, 2], [0, 4], [2, 4], [4, 4]]
         rim = [[0, 1], [1, 2], [2, 5], [5, 8], [8, 7], [7, 6], [6, 3], [3, 0]]
@@ -162,7 +165,7 @@ class TestChains:
         np.testing.assert_allclose(np.degrees(mesh.fold_angles["mountain"]), [4, 1, 2, 3])
         np.testing.assert_allclose(np.degrees(mesh.fold_angles["m2"]), [2, 3])
 
-    def test_three_creases_without_a_straight_pair_end_at_their_vertex(self, read):
+    def test_three_creases_without_a_straight_pair_end_at_their_vertex(self, read: Read) -> None:
         mesh = read(
             vertices_coords=[[0, 0], [4, 0], [2, 4], [2, 1]],
             edges_vertices=[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
@@ -170,11 +173,11 @@ class TestChains:
         )
         assert [name for name in mesh.creases if name != "valley"] == ["v1", "v2", "v3"]
 
-    def test_other_assignments_do_not_end_a_chain(self, read):
+    def test_other_assignments_do_not_end_a_chain(self, read: Read) -> None:
         mesh = read(SQUARE)  # a valley and a flat edge meet the mountains at vertex 4
         assert len(pairs(mesh, "crease:m1")) == 2
 
-    def test_closed_line(self, read):
+    def test_closed_line(self, read: Read) -> None:
         mesh = read(_rings([1.0, 2.0, 3.0], "BMB", 6))
         ring = mesh.edge_sets["crease:m1"]
         assert len(ring) == 6
@@ -183,13 +186,13 @@ class TestChains:
 
 class TestFaces:
     @pytest.mark.parametrize("flips", [(), (0,), (1, 3), (0, 1, 2), (0, 1, 2, 3)])
-    def test_orientation_is_made_consistent(self, read, flips):
+    def test_orientation_is_made_consistent(self, read: Read, flips: tuple[int, ...]) -> None:
         faces = [face[::-1] if i in flips else face for i, face in enumerate(SQUARE["faces_vertices"])]
         mesh = read(SQUARE, faces_vertices=faces)
         assert (winding(mesh) > 0).all()
         assert mesh.areas.sum() == pytest.approx(4.0)
 
-    def test_orientation_in_space_follows_most_faces(self, read):
+    def test_orientation_in_space_follows_most_faces(self, read: Read) -> None:
         coords = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 1]]
         up = read(SQUARE, vertices_coords=coords, faces_vertices=[[0, 4, 1], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
         assert (winding(up) > 0).all()
@@ -199,25 +202,25 @@ class TestFaces:
         assert (winding(down) < 0).all()
 
     @pytest.mark.parametrize("turn", range(4))
-    def test_a_quadrilateral_is_cut_along_its_shorter_diagonal(self, read, turn):
+    def test_a_quadrilateral_is_cut_along_its_shorter_diagonal(self, read: Read, turn: int) -> None:
         coords = [[0, 0], [3, 0], [4, 1], [0, 2]]  # 0-2 is 4.1 long, 1-3 is 3.6
         mesh = read(vertices_coords=coords, faces_vertices=[np.roll(range(4), turn).tolist()])
         assert undirected(mesh.edge_sets["edge:facet"]) == {(1, 3)}
 
     @pytest.mark.parametrize("turn", range(4))
-    def test_of_equal_diagonals_the_one_at_the_smallest_number_is_taken(self, read, turn):
+    def test_of_equal_diagonals_the_one_at_the_smallest_number_is_taken(self, read: Read, turn: int) -> None:
         ring = np.roll([3, 1, 0, 2], turn).tolist()
         coords = np.empty((4, 2))
-        coords[[3, 1, 0, 2]] = [[0, 0], [0.3, 0], [0.3, 0.1], [0, 0.1]]
+        coords[[3, 1, 0, 2]] = np.array([[0, 0], [0.3, 0], [0.3, 0.1], [0, 0.1]])
         mesh = read(vertices_coords=coords.tolist(), faces_vertices=[ring])
         assert undirected(mesh.edge_sets["edge:facet"]) == {(0, 3)}
 
-    def test_a_concave_quadrilateral_is_cut_inside(self, read):
+    def test_a_concave_quadrilateral_is_cut_inside(self, read: Read) -> None:
         mesh = read(vertices_coords=[[0, 0], [4, 3], [0, 6], [1, 3]], faces_vertices=[[0, 1, 2, 3]])
         assert undirected(mesh.edge_sets["edge:facet"]) == {(1, 3)}  # 0-2 runs outside
         assert mesh.areas.sum() == pytest.approx(9.0)
 
-    def test_a_quadrilateral_in_space(self, read):
+    def test_a_quadrilateral_in_space(self, read: Read) -> None:
         coords = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 1.5]]  # 0-2 is 2.83 long, 1-3 is 3.2
         mesh = read(vertices_coords=coords, faces_vertices=[[0, 1, 2, 3]])
         assert undirected(mesh.edge_sets["edge:facet"]) == {(0, 2)}
@@ -237,7 +240,7 @@ class TestFaces:
         ],
     )
     @pytest.mark.parametrize("tilted", [False, True])
-    def test_polygons(self, read, coords, area, tilted):
+    def test_polygons(self, read: Read, coords: list[list[float]], area: float, tilted: bool) -> None:
         count = len(coords)
         points = np.column_stack((coords, np.zeros(count)))
         if tilted:  # into a plane through no axis
@@ -252,7 +255,7 @@ class TestFaces:
         }
         assert len(mesh.edge_sets["edge:facet"]) == count - 3
 
-    def test_triangles_between_curves_are_well_shaped(self, read):
+    def test_triangles_between_curves_are_well_shaped(self, read: Read) -> None:
         """A crescent of 2 x 40 vertices: Delaunay triangles join neighbours across, no fans from one vertex."""
         angle = np.linspace(0.0, 1.0, 40)
         inner, outer = (np.column_stack((r * np.cos(angle), r * np.sin(angle))) for r in (10.0, 11.0))
@@ -262,7 +265,7 @@ class TestFaces:
         across = mesh.points[mesh.topology.edges[:, 0]] - mesh.points[mesh.topology.edges[:, 1]]
         assert np.linalg.norm(across, axis=1).max() < 1.2
 
-    def test_units(self, read):
+    def test_units(self, read: Read) -> None:
         sizes = {
             "mm": 1.0,
             "unit": 1.0,
@@ -278,13 +281,13 @@ class TestFaces:
             np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [2 * size, 2 * size, 0], rtol=1e-14)
             assert mesh.areas.sum() == pytest.approx(4 * size**2)
 
-    def test_byte_order_mark(self, tmp_path):
+    def test_byte_order_mark(self, tmp_path: pathlib.Path) -> None:
         path = tmp_path / "bom.fold"
         path.write_bytes(b"\xef\xbb\xbf" + json.dumps(SQUARE).encode())
         assert len(read_fold(path).triangles) == 4
 
 
-def _rings(radii: list[float], letters: str, count: int) -> dict:
+def _rings(radii: list[float], letters: str, count: int) -> dict[str, Any]:
     """Concentric regular polygons, edges only."""
     turn = 2 * math.pi / count
     return {
@@ -303,25 +306,25 @@ def _polygon_area(radius: float, count: int) -> float:
 
 
 class TestEdgesOnly:
-    def test_the_same_as_with_faces(self, read):
+    def test_the_same_as_with_faces(self, read: Read) -> None:
         mesh, other = read(SQUARE), read(SQUARE, faces_vertices=None)
         assert undirected(other.topology.edges) == undirected(mesh.topology.edges)
         for name in mesh.edge_sets:
             assert undirected(other.edge_sets[name]) == undirected(mesh.edge_sets[name])
         assert (winding(other) > 0).all()
 
-    def test_annulus_has_a_hole(self, read):
+    def test_annulus_has_a_hole(self, read: Read) -> None:
         mesh = read(_rings([1.0, 2.0, 3.0, 4.0], "BMVB", 24))
         assert mesh.areas.sum() == pytest.approx(_polygon_area(4.0, 24) - _polygon_area(1.0, 24))
         assert len(mesh.edge_sets["edge:boundary"]) == 48
         assert set(mesh.creases) == {"mountain", "m1", "valley", "v1"}
         assert len(mesh.points) - len(mesh.topology.edges) + len(mesh.triangles) == 0
 
-    def test_a_disc_without_borders_has_none(self, read):
+    def test_a_disc_without_borders_has_none(self, read: Read) -> None:
         mesh = read(_rings([1.0, 2.0], "MU", 12))
         assert mesh.areas.sum() == pytest.approx(_polygon_area(2.0, 12))
 
-    def test_a_sheet_inside_a_hole_is_a_second_sheet(self, read):
+    def test_a_sheet_inside_a_hole_is_a_second_sheet(self, read: Read) -> None:
         with pytest.raises(FileFormatError, match="one sheet"):
             read(_rings([1.0, 2.0, 3.0], "BBB", 12))
 
@@ -341,7 +344,7 @@ class TestEdgesOnly:
             ),
         ],
     )
-    def test_not_plane(self, read, changes, words):
+    def test_not_plane(self, read: Read, changes: dict[str, Any], words: str) -> None:
         with pytest.raises(FileFormatError) as caught:
             read(
                 {"vertices_coords": SQUARE["vertices_coords"], "edges_vertices": SQUARE["edges_vertices"]},
@@ -349,7 +352,7 @@ class TestEdgesOnly:
             )
         assert words in str(caught.value)
 
-    def test_border_inside_the_sheet(self, read):
+    def test_border_inside_the_sheet(self, read: Read) -> None:
         with pytest.raises(FileFormatError, match=r"edge 6 \(1-4\) is assigned B but does not part"):
             read(SQUARE, faces_vertices=None, edges_assignment=list("BBBBMMBF"))
 
@@ -362,20 +365,20 @@ class TestFrames:
         {"vertices_coords": [[0, 0], [1, 0], [0, 1]], "faces_vertices": [[0, 1, 2]]},
     )  # fmt: skip
 
-    def test_frames_count_from_the_key_frame(self, read):
+    def test_frames_count_from_the_key_frame(self, read: Read) -> None:
         file = {**SQUARE, "file_frames": list(self.FRAMES)}
         assert read(file).flat
         assert read(file, 0).flat
         assert read(file, 1).points[4].tolist() == [1.0, 1.0, 1.0]
         assert read(file, 3).areas.tolist() == [0.5]
 
-    def test_inheritance_of_the_inherited(self, read):
+    def test_inheritance_of_the_inherited(self, read: Read) -> None:
         mesh = read({**SQUARE, "file_frames": list(self.FRAMES)}, 2)
         assert mesh.points[4].tolist() == [10.0, 10.0, 10.0]
         assert pairs(mesh, "crease:m1") == [[0, 4], [4, 2]]
         assert not mesh.fold_angles  # null overrides what would be inherited
 
-    def test_default_is_the_first_frame_with_vertices(self, read):
+    def test_default_is_the_first_frame_with_vertices(self, read: Read) -> None:
         mesh = read({"file_spec": 1.2, "file_frames": [{"frame_title": "empty"}, self.FRAMES[2]]})
         assert mesh.areas.tolist() == [0.5]
 
@@ -405,14 +408,14 @@ class TestFrames:
             ),
         ],
     )
-    def test_wrong_frames(self, read, frames, frame, words):
+    def test_wrong_frames(self, read: Read, frames: list[Any], frame: int, words: str) -> None:
         with pytest.raises(FileFormatError) as caught:
             read({**SQUARE, "file_frames": frames}, frame)
         assert words in str(caught.value)
 
 
 TWO_D = SQUARE["vertices_coords"]
-BAD = {
+BAD: dict[str, tuple[dict[str, Any], str]] = {
     "no vertices": ({"vertices_coords": None}, "no frame has vertices_coords"),
     "empty vertices": ({"vertices_coords": []}, "vertices_coords"),
     "vertices no list": ({"vertices_coords": "abc"}, 'vertices_coords is "abc"'),
@@ -462,7 +465,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_values(read, case):
+def test_bad_values(read: Read, case: str) -> None:
     changes, words = BAD[case]
     with pytest.raises(FileFormatError) as caught:
         read(SQUARE, **changes)
@@ -500,7 +503,7 @@ def test_bad_values(read, case):
         ),
     ],
 )  # fmt: skip
-def test_bad_sheets(read, coords, faces, words):
+def test_bad_sheets(read: Read, coords: list[list[float]], faces: list[Any], words: str) -> None:
     with pytest.raises(FileFormatError) as caught:
         read(vertices_coords=coords, faces_vertices=faces)
     assert words in str(caught.value)
@@ -527,7 +530,7 @@ def test_bad_sheets(read, coords, faces, words):
     ],
     ids=range(14),
 )
-def test_bad_files(tmp_path, content, words):
+def test_bad_files(tmp_path: pathlib.Path, content: bytes, words: str) -> None:
     path = tmp_path / "bad.fold"
     path.write_bytes(content)
     with pytest.raises(FileFormatError) as caught:
@@ -537,7 +540,7 @@ def test_bad_files(tmp_path, content, words):
     assert str(caught.value).isprintable()
 
 
-def test_no_file(tmp_path):
+def test_no_file(tmp_path: pathlib.Path) -> None:
     with pytest.raises(FileFormatError, match="folder"):
         read_fold(tmp_path)
     with pytest.raises(FileFormatError, match="No such file"):
@@ -551,7 +554,7 @@ def test_no_file(tmp_path):
     assert str(caught.value).isprintable()
 
 
-def test_a_folded_form():
+def test_a_folded_form() -> None:
     """Two pages at a right angle, each with a flap that lies on it, with the order of the layers."""
     mesh = read_fold(DATA / "layers.fold")
     assert len(mesh.points) == 6
@@ -562,7 +565,7 @@ def test_a_folded_form():
     assert not mesh.flat
 
 
-def test_a_rigidly_folded_form():
+def test_a_rigidly_folded_form() -> None:
     """Three by three panels of a Miura fold, rounded to six decimals: every panel gets a diagonal."""
     mesh = read_fold(DATA / "rigid_miura.fold")
     assert (len(mesh.points), len(mesh.triangles)) == (16, 18)
@@ -570,9 +573,8 @@ def test_a_rigidly_folded_form():
     assert counts == {"crease:mountain": 6, "crease:valley": 6, "edge:facet": 9}
     assert len(mesh.edge_sets["edge:boundary"]) == 12
     # the sign of every fold in space is as drawn: normals part at a mountain, so its far wing lies below
-    normals = np.cross(
-        *(mesh.points[mesh.triangles[:, k]] - mesh.points[mesh.triangles[:, 0]] for k in (1, 2))
-    )
+    a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
     topology = mesh.topology
     for name, sign in (("crease:mountain", -1), ("crease:valley", 1)):
         for edge in topology.find_edges(mesh.edge_sets[name]):
@@ -587,7 +589,7 @@ class TestWriteFold:
     def mesh(self) -> SheetMesh:
         return structured(annulus_sector([60, 80], 10, 1.2, ["mountain", "valley"]), along=5, rows=2)
 
-    def test_the_file(self, tmp_path):
+    def test_the_file(self, tmp_path: pathlib.Path) -> None:
         mesh = self.mesh()
         path = tmp_path / "out.fold"
         write_fold(path, mesh, title="A sheet")
@@ -607,10 +609,10 @@ class TestWriteFold:
         assert "edges_foldAngle" not in data
         assert os.listdir(tmp_path) == ["out.fold"]
 
-    def test_states(self, tmp_path):
+    def test_states(self, tmp_path: pathlib.Path) -> None:
         mesh = self.mesh()
         angles = np.linspace(-1.0, 1.0, len(mesh.topology.edges))
-        lifted = mesh.points + [0.0, 0.0, 1.0] * mesh.points[:, :1] ** 2 / 50.0
+        lifted = mesh.points + np.array([0.0, 0.0, 1.0]) * mesh.points[:, :1] ** 2 / 50.0
         path = tmp_path / "out.fold"
         write_fold(path, mesh, frames=[("flat", mesh.points, None), ("lifted", lifted, angles)])
         data = json.loads(path.read_text())
@@ -625,32 +627,32 @@ class TestWriteFold:
         at = mesh.topology.find_edges(mesh.edge_sets["crease:crease-1"])
         np.testing.assert_allclose(crease, angles[at], rtol=1e-14)
 
-    def test_drawn_angles(self, tmp_path, read):
+    def test_drawn_angles(self, tmp_path: pathlib.Path, read: Read) -> None:
         mesh = read(SQUARE)
         write_fold(tmp_path / "out.fold", mesh)
         again = read_fold(tmp_path / "out.fold")
         for name in mesh.creases:
             np.testing.assert_allclose(again.fold_angles[name], mesh.fold_angles[name], rtol=1e-15)
 
-    def test_partly_unknown_angles(self, tmp_path, read):
+    def test_partly_unknown_angles(self, tmp_path: pathlib.Path, read: Read) -> None:
         write_fold(tmp_path / "out.fold", read(SQUARE, edges_foldAngle=[0, 0, 0, 0, None, -60, 45, 0]))
         angles = json.loads((tmp_path / "out.fold").read_text())["edges_foldAngle"]
         assert angles.count(None) == 1
 
-    def test_unassigned_and_join_survive(self, tmp_path, read):
+    def test_unassigned_and_join_survive(self, tmp_path: pathlib.Path, read: Read) -> None:
         write_fold(tmp_path / "out.fold", read(SQUARE, edges_assignment=list("BBBBUJVF")))
         again = read_fold(tmp_path / "out.fold")
         assert undirected(again.edge_sets["edge:unassigned"]) == {(0, 4)}
         assert undirected(again.edge_sets["edge:join"]) == {(2, 4)}
 
-    def test_a_folded_mesh(self, tmp_path):
+    def test_a_folded_mesh(self, tmp_path: pathlib.Path) -> None:
         mesh = self.mesh()
         folded = SheetMesh(mesh.points + [0, 0, 1] * mesh.points[:, :1] ** 2, mesh.triangles)
         write_fold(tmp_path / "out.fold", folded)
         assert json.loads((tmp_path / "out.fold").read_text())["frame_classes"] == ["foldedForm"]
         np.testing.assert_array_equal(read_fold(tmp_path / "out.fold").points, folded.points)
 
-    def test_wrong_states(self, tmp_path):
+    def test_wrong_states(self, tmp_path: pathlib.Path) -> None:
         mesh = self.mesh()
         for points, angles in (
             (mesh.points[1:], None),
@@ -678,17 +680,19 @@ class TestPlaces:
     def mesh(self) -> SheetMesh:
         return structured(strip(10, 4, [2]), along=3)
 
-    def test_no_folder(self, tmp_path, kind):
+    def test_no_folder(self, tmp_path: pathlib.Path, kind: str) -> None:
         with pytest.raises(FileFormatError, match=r"cannot be written .*existing folder"):
             _write_any(kind, tmp_path / "absent" / f"out.{kind}", self.mesh())
 
-    def test_a_folder_in_its_place(self, tmp_path, kind):
+    def test_a_folder_in_its_place(self, tmp_path: pathlib.Path, kind: str) -> None:
         (tmp_path / f"out.{kind}").mkdir()
         with pytest.raises(FileFormatError, match="folder or device"):
             _write_any(kind, tmp_path / f"out.{kind}", self.mesh())
         assert os.listdir(tmp_path) == [f"out.{kind}"]
 
-    def test_a_failure_keeps_the_old_file(self, tmp_path, kind, monkeypatch):
+    def test_a_failure_keeps_the_old_file(
+        self, tmp_path: pathlib.Path, kind: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         path = tmp_path / f"out.{kind}"
         path.write_text("old")
 
@@ -701,7 +705,7 @@ class TestPlaces:
         assert path.read_text() == "old"
         assert os.listdir(tmp_path) == [path.name]
 
-    def test_a_link_stays_a_link(self, tmp_path, kind):
+    def test_a_link_stays_a_link(self, tmp_path: pathlib.Path, kind: str) -> None:
         (tmp_path / "real").mkdir()
         link = tmp_path / f"out.{kind}"
         link.symlink_to(tmp_path / "real" / f"out.{kind}")
@@ -709,7 +713,7 @@ class TestPlaces:
         assert link.is_symlink()
         assert (tmp_path / "real" / f"out.{kind}").is_file()
 
-    def test_bad_path(self, tmp_path, kind):
+    def test_bad_path(self, tmp_path: pathlib.Path, kind: str) -> None:
         with pytest.raises(FileFormatError):
             _write_any(kind, tmp_path / f"nul\0.{kind}", self.mesh())
 
@@ -719,7 +723,7 @@ class TestWriteMesh:
         return structured(full_annulus(20, 5), along=12)
 
     @pytest.mark.parametrize("suffix", FORMATS)
-    def test_formats(self, tmp_path, suffix, capfd):
+    def test_formats(self, tmp_path: pathlib.Path, suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
         mesh = self.mesh()
         path = tmp_path / f"out{suffix.upper()}"
         write_mesh(path, mesh)
@@ -731,7 +735,7 @@ class TestWriteMesh:
         np.testing.assert_allclose(corners, mesh.points[mesh.triangles], atol=1e-12)
 
     @pytest.mark.parametrize("suffix", [suffix for suffix, (_, fields) in FORMATS.items() if fields])
-    def test_fields(self, tmp_path, suffix, capfd):
+    def test_fields(self, tmp_path: pathlib.Path, suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
         mesh = self.mesh()
         points = mesh.points + np.array([0.0, 0.0, 3.0])
         fields = {
@@ -774,7 +778,7 @@ class TestWriteMesh:
             ("out.vtu", {"points": np.full((36, 3), np.inf)}, "finite"),
         ],
     )
-    def test_errors(self, tmp_path, name, arguments, words):
+    def test_errors(self, tmp_path: pathlib.Path, name: str, arguments: dict[str, Any], words: str) -> None:
         with pytest.raises(FileFormatError) as caught:
             write_mesh(tmp_path / name, self.mesh(), **arguments)
         assert words in str(caught.value)

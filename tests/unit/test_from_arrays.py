@@ -12,6 +12,7 @@ import bh
 import meshes
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
+from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 
 # columns of cells; total, bending and folding energy (N mm) on which six independent codes agree (Green's strain)
 PUBLISHED = {
@@ -91,7 +92,9 @@ def own_arrays() -> tuple[bh.Model, dict[str, Any]]:
         .support("edge:end", "z")
     )
     model = model.fold("crease", rest=2.0, Lstar=10.0)
-    elements = formulation(model.formulation).system(model, load_steps(model)[0], None).elements
+    system = formulation(model.formulation).system(model, load_steps(model)[0], None)
+    assert isinstance(system, BarsAndHingesSystem)
+    elements = system.elements
     bend = slice(0, elements.bending)
     fold = slice(elements.bending, None)
     held = np.zeros((len(mesh.points), 4), dtype=int)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -100,7 +101,7 @@ def test_referee_gradients_are_derivatives() -> None:
 
 @ASSEMBLAGES
 @pytest.mark.parametrize("law", ["quadratic", "published"])
-def test_referee_tangent_is_the_derivative_of_its_forces(make: type[Assemblage], law: Law) -> None:
+def test_referee_tangent_is_the_derivative_of_its_forces(make: Callable[[], Assemblage], law: Law) -> None:
     rng = np.random.default_rng(5)
     given = make()
     # a narrow linear range, so that hinges beyond it are tried too
@@ -137,7 +138,7 @@ def test_referee_follows_the_truss() -> None:
 
 
 @ASSEMBLAGES
-def test_assemblages_are_those_of_the_paper(make: type[Assemblage]) -> None:
+def test_assemblages_are_those_of_the_paper(make: Callable[[], Assemblage]) -> None:
     """Panels of edge 2 and 60 degrees; loads and supports as its text and figures show them."""
     given = make()
     x = given.points[given.panels]
@@ -162,7 +163,7 @@ def test_assemblages_are_those_of_the_paper(make: type[Assemblage]) -> None:
 
 
 @ASSEMBLAGES
-def test_small_load_balances_in_the_referee(make: type[Assemblage]) -> None:
+def test_small_load_balances_in_the_referee(make: Callable[[], Assemblage]) -> None:
     given = make()
     path = trace(given.model(0.4))
     assert path.outcome == "reached"

@@ -59,4 +59,4 @@ def test_points_of_the_data() -> None:
     points = intensity_points(shipped())
     with xarray.open_dataset(SHIPPED, engine="h5netcdf") as data:
         for name, values in zip(points.names, points.values, strict=True):
-            np.testing.assert_allclose(data[name].values, values, rtol=1e-12)
+            np.testing.assert_allclose(data[name].values, np.array(values, dtype=float), rtol=1e-12)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -43,7 +44,7 @@ def twisted() -> FoldedCrease:
     )
 
 
-FOLDS = {
+FOLDS: dict[str, Callable[[], FoldedCrease]] = {
     "twisted": twisted,
     "helix": lambda: of_crease(helix, 2.0, interval=(0.0, 4.0)),
     "valley": lambda: of_crease(helix, 4.0, interval=(0.0, 4.0)),

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bh
 import meshes
 from bh import CreaseLaw, Displace, Fold, Force, Model, ModelError, Moment, Sheet
 from bh.loading.builder import load_steps
-from bh.loading.load_step import crease_hinges
+from bh.loading.load_step import LoadStep, crease_hinges
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.ramp import Ramp
 
@@ -22,7 +23,7 @@ ONE = meshes.structured(meshes.annulus_sector(40.0, 8.0, 0.6), along=4)
 TWO = meshes.structured(meshes.annulus_sector((40.0, 50.0), 8.0, 0.6, ("mountain", "valley")), along=4)
 
 
-def steps(model: Model) -> list:
+def steps(model: Model) -> list[LoadStep]:
     return list(load_steps(model))
 
 
@@ -88,7 +89,8 @@ def test_angles_follow_the_crease_whatever_the_numbering() -> None:
 def test_spring_from_length_scale_and_from_stiffness() -> None:
     """Eq. 3.12: stiffness a length is E t^3 / (12 L*)."""
     at = crease_hinges(ONE, "crease")
-    for how, expected in (({"Lstar": 5.0}, K / 5.0), ({"stiffness": 0.3}, 0.3)):
+    cases: list[tuple[dict[str, Any], float]] = [({"Lstar": 5.0}, K / 5.0), ({"stiffness": 0.3}, 0.3)]
+    for how, expected in cases:
         (step,) = steps(Model(ONE, STEEL).fold("crease", rest=2.0, **how))
         assert (step.law[at] == SPRING).all()
         assert step.stiffness[at] == pytest.approx(np.full(4, expected), rel=1e-14)
@@ -292,7 +294,9 @@ def test_numpy_numbers_are_numbers(E: Any) -> None:
 
 def test_crease_on_the_boundary_cannot_fold() -> None:
     mesh = meshes.SheetMesh(
-        [[0, 0], [2, 0], [2, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]], edge_sets={"crease:rim": np.array([[0, 1]])}
+        np.array([[0, 0], [2, 0], [2, 1], [0, 1]]),
+        np.array([[0, 1, 2], [0, 2, 3]]),
+        edge_sets={"crease:rim": np.array([[0, 1]])},
     )
     with pytest.raises(ModelError, match="boundary"):
         load_steps(Model(mesh, STEEL).fold("rim", to=2.0))
@@ -301,7 +305,7 @@ def test_crease_on_the_boundary_cannot_fold() -> None:
 # --------------------------------------------------------------------------------------- known faults
 
 
-def attempt(model: Model) -> tuple[list, str]:
+def attempt(model: Model) -> tuple[list[LoadStep], str]:
     """The program, or why there is none."""
     try:
         return steps(model), ""
@@ -327,3 +331,31 @@ def test_release_of_a_held_crease_into_a_spring() -> None:
     assert "needs Lstar" not in refused
     if not refused:
         assert (found[1].law[crease_hinges(ONE, "crease")] == SPRING).all()
+
+
+def bent(formulation: str = "bars-and-hinges", by: float = 1.5) -> bh.Model:
+    """A strip that is pushed to an arch while its crease is still ordinary sheet."""
+    mesh = meshes.structured(meshes.strip(60.0, 20.0, creases=[10.0]), along=12, rows=2)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.3), formulation=formulation)
+    model = model.support("edge:inner", "xyz").support("edge:outer", "xyz")
+    return model.step(bh.Force("crease:crease", total=(0.0, 0.0, by)))
+
+
+def test_a_crease_that_was_bent_as_sheet_is_held_with_the_moment_of_the_sheet() -> None:
+    """The multiplier of an imposed angle begins with the bending moment of the hinge: the step begins in balance."""
+    path = bh.trace(bent().fold("crease", by=0.05))
+    system = path.system(1)
+    assert path.steps[0].outcome == "reached"
+    angle = np.abs(path[len(path) - 1].dihedral("crease") - np.pi)
+    assert angle.max() > 1e-3
+    assert system.evaluate(system.start(), 0.0).imbalance < 1e-6
+    assert path.outcome == "reached"
+
+
+def test_large_strains_get_a_remark() -> None:
+    mesh = meshes.structured(meshes.strip(60.0, 20.0), along=12, rows=2)
+    model = bh.Model(mesh, bh.Sheet(E=4.0, t=0.3)).support("edge:start", "xyz").support("edge:end", "yz")
+    small, large = (bh.trace(model.displace("edge:end", "x", by)) for by in (1.0, 6.0))
+    assert large[-1].strain.max() == pytest.approx(0.1, rel=0.2)
+    assert any("strains reach 10%" in line for line in large.remarks)
+    assert not any("strains" in line for line in small.remarks)

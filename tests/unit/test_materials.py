@@ -184,6 +184,7 @@ def test_derivatives(make: Callable[[], Consistent], kind: str) -> None:
         )
         model = model.step(Fold("crease", to=2.6), Displace("corner:outer-end", (1.0, 1.0, 0.0), 0.4))
     system = formulation(model.formulation).system(model, load_steps(model)[0], None)
+    assert isinstance(system, ConsistentSystem)
     for seed in (1, 2):
         rng = np.random.default_rng(seed)
         q = system.start()

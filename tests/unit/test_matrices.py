@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from bh.mechanics.shared import sparsity as patterns
+from bh.mechanics.shared import sparsity
 from bh.mechanics.shared.sparsity import build_pattern
 from bh.solvers.matrices import (
     BandMatrix,
@@ -19,6 +19,7 @@ from bh.solvers.matrices import (
     reverse_cuthill_mckee,
 )
 from bh.solvers.saddle import ConstraintRows, MultiplierFactor, MultiplierMatrix
+from bh.solvers.sparse import band_is_cheaper
 
 Array = NDArray[np.float64]
 N, BAND = 12, 3
@@ -148,7 +149,7 @@ def test_reverse_cuthill_mckee() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_pattern_assembles_random_elements(banded: bool, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Random elements with some unknowns prescribed: the matrix is the sum of all element matrices."""
-    monkeypatch.setattr(patterns, "band_is_cheaper", lambda n, bandwidth: banded)
+    monkeypatch.setattr(sparsity, "band_is_cheaper", lambda n, bandwidth: banded)
     rng = np.random.default_rng(seed)
     nodes = 9
     number = np.full((nodes, 3), -1)
@@ -181,8 +182,8 @@ def test_pattern_assembles_random_elements(banded: bool, seed: int, monkeypatch:
 
 
 def test_choice_of_storage_grows_with_bandwidth() -> None:
-    assert patterns.band_is_cheaper(500, 20)
-    assert not patterns.band_is_cheaper(30_000, 900)
+    assert band_is_cheaper(500, 20)
+    assert not band_is_cheaper(30_000, 900)
 
 
 # --------------------------------------------------------------------------------------- free bodies
@@ -271,6 +272,7 @@ def test_multipliers_against_a_dense_saddle(gap: float, gamma: float) -> None:
     assert np.abs(y[:N] - expected[:N]).max() <= 1e-3 * np.abs(expected[:N]).max()
     # as tight as it is asked for
     factor = matrix.factorise()
+    assert isinstance(factor, MultiplierFactor)
     tight = MultiplierFactor(
         factor.factor, factor.G, factor.gamma, factor.compliance, most=200, tolerance=1e-12
     ).solve(b)

@@ -308,7 +308,7 @@ def test_extrapolation_is_exact_for_polynomials(count: int) -> None:
     coefficients = np.array([[1.0, -2.0], [0.5, 3.0], [-4.0, 1.5]])[:count]
 
     def value(lam: float) -> Array:
-        return sum(c * lam**i for i, c in enumerate(coefficients))
+        return np.asarray(sum(c * lam**i for i, c in enumerate(coefficients)))
 
     points = [Point(lam, value(lam), 3.0 * value(lam), 0.0, 0.0) for lam in (0.1, 0.25, 0.7)[:count]]
     q, forces = extrapolate(points, 1.3)
@@ -334,12 +334,12 @@ def test_stiffening_spring_is_followed() -> None:
 def test_limits_by_rotation_or_by_lambda() -> None:
     system, strategy = Springs(), LoadControl()
     assert strategy.limits(system) == (0.1, 0.34)
-    system.rotation = math.radians(90.0)  # type: ignore[misc]
+    system.rotation = math.radians(90.0)
     assert strategy.limits(system) == (1.0, 1.0)
     assert strategy.cautious(system) == pytest.approx(15.0 / 90.0)
-    system.rotation = math.radians(135.0)  # type: ignore[misc]
+    system.rotation = math.radians(135.0)
     assert strategy.limits(system) == pytest.approx((90.0 / 135.0, 90.0 / 135.0))
-    system.rotation = math.radians(5.0)  # type: ignore[misc]
+    system.rotation = math.radians(5.0)
     assert strategy.limits(system) == (1.0, 1.0)
 
 

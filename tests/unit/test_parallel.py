@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,6 +87,6 @@ def test_chains_are_meshed_lifted_stored() -> None:
         ((math.nan, 10.0), "curvature = nan"),
     ],
 )
-def test_what_cannot_be(how: tuple, words: str) -> None:
+def test_what_cannot_be(how: tuple[Any, ...], words: str) -> None:
     with pytest.raises(PatternError, match=words):
         meshes.parallel_creases(*how)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from bh.loading.builder import load_steps
 from bh.loading.load_step import crease_hinges
 from bh.model.laws import PRESCRIBED, SPRING
 from bh.model.pinch import Chain, chain, parts
+from fem.state import ShellState
 
 PLATE = Sheet(E=4000.0, t=0.5)
 ONE = meshes.structured(meshes.annulus_sector(100.0, 5.0, 1.0), along=40)
@@ -168,7 +170,11 @@ def test_rest_angles_alone_do_not_reach_the_angle() -> None:
 
 @pytest.mark.parametrize("formulation", BOTH)
 def test_couples_close_the_crease_until_the_angle_is_reached(formulation: str) -> None:
-    how = {"length": 20.0, "how": "couple", "couple": 600.0 if formulation == BOTH[0] else 150.0}
+    how: dict[str, Any] = {
+        "length": 20.0,
+        "how": "couple",
+        "couple": 600.0 if formulation == BOTH[0] else 150.0,
+    }
     path = trace(folded(formulation).pinch("crease", to=CLOSED, **how))
     assert path.outcome == "reached"
     last = path[-1]
@@ -217,7 +223,9 @@ def test_shell_has_the_profile_itself() -> None:
     model = Model(mesh, PLATE, formulation="shell").fold("crease", rest=RIGHT, Lstar=2.0)
     path = trace(model.pinch("crease", to=CLOSED, length=30.0))
     assert path.outcome == "reached"
-    along = path[-1].fold_angles_along("crease")
+    last = path[-1]
+    assert isinstance(last, ShellState)
+    along = last.fold_angles_along("crease")
     assert along[9, 1] == along[10, 0] == pytest.approx(math.pi - CLOSED)
     inside = slice(8, 12)
     assert along[inside][:-1, 1] == pytest.approx(along[inside][1:, 0], abs=1e-3)
@@ -281,7 +289,7 @@ def test_a_scene_says_the_same() -> None:
         ({"to": 6.0}, ["other side", "0.2832"]),
     ],
 )
-def test_bad_pinches_are_told_in_one_line(how: dict, words: list[str]) -> None:
+def test_bad_pinches_are_told_in_one_line(how: dict[str, Any], words: list[str]) -> None:
     with pytest.raises(ModelError) as error:
         load_steps(folded().pinch("crease", **how))
     message = str(error.value)

@@ -37,7 +37,9 @@ def middle(mesh: skfem.MeshTri, deflection: Deflection) -> float:
 @pytest.mark.parametrize(
     ("element", "rate", "error"), [(morley, 1.8, 0.1), (hhj, 3.5, 2e-4)], ids=["morley", "hhj"]
 )
-def test_square_under_pressure(element: Callable, rate: float, error: float, clamped: bool) -> None:
+def test_square_under_pressure(
+    element: Callable[..., Deflection], rate: float, error: float, clamped: bool
+) -> None:
     errors = []
     for cells in (4, 8, 16):
         mesh = square(cells)

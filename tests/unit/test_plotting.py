@@ -57,7 +57,7 @@ def test_picture_shows_the_whole_sheet(path: bh.Path, tmp_path: Path) -> None:
     file = plotting.picture(path[-1], tmp_path / "sheet.png", size=(480, 360), caption=False)
     image = pixels(file)
     assert image.shape == (360, 480, 3)
-    drawn = (image < 0.97).any(axis=2)[: 360 - 59]  # above the colour bar
+    drawn = np.asarray((image < 0.97).any(axis=2))[: 360 - 59]  # above the colour bar
     rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
     assert rows[0] > 2
     assert rows[-1] < len(drawn) - 3
@@ -121,7 +121,7 @@ def test_environment_stays_as_it_was(
         ),
         (lambda s, f: plotting.picture(s, f / "a.jpg"), "is not a .png file"),
         (lambda s, f: plotting.picture(s, f / "a.png", size=(0, 10)), "size 0 x 10 cannot be"),
-        (lambda s, f: plotting.picture([s], f / "a.png"), r"list is not a state; give .* path\[-1\]"),
+        (lambda s, f: plotting.picture([s], f / "a.png"), r"list is not a state; give .* path\[-1\]"),  # type: ignore[arg-type]
         (lambda s, f: plotting.picture(s, f / "a.png", top=float("nan")), "top = nan cannot be"),
     ],
 )
@@ -144,7 +144,7 @@ def test_places_that_cannot_be_written_are_refused(path: bh.Path, tmp_path: Path
 
 
 def test_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(offscreen.sys, "platform", "linux")
+    monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setattr(offscreen, "library", lambda name: None)
     offscreen.egl_works.cache_clear()
     try:
@@ -155,7 +155,7 @@ def test_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.Monk
 
 
 def test_window_needs_a_display(path: bh.Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(offscreen.sys, "platform", "linux")
+    monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setenv("DISPLAY", "")
     with pytest.raises(InputError, match=r"no display .* use bh\.plotting\.picture"):
         path.plot()

@@ -126,6 +126,30 @@ def test_hooks_download_nothing_and_run_the_linters() -> None:
         assert "additional_dependencies" not in hook
 
 
+def loosely_checked(tool: dict[str, Any]) -> list[str]:
+    """What the type checker would pass over, by its settings."""
+    folders = {"bh", "fem", "meshes", "verification", "reports", "tests"}
+    found = sorted(folders - set(tool["files"])) + ([] if tool.get("strict") else ["strict"])
+    found += [str(one["module"]) for one in tool.get("overrides", []) if one.get("ignore_errors")]
+    return found + (["exclude"] if tool.get("exclude") else [])
+
+
+def test_the_type_checker_reads_everything_strictly() -> None:
+    """Tests too, and no module is let off as a whole."""
+    assert loosely_checked(PROJECT["tool"]["mypy"]) == []
+    loose = {"files": ["bh"], "exclude": "x", "overrides": [{"module": "fem.*", "ignore_errors": True}]}
+    assert loosely_checked(loose) == [
+        "fem",
+        "meshes",
+        "reports",
+        "tests",
+        "verification",
+        "strict",
+        "fem.*",
+        "exclude",
+    ]
+
+
 def test_tools_of_the_project_are_in_the_lock() -> None:
     locked = {line.split("==")[0] for line in text_of("requirements.lock").splitlines()}
     wanted = PROJECT["project"]["dependencies"] + PROJECT["project"]["optional-dependencies"]["dev"]

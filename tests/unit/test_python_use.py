@@ -23,19 +23,19 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "appendix_b_a.toml"
 @pytest.mark.parametrize(
     ("slip", "told"),
     [
-        (lambda: bh.trace(load_scene(EXAMPLE)), "trace takes a model, not a Scene; give scene.model"),
-        (lambda: bh.trace("scene.toml"), "trace takes a model, not a str"),
-        (lambda: bh.Model(PATTERN, SHEET), "mesh of a model is a CreasePattern; give bh.Model(mesh, sheet)"),
-        (lambda: bh.Model(SHEET, MESH), "mesh of a model is a Sheet; give bh.Model(mesh, sheet)"),
-        (lambda: bh.Model(MESH, 0.1), "sheet of a model is a float; give bh.Model(mesh, sheet)"),
-        (lambda: bh.Model(MESH, bh.Sheet), "sheet of a model is the class Sheet; give"),
-        (lambda: bh.Sheet(E=4000.0, t="0.1"), "sheet t = '0.1' cannot be; give a positive number in mm"),
-        (lambda: bh.Sheet(E=4000.0, t=0.1, nu="0.3"), "sheet nu = '0.3' cannot be"),
+        (lambda: bh.trace(load_scene(EXAMPLE)), "trace takes a model, not a Scene; give scene.model"),  # type: ignore[arg-type]
+        (lambda: bh.trace("scene.toml"), "trace takes a model, not a str"),  # type: ignore[arg-type]
+        (lambda: bh.Model(PATTERN, SHEET), "mesh of a model is a CreasePattern; give bh.Model(mesh, sheet)"),  # type: ignore[arg-type]
+        (lambda: bh.Model(SHEET, MESH), "mesh of a model is a Sheet; give bh.Model(mesh, sheet)"),  # type: ignore[arg-type]
+        (lambda: bh.Model(MESH, 0.1), "sheet of a model is a float; give bh.Model(mesh, sheet)"),  # type: ignore[arg-type]
+        (lambda: bh.Model(MESH, bh.Sheet), "sheet of a model is the class Sheet; give"),  # type: ignore[arg-type]
+        (lambda: bh.Sheet(E=4000.0, t="0.1"), "sheet t = '0.1' cannot be; give a positive number in mm"),  # type: ignore[arg-type]
+        (lambda: bh.Sheet(E=4000.0, t=0.1, nu="0.3"), "sheet nu = '0.3' cannot be"),  # type: ignore[arg-type]
         (lambda: meshes.annulus_sector(100, 10, 45), "angles are radians, not degrees"),
-        (lambda: meshes.annulus_sector(100, 10, "45"), "angle = '45' is not a number"),
-        (lambda: meshes.annulus_sector("wide", 10, 0.5), "radius = 'wide' is not a number"),
-        (lambda: meshes.strip(None, 10), "length = None is not a number"),
-        (lambda: meshes.structured(MESH, along=3), "a SheetMesh cannot be meshed; give a pattern"),
+        (lambda: meshes.annulus_sector(100, 10, "45"), "angle = '45' is not a number"),  # type: ignore[arg-type]
+        (lambda: meshes.annulus_sector("wide", 10, 0.5), "radius = 'wide' is not a number"),  # type: ignore[arg-type]
+        (lambda: meshes.strip(None, 10), "length = None is not a number"),  # type: ignore[arg-type]
+        (lambda: meshes.structured(MESH, along=3), "a SheetMesh cannot be meshed; give a pattern"),  # type: ignore[arg-type]
     ],
 )
 def test_slips_are_told_in_one_line(slip: Callable[[], Any], told: str) -> None:
@@ -48,9 +48,9 @@ def test_slips_are_told_in_one_line(slip: Callable[[], Any], told: str) -> None:
 def test_values_of_a_sheet_are_given_by_name() -> None:
     """`Sheet(4000, 0.38, 0.127)` would read as a thickness of 0.38 mm."""
     with pytest.raises(TypeError):
-        bh.Sheet(4000.0, 0.38, 0.127)  # type: ignore[misc]
+        bh.Sheet(4000.0, 0.38, 0.127)  # type: ignore[call-arg]
     with pytest.raises(TypeError):
-        meshes.structured(PATTERN, 8)  # type: ignore[misc]
+        meshes.structured(PATTERN, 8)  # type: ignore[call-arg]
 
 
 def test_objects_show_what_they_hold_in_one_line() -> None:
@@ -86,5 +86,5 @@ def test_models_and_paths_can_be_pickled() -> None:
     assert other.mesh.creases == mesh.creases
     assert other.mesh.aspect_ratio == mesh.aspect_ratio
     with pytest.raises(TypeError):
-        other.mesh.corners["corner:inner-start"] = 3  # type: ignore[index]
+        other.mesh.corners["corner:inner-start"] = 3
     assert not other.mesh.points.flags.writeable

@@ -20,7 +20,9 @@ from verification.framework.cases import ALL_CASES
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "examples" / "README.md"]
 README = PAGES[0].read_text(encoding="utf-8")
-COMMANDS = typer.main.get_command(bh.commands.cli.app).commands
+GROUP = typer.main.get_command(bh.commands.cli.app)
+assert isinstance(GROUP, typer.core.TyperGroup)
+COMMANDS = GROUP.commands
 
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INDENTED = re.compile(r"^(?:    .*\n)+", re.MULTILINE)
@@ -39,7 +41,7 @@ def drawable() -> bool:
 def block(language: str) -> str:
     """The one block of README in this language."""
     (found,) = (text for name, text in FENCED.findall(README) if name == language)
-    return found
+    return str(found)
 
 
 def code(text: str) -> Iterator[str]:

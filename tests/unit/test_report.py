@@ -30,7 +30,7 @@ MESHES = ("staggered", "alternating", "one-way", "mirrored")
 def record(
     case: str, quantity: str, value: float | None, passed: bool | None = None, **more: Any
 ) -> dict[str, Any]:
-    found = {
+    found: dict[str, Any] = {
         "case": case,
         "quantity": quantity,
         "params": {},
@@ -254,7 +254,7 @@ def test_nothing_comes_from_elsewhere(site: dict[Path, str]) -> None:
 def test_pictures_and_plots_say_what_they_show(page: Page) -> None:
     images = page.all("img")
     assert [image["alt"] for image in images] == ['A folded sheet, "coloured" by energy']
-    assert images[0]["src"].startswith("data:image/webp;base64,")
+    assert str(images[0]["src"]).startswith("data:image/webp;base64,")
     plots = [attributes for attributes in page.all("svg") if attributes.get("role") == "img"]
     assert len(plots) == 2
     assert all(plot["aria-labelledby"] for plot in plots)
@@ -323,7 +323,7 @@ def test_unreached_states_name_their_outcome(tmp_path: Path) -> None:
 def test_data_behind_plots_can_be_had(page: Page) -> None:
     links = {a["download"]: a["href"] for a in page.all("a") if a.get("download")}
     assert set(links) == {"strips-bending.csv", "strips.csv", "cone.csv", "derivatives.csv"}
-    lines = base64.b64decode(links["strips-bending.csv"].split(",")[1]).decode().splitlines()
+    lines = base64.b64decode(str(links["strips-bending.csv"]).split(",")[1]).decode().splitlines()
     assert lines[0] == "series,aspect ratio alpha = H / W,U_BH / U_Th"
     assert len(lines) == 1 + 25
     assert lines[5] == "staggered,20.0,"
@@ -443,14 +443,15 @@ def test_strange_plots_are_drawn(tmp_path: Path) -> None:
         axes = {"x": {"label": "$x"}, "y": {"label": "y", "log": log}}
         return svg(Plot.model_validate({"id": "p", "title": "t", "series": [series], **axes}), "p-")
 
-    for y in (
+    many: list[list[float | None]] = [
         [],
         [None, None],
         [1.0, math.inf, math.nan],
         [1.0, 1.0, 1.0 + 1e-14],
         [0.0, -1.0, 2.0],
         [1e-9, 1.0, 1e9],
-    ):
+    ]
+    for y in many:
         for log in (False, True):
             assert Page(drawn(y, log)).wrong == []
     assert "10⁻⁹" in drawn([1e-9, 1.0, 1e9], True)

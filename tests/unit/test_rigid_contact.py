@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 import meshes
 from bh import LoadControl, Model, ModelError, Sheet, trace
+from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.consistent.system import ConsistentSystem
 from bh.mechanics.shared.contact import RigidContact
 from bh.model.actuations import Indenter, Tether
 from bh.paths.path import Path
@@ -28,7 +31,7 @@ def rig(
     by: float, radius: float = 0.5, gap: float = 0.02, half: float = 0.5 * SPAN
 ) -> list[Indenter | Tether]:
     """Cylinders along y: two below, one above that goes down."""
-    about = {
+    about: dict[str, Any] = {
         "azimuth": 0.5 * math.pi,
         "width": 2.0 * radius,
         "height": 2.0 * radius,
@@ -92,13 +95,14 @@ def test_work_of_the_bar_is_the_energy_of_sheet_and_barriers() -> None:
     assert path[-1].energy.total < gained
 
 
-def shaken(formulation: str, seed: int) -> tuple[object, np.ndarray, float]:
+def shaken(formulation: str, seed: int) -> tuple[BarsAndHingesSystem | ConsistentSystem, np.ndarray, float]:
     """A folded piece of sheet deep in a slanted bar: rounded edges, flat sides and tethers all act."""
     mesh = meshes.structured(meshes.annulus_sector(20.0, 6.0, 0.6), along=6)
     model = Model(mesh, SHEET, formulation=formulation).support("corner:inner-start", [[1.0, 0.5, 0.2]])
     bar = Indenter("bar", (19.0, 5.0, 0.6), 0.7, 4.0, 1.5, 0.5, by=(0.3, -0.2, -0.5), tilt=0.1, gap=0.4)
     model = model.crease("crease", Lstar=25.0).step(bar, Tether("edge:start", (0.5, 1.0, 2.0)))
     system = Path(model).system(0)
+    assert isinstance(system, BarsAndHingesSystem | ConsistentSystem)
     q = system.start() + 0.1 * np.random.default_rng(seed).normal(size=system.size)
     return system, q, 0.4
 
@@ -107,6 +111,7 @@ def shaken(formulation: str, seed: int) -> tuple[object, np.ndarray, float]:
 def test_derivatives(formulation: str) -> None:
     """Gradient, Hessian, rate with lambda and power against central differences."""
     system, q, lam = shaken(formulation, 3)
+    assert system.rigid_contact is not None
     assert np.abs(system.rigid_contact.contact_forces(system.positions(q, lam), lam)["bar"]).max() > 1.0
     now, h = system.evaluate(q, lam), 1e-6
     matrix = system.tangent(q, lam, now.forces).matrix
@@ -134,7 +139,7 @@ def test_distance_is_that_of_a_rounded_rectangle() -> None:
 
     def push(y: float, z: float) -> np.ndarray:
         x = np.tile([0.0, y, z], (3, 1))
-        return contact.contact_forces(x, 0.0)["bar"] / contact.share.sum()
+        return np.asarray(contact.contact_forces(x, 0.0)["bar"] / contact.share.sum())
 
     assert push(0.0, 1.4) == pytest.approx([0.0, 0.0, 0.5 * 0.6**2])
     assert push(2.6, 0.0) == pytest.approx([0.0, 0.5 * 0.4**2, 0.0])

@@ -214,8 +214,8 @@ def test_a_function_of_nodes_by_complex_step() -> None:
     path = bh.trace(build(p), strategy=EXACT)
     a, b = 0, int(path.model.mesh.nodes(TIP)[0])
 
-    def distance(x: Array) -> Array:
-        return np.sqrt(((x[1] - x[0]) * (x[1] - x[0])).sum())
+    def distance(x: NDArray[np.float64 | np.complex128]) -> complex:
+        return complex(np.sqrt(((x[1] - x[0]) * (x[1] - x[0])).sum()))
 
     def whole(points: Array) -> tuple[float, Array]:
         away = points[b] - points[a]

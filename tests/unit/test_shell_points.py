@@ -22,7 +22,7 @@ from fem.spaces import (
 
 
 def unit(v: np.ndarray) -> np.ndarray:
-    return v / np.linalg.norm(v)
+    return np.asarray(v / np.linalg.norm(v))
 
 
 def angle(z: np.ndarray, t0: np.ndarray, d0: np.ndarray) -> tuple[float, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from fem import system as system_module
 from fem.assembly import build_pattern
 from fem.kirchhoff_love import LinearShell, Shell
 from fem.shell import carried_frames, flat_frames, shell_elements
+from fem.state import ShellState
 from fem.system import ShellSystem
 from meshes import SheetMesh
 from meshes.curved import lift
@@ -98,7 +100,7 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]]) / np.linalg.norm(
         axis
     )
-    return np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k
+    return np.asarray(np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k)
 
 
 @pytest.mark.parametrize("angle", [0.5, 2.0])
@@ -191,7 +193,10 @@ def test_moments_and_membrane_forces_of_constant_states() -> None:
     model = model.force("edge:end", total=(0.01, 0.0, 0.0))
     path = bh.trace(model)
     assert path.outcome == "reached"
-    np.testing.assert_allclose(path[-1].membrane_forces, [[0.01, 0.0, 0.0]] * len(mesh.triangles), atol=2e-5)
+    last = path[-1]
+    assert isinstance(last, ShellState)
+    expected = np.tile([0.01, 0.0, 0.0], (len(mesh.triangles), 1))
+    np.testing.assert_allclose(last.membrane_forces, expected, atol=2e-5)
     assert path[-1].reaction("edge:start")[0] == pytest.approx(-0.01, rel=1e-6)
 
 
@@ -202,9 +207,7 @@ def test_both_patterns_hold_the_same_matrix(formulation: str, monkeypatch: pytes
     now = system.evaluate(q, 0.3)
     expected = system.tangent(q, 0.3, now.forces).matrix
     other = system_of(CASES["spring and its rest angle"])
-    monkeypatch.setattr(
-        system_module, "build_pattern", lambda *a: build_pattern(*a, banded=formulation == "band")
-    )
+    monkeypatch.setattr(system_module, "build_pattern", partial(build_pattern, banded=formulation == "band"))
     matrix = other.tangent(q, 0.3, other.evaluate(q, 0.3).forces).matrix
     assert other._pattern.banded == (formulation == "band")
     v = np.random.default_rng(6).normal(size=system.size)

@@ -59,7 +59,7 @@ def dense(probe: Probe) -> Array:
     return np.column_stack([probe.matrix @ unit for unit in np.eye(len(probe.q))])
 
 
-def condensed(K: Array, keep: Array, drop: Array) -> Array:
+def condensed(K: Array, keep: NDArray[np.integer], drop: NDArray[np.integer]) -> Array:
     """K_kk - K_kr K_rr^-1 K_rk of unknowns `keep`, those of `drop` held."""
     rest = np.setdiff1d(np.arange(len(K)), np.concatenate((keep, drop)))
     return np.asarray(

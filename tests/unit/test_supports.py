@@ -6,6 +6,7 @@ import math
 import tracemalloc
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,14 +15,15 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh import Displace, Fold, Force, Model, ModelError, RigidBody, Sheet, Support, trace
+from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.model.supports import Prescribed, directions, free_motions, resolve, rigid_motions, select
 from meshes import MeshError, SheetMesh
 
 Array = NDArray[np.float64]
 SHEET = Sheet(E=4000.0, t=0.127)
 MESH = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), along=8)
-SMALL = SheetMesh([[0, 0], [2, 0], [2, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]])
-FOLDS = {"held": {"to": 2.0}, "spring": {"rest": 1.5, "Lstar": 25.0}}
+SMALL = SheetMesh(np.array([[0, 0], [2, 0], [2, 1], [0, 1]]), np.array([[0, 1, 2], [0, 2, 3]]))
+FOLDS: dict[str, dict[str, Any]] = {"held": {"to": 2.0}, "spring": {"rest": 1.5, "Lstar": 25.0}}
 
 
 def solve(model: Model) -> bh.Path:
@@ -67,6 +69,7 @@ def test_select() -> None:
         select(MESH, "corner:nowhere")
     with pytest.raises(ModelError, match="not in the mesh"):
         select(MESH, [len(MESH.points)])
+    wrong: Any
     for wrong in ([-1], [], [0.5], [[1]]):
         with pytest.raises(ModelError):
             select(MESH, wrong)
@@ -144,7 +147,7 @@ def test_supports_in_one_direction_twice_are_one() -> None:
         ([], [((1.0, 0.0, 0.0), 0.5), ((0.0, 1.0, 0.0), 0.5), ((0.6, 0.8, 0.0), 0.1)]),
     ],
 )
-def test_contradictions_name_the_node(supports: list, prescribed: list) -> None:
+def test_contradictions_name_the_node(supports: list[Support], prescribed: list[Any]) -> None:
     items = [Prescribed(np.array([2]), direction, 0.0, end) for direction, end in prescribed]
     with pytest.raises(ModelError, match="node 2"):
         resolve(SMALL, [*supports, RigidBody()], items)
@@ -173,7 +176,7 @@ def test_rigid_motions_stretch_nothing() -> None:
                 assert abs((u[i] - u[j]) @ (x[i] - x[j])) < 1e-14
 
 
-FREE = [
+FREE: list[tuple[list[Support], int]] = [
     ([], 6),
     ([Support([0], "x")], 5),
     ([Support([0], "xyz")], 3),
@@ -194,7 +197,7 @@ FREE = [
 
 @pytest.mark.parametrize(("supports", "left"), FREE)
 @pytest.mark.parametrize("unit", [1.0, 1e-9, 1e9])
-def test_number_of_free_motions(supports: list, left: int, unit: float) -> None:
+def test_number_of_free_motions(supports: list[Support], left: int, unit: float) -> None:
     """Exactly six for a free sheet, fewer with partial supports, in any unit of length."""
     mesh = replace(SMALL, points=SMALL.points * unit)
     found = resolve(mesh, [*supports, RigidBody()])
@@ -208,7 +211,7 @@ def test_number_of_free_motions(supports: list, left: int, unit: float) -> None:
 
 
 @pytest.mark.parametrize(("supports", "left"), FREE)
-def test_missing_supports_are_counted(supports: list, left: int) -> None:
+def test_missing_supports_are_counted(supports: list[Support], left: int) -> None:
     """Without a support at "rigid-body" a motion that is left free is an error that counts and names it."""
     if not supports:
         assert resolve(SMALL, []).rigid_body  # no support at all: taken out by itself
@@ -246,6 +249,7 @@ def internal_forces(path: bh.Path) -> tuple[Array, Array]:
     """Nodes (n, 3) and forces (n, 3) of bars and hinges on them, in the last state of a free sheet."""
     record = path.records[-1]
     system = path.system(record.step)
+    assert isinstance(system, BarsAndHingesSystem)
     _, _, forces, _, _ = system.internal_forces(path[-1].points, record.q, record.lam)
     return path[-1].points, forces
 
@@ -258,6 +262,7 @@ def test_free_sheet_is_held_without_force(how: str, kind: str) -> None:
     for state in path:
         assert np.abs(state.reactions).max() == 0.0
     system = path.system(0)
+    assert isinstance(system, BarsAndHingesSystem)
     assert system.primal == 3 * len(mesh.points)  # nothing is fixed, not even invisibly
     x, forces = internal_forces(path)
     typical = np.abs(system.evaluate(path.records[-1].q, 1.0).forces[: len(system.elements.bars)]).max()
@@ -397,7 +402,7 @@ def test_balanced_pair_on_a_free_sheet() -> None:
 )
 def test_dead_pull_may_turn_a_free_sheet() -> None:
     """Two opposite dead forces on a triangle: in balance in the flat sheet; in tension there is a stable state."""
-    triangle = SheetMesh([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]])
+    triangle = SheetMesh(np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]]))
     pull = (Force([0], each=(0.0, -0.1, 0.0)), Force([2], each=(0.0, 0.1, 0.0)))
     path = trace(Model(triangle, SHEET, formulation="bars-and-hinges").step(*pull))
     assert path.outcome == "reached"
@@ -430,8 +435,8 @@ def test_oblique_supports_are_rotated_axis_supports() -> None:
     Q, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
     Q = Q * np.sign(np.linalg.det(Q))
 
-    def turned(vector: Sequence[float]) -> list[float]:
-        return (Q @ np.asarray(vector, dtype=float)).tolist()
+    def turned(vector: Sequence[float] | Array) -> list[float]:
+        return [float(x) for x in Q @ np.asarray(vector, dtype=float)]
 
     axes = np.eye(3)
     rotated = replace(MESH, points=MESH.points @ Q.T)

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +33,7 @@ EXAMPLES = HERE.parents[1] / "examples"
 def tasks(monkeypatch: pytest.MonkeyPatch) -> Any:
     """The module of tasks; spawned workers get this process's path."""
     monkeypatch.syspath_prepend(str(HERE))
-    import sweep_tasks
-
-    return sweep_tasks
+    return import_module("sweep_tasks")
 
 
 def same(one: Any, other: Any) -> bool:
@@ -379,7 +378,7 @@ def pinching(angles: Sequence[float]) -> tuple[Any, Any]:
 
 def test_warm_starts_give_the_same_states(tmp_path: Path) -> None:
     """To a millionth of the sheet, in fewer iterations, and the same bits with other workers."""
-    task, points = pinching(np.linspace(1.8, 1.5, 7))
+    task, points = pinching(np.linspace(1.8, 1.5, 7).tolist())
     cold = bh.sweep.run(task, points, tmp_path / "cold.nc", pool=0)
     warm = bh.sweep.run(task, points, tmp_path / "warm.nc", pool=0, warm=True)
     assert (warm["outcome"] == "reached").all()

@@ -67,7 +67,7 @@ def test_a_trace_uses_one(three_threads: None, monkeypatch: pytest.MonkeyPatch) 
         def close(self, *_: Any) -> None:
             pass
 
-    bh.trace(model("a", along=8), progress=Meter())  # type: ignore[arg-type]
+    bh.trace(model("a", along=8), progress=Meter())
     assert seen
     assert all(number == {1} for number in seen)
     assert numbers() == {3}

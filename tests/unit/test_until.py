@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from pathlib import Path as FilePath
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from bh import Model, ModelError, Sheet, Until, trace
 from bh.formulations.observables import depth_of, measure
 from bh.formulations.state import State
 from bh.scene.load import parse_scene
+from bh.solvers.trace import Walk, _until
 
 SHEET = Sheet(E=4000.0, t=0.381)
 FORMULATIONS = ["bars-and-hinges", "consistent"]
@@ -133,16 +136,11 @@ def test_bad_targets_are_one_line() -> None:
         (lambda: Until("energy", float("nan")), "finite number"),
         (lambda: Until("fold_angle", 1.0), "needs `of`, the name of a crease"),
         (lambda: bh.depth(-1.0), "positive length"),
-        (lambda: Until(lambda state: 1.0, 1.0), "top of a module"),  # type: ignore[arg-type]
+        (lambda: Until(lambda state: 1.0, 1.0), "top of a module"),
         (lambda: corrugation().step(until=bh.depth(1.0)), "at least one actuation"),
         (lambda: corrugation().step(bh.depth(1.0)), "give it by name"),  # type: ignore[arg-type]
         (lambda: corrugation().step("fold"), "takes actuations, not a str"),  # type: ignore[arg-type]
-        (
-            lambda: Model(
-                corrugation().mesh, SHEET, steps=((bh.Fold("a", to=1.0),),), formulation="bars-and-hinges"
-            ),
-            "give bh.Step",
-        ),  # type: ignore
+        (lambda: Model(corrugation().mesh, SHEET, steps=((bh.Fold("a", to=1.0),),)), "give bh.Step"),  # type: ignore[arg-type]
     ):
         with pytest.raises(ModelError, match=message):
             make()
@@ -183,3 +181,25 @@ def test_scene() -> None:
     ):
         with pytest.raises(bh.SceneError, match=message):
             parse_scene(SCENE.replace("UNTIL", text))
+
+
+def test_a_small_value_is_met_as_well_as_a_large_one() -> None:
+    """The tolerance is in parts of the value: an energy of 2e-5 N mm once was met with a twentieth of it."""
+    model = corrugation().fold("all", by=0.5, Lstar=25.0, until=Until("energy", 2e-5))
+    path = trace(model)
+    assert path.outcome == "reached"
+    assert path[-1].energy.total == pytest.approx(2e-5, rel=1e-5)
+
+
+def test_a_jump_over_the_value_is_told() -> None:
+    """A step whose states jump from one side of the value to the other has passed it, and says where."""
+
+    def goal(at: Any) -> float:
+        return float(at.value)
+
+    one: Any = SimpleNamespace(point=SimpleNamespace(lam=0.5, value=1.0), reached=True, jumped=True)
+    start = SimpleNamespace(lam=0.0, value=-1.0)
+    task = Walk(None, None, (start,), goal=goal)  # type: ignore[arg-type]
+    *_, last = _until(task, iter([one]), goal)
+    assert last.outcome == "target-missed"
+    assert "a jump at lambda 0.5 passed it" in last.note

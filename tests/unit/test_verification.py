@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,7 @@ SLOW = {
 
 
 def check(**changes: Any) -> Check:
-    given = {
+    given: dict[str, Any] = {
         "case": "c",
         "quantity": "q",
         "params": {"alpha": 2.0},
@@ -328,7 +329,7 @@ def test_environment_and_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     assert "git commit" not in environment.environment()
     (tmp_path / ".git").write_text("no repository either")
     assert "git commit" not in environment.environment()
-    monkeypatch.setattr(environment.shutil, "which", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
     assert "git commit" not in environment.environment()
 
 
@@ -423,9 +424,9 @@ def test_derivatives_case_sees_a_wrong_hessian(monkeypatch: pytest.MonkeyPatch, 
 
 def test_cone_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Bending hinges 10 % too stiff."""
-    from bh.mechanics.bars_and_hinges import elements
+    from bh.mechanics.bars_and_hinges import elements, stiffness
 
-    right = elements.bending_hinge_stiffness
+    right = stiffness.bending_hinge_stiffness
     monkeypatch.setattr(elements, "bending_hinge_stiffness", lambda *args: 1.1 * right(*args))
     data = run(["cone"], tmp_path, quick=True)
     assert data["cases"][0]["verdict"] == "differs"
@@ -437,9 +438,9 @@ def test_cone_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp_p
 
 def test_strips_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Diagonals by Eq. 3.3 without the factor of Eq. 3.4 are as good in tension; hinges of half the area are not."""
-    from bh.mechanics.bars_and_hinges import elements
+    from bh.mechanics.bars_and_hinges import elements, stiffness
 
-    right = elements.bending_hinge_stiffness
+    right = stiffness.bending_hinge_stiffness
     monkeypatch.setattr(elements, "bending_hinge_stiffness", lambda E, t, L, A: right(E, t, L, 0.5 * A))
     data = run(["strips"], tmp_path, quick=True)
     failed = {r["quantity"] for r in data["checks"] if r["passed"] is False}
@@ -453,7 +454,8 @@ def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytes
     """Results that are stored are not played again; a half-written line and those of other versions are."""
     monkeypatch.setattr(campaign, "environment", lambda: {"python": "x"})
     few = campaign.scenes(3)
-    store, told = tmp_path / "campaign.jsonl", []
+    store = tmp_path / "campaign.jsonl"
+    told: list[str] = []
     whole = campaign.play_all(few, store, told.append)
     assert [r.outcome for r in whole] == ["reached"] * 3
     assert told == []

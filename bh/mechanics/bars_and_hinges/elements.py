@@ -105,6 +105,18 @@ def sheet_elements(
     )  # fmt: skip
 
 
+def bending_moments(model: Model, angles: Array) -> Array:
+    """(m,) moments, N mm, of all hinges as bending hinges of the sheet at dihedral angles (m,), rad."""
+    topology, points = model.mesh.topology, model.mesh.points
+    turn = angles - dihedral_angles(points, topology.hinges)
+    if model.stiffness is not None:
+        return np.asarray(model.stiffness.hinges * turn)
+    ends = points[topology.hinges[:, 1:3]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    area = model.mesh.areas[topology.edge_triangles[topology.hinge_edges]].sum(axis=1)
+    return np.asarray(bending_hinge_stiffness(model.sheet.E, model.sheet.t, length, area) * turn)
+
+
 def _lock_stiffness(
     model: Model, load_step: LoadStep, stiffness: Array, sheet: Array, reference: Array
 ) -> Array:

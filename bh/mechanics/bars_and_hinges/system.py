@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
-from bh.mechanics.bars_and_hinges.elements import sheet_elements
+from bh.mechanics.bars_and_hinges.elements import bending_moments, sheet_elements
 from bh.mechanics.shared.assembly import (
     Pattern,
     build_pattern,
@@ -22,6 +22,7 @@ from bh.mechanics.shared.assembly import (
 )
 from bh.mechanics.shared.base_system import SupportedSheet
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
+from bh.model.laws import PRESCRIBED
 from bh.model.model import Model
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
@@ -82,6 +83,11 @@ class BarsAndHingesSystem(SupportedSheet):
         moments = np.zeros(len(prescribed_start)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
         self.elements = sheet_elements(model, load_step, prescribed_start, moments)
+        if (
+            start is not None
+        ):  # a crease that was ordinary sheet up to here is held against the sheet's moment
+            sheet = np.isnan(start.crease_moments) & (load_step.law == PRESCRIBED)
+            moments = np.where(sheet, bending_moments(model, prescribed_start), moments)
         if plane is not None:
             from bh.mechanics.shared.mirrored import half_elements, half_load_step
 
