@@ -127,10 +127,10 @@ def unstructured(
     mesh = SheetMesh(
         points=points,
         triangles=triangles,
-        edge_sets=with_groups(pattern, chains),
+        edge_sets=(edge_sets := with_groups(pattern, chains)),
         corners=_corners({name: pairs for name, pairs in chains.items() if name not in cuts}),
         folds=pattern.folds,
-        fold_angles=drawn_angles(pattern, chains),
+        fold_angles=drawn_angles(pattern, edge_sets),
         curves=curves,
         kind="gmsh",
         remarks=pattern.remarks,

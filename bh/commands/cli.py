@@ -15,20 +15,16 @@ try:
     from collections.abc import Callable, Sequence
     from importlib.metadata import EntryPoint, entry_points, version
     from pathlib import Path
-    from typing import TYPE_CHECKING, Annotated
+    from typing import Annotated
 
     import typer
 
+    from bh.commands.fold_options import fold
     from bh.runtime.consent import take_options
     from bh.runtime.terminal import say
 except KeyboardInterrupt:  # `main` tells of it from here on
     sys.stderr.write("bh: interrupted\n")
     raise SystemExit(130) from None
-
-if TYPE_CHECKING:
-    from bh.analysis.contact import Contact
-    from bh.paths.path import Path as Trace
-    from bh.scene.load import Scene
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
@@ -145,6 +141,7 @@ def run(
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
     from bh.commands.run import UNFINISHED, extras, holds_states, solve
+    from bh.commands.summary import summary
     from bh.errors import InputError
     from bh.scene.load import load_scene
 
@@ -171,7 +168,7 @@ def run(
             ) from error
         written.append(folder / name)
     if not quiet:
-        _summary(path, loaded, written, contact)
+        summary(path, loaded, written, contact)
     if path.reached and path.accuracy is not None and not path.accuracy.met:
         why = "; ".join(note for note in path.accuracy.notes if note.startswith("ended"))
         say(
@@ -189,6 +186,9 @@ def run(
             err=True,
         )
         raise typer.Exit(1)
+
+
+app.command()(fold)
 
 
 @app.command()
@@ -278,7 +278,7 @@ def export(
 def init(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The scene to write.")] = Path("scene.toml"),
     drawing: Annotated[
-        Path | None, typer.Option("--drawing", metavar="FILE", help="An SVG or DXF crease pattern to fold.")
+        Path | None, typer.Option("--drawing", metavar="FILE", help="SVG, DXF, FOLD, .cp or .opx to fold.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
 ) -> None:
@@ -301,7 +301,7 @@ def init(
 
 @app.command()
 def check(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).")],
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML), or a drawing.")],
     picture: Annotated[
         Path | None,
         typer.Option("--picture", metavar="FILE", help="PNG, SVG or PDF to draw; default SCENE-check.png."),
@@ -309,10 +309,12 @@ def check(
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
 ) -> None:
     """Check a scene, say what it is, and draw its flat pattern."""
+    from bh.commands.summary import scene_of_drawing
     from bh.scene.load import load_scene
     from bh.scene.report import draw, report
+    from meshes.io.drawing import PATTERNS
 
-    loaded = load_scene(scene)
+    loaded = scene_of_drawing(scene) if scene.suffix.lower() in PATTERNS else load_scene(scene)
     for line in report(loaded):
         say(line)
     if not no_picture:
@@ -381,45 +383,6 @@ def _proxy(entry: EntryPoint) -> Callable[[typer.Context], None]:
 
 
 _add_commands()
-
-
-def _summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact | None) -> None:
-    from math import degrees
-
-    from bh.formulations.registry import takes_nu
-
-    energy, last = path[-1].energy, path[-1]
-    say(
-        f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
-        f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
-    )
-    for remark in path.remarks[:6]:
-        say(remark)
-    model = path.model
-    if model.sheet.nu != 0.0 and not takes_nu(model.formulation):
-        say(f"{model.formulation} take Poisson's ratio as 0, not as nu = {model.sheet.nu:g}")
-    say(
-        f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
-        f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
-    )
-    creases = model.mesh.creases
-    for crease in creases[:6]:
-        a = last.fold_angle(crease)
-        say(
-            f"fold angle of {crease}: {a.mean():.4f} rad ({degrees(a.mean()):.1f} degrees), "
-            f"{a.min():.4f} to {a.max():.4f}"
-        )
-    if len(creases) > 6:
-        say(f"and {len(creases) - 6} more creases")
-    if contact is None:
-        say("self-contact: none")
-    else:
-        say(f"self-contact (reported, not prevented), first in {contact}")
-    if path.accuracy is not None:
-        say(f"accuracy: {path.accuracy}")
-    if path.estimate_reason:
-        say(f"accuracy: no estimate: {path.estimate_reason}")
-    say("files: " + " ".join(str(file) for file in written))
 
 
 if __name__ == "__main__":

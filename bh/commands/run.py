@@ -73,7 +73,7 @@ def solve(
             described; a folder that was made for the run is taken away again if nothing came of it.
     """
     names = _names(folder, scene, resume)
-    made = _make(folder)
+    made = make_folder(folder)
     file = folder / names[0]
     before = resume and _is_whole(file, scene)
     solved = _solved_meshes(file)
@@ -92,7 +92,7 @@ def solve(
     except (InputError, KeyboardInterrupt):
         if not resume and not holds_states(folder):
             remove_levels(folder_of(file))
-            _take_back(file, made)
+            take_back(file, made)
         raise
     clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
     if path.reached:
@@ -192,7 +192,7 @@ def _is_finished(folder: Path) -> bool:
     return isinstance(result, dict) and result.get("outcome") == Outcome.REACHED
 
 
-def _make(folder: Path) -> list[Path]:
+def make_folder(folder: Path) -> list[Path]:
     """Make the folder and what is missing above it; returns what was made, the deepest last.
 
     Raises:
@@ -207,7 +207,7 @@ def _make(folder: Path) -> list[Path]:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except (OSError, ValueError) as error:
-        _take_back(None, made)
+        take_back(None, made)
         why = getattr(error, "strerror", None) or error
         raise InputError(
             f"the output folder '{folder}' cannot be written ({why}); choose another with -o"
@@ -215,7 +215,7 @@ def _make(folder: Path) -> list[Path]:
     return made
 
 
-def _take_back(file: Path | None, made: Sequence[Path]) -> None:
+def take_back(file: Path | None, made: Sequence[Path]) -> None:
     """Remove a file and the folders that were made for it, as far as nothing else is in them."""
     with contextlib.suppress(OSError):
         if file is not None:

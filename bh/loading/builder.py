@@ -142,11 +142,15 @@ class LoadStepBuilder:
             np.asarray(self.mesh.fold_angles.get(each, np.full(len(found), np.nan)))
             for each, found in zip(names, hinges, strict=True)
         ]
-        joined, first = np.unique(np.concatenate(hinges), return_index=True)
+        every, angles = np.concatenate(hinges), np.concatenate(drawn)
+        # a hinge can have several names (all mountains, and each of them), and an angle by one of them only
+        telling = np.argsort(np.isnan(angles), kind="stable")
+        joined, first = np.unique(every[telling], return_index=True)
+        first = telling[first]
         if name != "all":  # keep the order along the crease, angles may be given an edge
             first = np.sort(first)
-            joined = np.concatenate(hinges)[first]
-        return joined, np.concatenate(sense)[first], np.concatenate(drawn)[first]
+            joined = every[first]
+        return joined, np.concatenate(sense)[first], angles[first]
 
     def angles(self, hinges: Ints) -> Array:
         """(k,) dihedral angles, rad; see `StepBuilder.angles`."""

@@ -30,6 +30,8 @@ class Fold(Actuation):
         to: dihedral angle that is imposed exactly (rigid connector), rad in (0, 2 pi); one number or one an edge.
         by: fold angle, mountain or valley as drawn, rad in (-pi, pi); imposed exactly, or the rest angle of a
             spring crease if `Lstar` or `stiffness` is given; "drawn" takes the angles of the pattern.
+        part: of the drawn angles (`by = "drawn"`), 0 to 1; where the pattern gives an angle to some creases only, the
+            others fold by that part of half a turn.
         rest: rest dihedral angle of a spring crease, rad in [0, 2 pi].
         Lstar: length scale of the crease, mm; stiffness a length is E t^3 / (12 Lstar) (Eq. 3.12).
         stiffness: of the crease a length, N mm / (mm rad) (instead of `Lstar`).
@@ -41,6 +43,7 @@ class Fold(Actuation):
     rest: Angles | None = None
     Lstar: float | None = None
     stiffness: float | None = None
+    part: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
@@ -48,6 +51,10 @@ class Fold(Actuation):
         Raises:
             ModelError: one line that names the value and what to give.
         """
+        if not 0.0 <= self.part <= 1.0 or (self.part != 1.0 and self.by != "drawn"):
+            raise ModelError(
+                f"fold of crease '{self.crease}': part = {self.part} cannot be; give 0 to 1, with by = 'drawn'"
+            )
         given = [key for key in ("to", "by", "rest") if getattr(self, key) is not None]
         if len(given) != 1:
             raise ModelError(
@@ -107,11 +114,11 @@ class Fold(Actuation):
     def _target(self, sense: Array, drawn: Array) -> Array:
         """(k,) dihedral angles at the end of the step, rad."""
         if isinstance(self.by, str):
-            if np.isnan(drawn).any():
+            if np.isnan(drawn).all():
                 raise ModelError(
                     f"fold of crease '{self.crease}': the pattern gives no fold angles; use by = radians"
                 )
-            return np.asarray(math.pi - drawn)
+            return np.asarray(math.pi - self.part * np.where(np.isnan(drawn), math.pi * sense, drawn))
         value = next(value for value in (self.by, self.to, self.rest) if value is not None)
         angles = np.asarray(value, dtype=float)
         if angles.ndim and angles.shape != sense.shape:

@@ -55,7 +55,7 @@ def example(drawing: Path | None = None, folder: Path = Path()) -> str:
     """The text of a scene; with a drawing (looked for in `folder`) that is to be folded.
 
     Args:
-        drawing: file name of a drawing (.svg, .dxf) or of a .fold file; None for a scene without one.
+        drawing: file name of a drawing (.svg, .dxf, .cp, .opx) or of a .fold file; None for a scene without one.
         folder: where the drawing is looked for.
 
     Raises:
@@ -65,10 +65,10 @@ def example(drawing: Path | None = None, folder: Path = Path()) -> str:
     if drawing is None:
         return f"{head}{ACCURACY}\n{LIBRARY}\n{REST.format(place='corner:inner-start')}"
     from meshes.io import read_pattern
-    from meshes.io.drawing import DRAWINGS
+    from meshes.io.drawing import PATTERNS
 
-    if drawing.suffix.lower() not in DRAWINGS:
-        raise InputError(f"'{drawing}' is no drawing; give a file that ends in one of {', '.join(DRAWINGS)}")
+    if drawing.suffix.lower() not in PATTERNS:
+        raise InputError(f"'{drawing}' is no drawing; give a file that ends in one of {', '.join(PATTERNS)}")
 
     pattern = read_pattern(folder / drawing)
     name = '"' + str(drawing).replace("\\", "/").replace('"', '\\"') + '"'

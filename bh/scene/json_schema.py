@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bh.scene import tables
-from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
+from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import Table
 
 Schema = dict[str, object]
@@ -31,7 +31,7 @@ def schema() -> Schema:
     What only fits together with other values (places, widths and radii, one of two keys) is told by `bh check`.
     """
     found: Schema = {}
-    patterns: list[type[Table]] = [*LIBRARY.values(), FilePattern, DrawingPattern]
+    patterns: list[type[Table]] = [*LIBRARY.values(), DrawingPattern]
     steps = {key: _one_or_more(_table(found, kind)) for key, kind in tables.ACTUATIONS.items()}
     steps["until"] = _table(found, tables.UntilTable)
     scene = {

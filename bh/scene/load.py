@@ -196,7 +196,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
     model = Model(
-        mesh=mesh_of(data["pattern"], data.get("mesh"), folder),
+        mesh=mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),

@@ -8,7 +8,7 @@ import numpy as np
 
 from bh.errors import SceneError
 from bh.model.plugins import made
-from bh.scene.patterns import LIBRARY, DrawingPattern, FilePattern
+from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import as_table, inside, nearest, read_table, shown, within, without
 from bh.scene.tables import DrawnTable, GmshTable, MeshTable
 from meshes import CreasePattern, SheetMesh, structured
@@ -17,13 +17,14 @@ from meshes.choices import first_mesh
 LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
 
 
-def mesh_of(pattern: object, mesh: object, folder: Path) -> SheetMesh:
+def mesh_of(pattern: object, mesh: object, folder: Path, anew: bool = False) -> SheetMesh:
     """The meshed sheet of a scene.
 
     Args:
         pattern: table [pattern].
         mesh: table [mesh], or None for a coarse one that only shows the places (the mesh is chosen by the run).
         folder: where files that these name are looked for.
+        anew: without a table [mesh], the faces of a FOLD file are not the mesh, but a coarse one of its pattern.
 
     Raises:
         SceneError: a table that is not understood, or a mesh that would only fill the memory.
@@ -31,14 +32,14 @@ def mesh_of(pattern: object, mesh: object, folder: Path) -> SheetMesh:
     """
     table = as_table(pattern, "pattern")
     if "file" in table:
-        return _mesh_from_file(table, mesh, folder)
+        return _mesh_from_file(table, mesh, folder, anew)
     drawn = _drawn(table)
     if mesh is None:
         with within("pattern"):
             return first_mesh(drawn)
     how = _mesh_table(as_table(mesh, "mesh"))
     if isinstance(how, DrawnTable):
-        raise SceneError('mesh.kind = "drawn" is for SVG and DXF files; use along or aspect_ratio')
+        raise SceneError('mesh.kind = "drawn" is for files; use along or aspect_ratio')
     return _meshed(drawn, how)
 
 
@@ -90,45 +91,38 @@ def _mesh_table(table: dict[str, object]) -> MeshTable | GmshTable | DrawnTable:
     return read_table(MeshTable, table, "mesh")
 
 
-def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path) -> SheetMesh:
-    name = shown(table["file"])
+def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: bool) -> SheetMesh:
+    from meshes.io import read_drawn, read_fold, read_pattern
+    from meshes.io.drawing import PATTERNS, DrawingOptions
+
     suffix = Path(str(table["file"])).suffix.lower()
-    from meshes.io.drawing import DRAWINGS
-
-    if suffix in DRAWINGS:
-        return _mesh_from_drawing(read_table(DrawingPattern, table, "pattern"), mesh, folder)
-    stored = read_table(FilePattern, table, "pattern")
-    if suffix != ".fold":
-        raise SceneError(f"pattern.file = {name} is no file of a pattern; give .svg, .dxf or .fold")
-    if mesh is not None:
-        raise SceneError(f"mesh: {name} brings its own faces, and they are the mesh; remove [mesh]")
-    from meshes.io import read_fold
-
-    place = inside(folder, stored.file, "pattern.file")
-    with within("pattern.file"):
-        return read_fold(place, stored.frame)
-
-
-def _mesh_from_drawing(table: DrawingPattern, mesh: object, folder: Path) -> SheetMesh:
-    from meshes.io import read_drawn, read_pattern
-    from meshes.io.drawing import DrawingOptions
-
+    if suffix not in PATTERNS:
+        raise SceneError(
+            f"pattern.file = {shown(table['file'])} is no file of a pattern; give one of {', '.join(PATTERNS)}"
+        )
+    given = read_table(DrawingPattern, table, "pattern")
+    if given.frame is not None and suffix != ".fold":
+        raise SceneError("pattern.frame is for FOLD files; remove it")
+    file = inside(folder, given.file, "pattern.file")
     options: DrawingOptions = {
-        "scale": table.scale,
-        "fit": table.fit,
-        "tolerance": table.tolerance,
-        "gap": table.gap,
-        "lines": table.lines,
+        "scale": given.scale,
+        "fit": given.fit,
+        "tolerance": given.tolerance,
+        "gap": given.gap,
+        "outline": given.outline,
+        "lines": given.lines,
+        "frame": given.frame,
     }
-    place = inside(folder, table.file, "pattern.file")
-    if mesh is None:
-        with within("pattern.file"):
-            return first_mesh(read_pattern(place, **options))
-    how = _mesh_table(as_table(mesh, "mesh"))
+    how = None if mesh is None else _mesh_table(as_table(mesh, "mesh"))
+    own_faces = isinstance(how, DrawnTable) or (mesh is None and not anew)
     with within("pattern.file"):
+        if suffix == ".fold" and own_faces:
+            return read_fold(file, given.frame, scale=given.scale, fit=given.fit)
         if isinstance(how, DrawnTable):
-            return read_drawn(place, **options)
-        drawn = read_pattern(place, **options)
+            return read_drawn(file, **options)
+        drawn = read_pattern(file, **options)
+        if how is None:
+            return first_mesh(drawn)
     return _meshed(drawn, how)
 
 

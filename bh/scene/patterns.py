@@ -168,22 +168,11 @@ class OppositeParabolasPattern(PatternTable):
     fold: Folds = Field("mountain", description=FOLDS)
 
 
-class FilePattern(Table):
-    """A FOLD file."""
-
-    file: Annotated[str, Field(min_length=1)] = Field(
-        description="the name of a .fold file, from the folder of the scene"
-    )
-    frame: Annotated[int, Field(ge=0, le=1_000_000)] | None = Field(
-        None, description="a frame number from 0 (the key frame)"
-    )
-
-
 class DrawingPattern(Table):
-    """An SVG or DXF drawing."""
+    """A drawing, or a FOLD file."""
 
     file: Annotated[str, Field(min_length=1)] = Field(
-        description="the name of an .svg, .dxf, .cp or .opx file, from the folder of the scene"
+        description="the name of an .svg, .dxf, .fold, .cp or .opx file, from the folder of the scene"
     )
     scale: Positive | None = Field(
         None, description="how many mm a unit of the drawing is, a positive number"
@@ -198,6 +187,9 @@ class DrawingPattern(Table):
     )
     lines: dict[str, str] = Field(
         {}, description='what lines stand for, such as { "#00aa00" = "valley", "layer:score" = "mountain" }'
+    )
+    frame: Annotated[int, Field(ge=0, le=1_000_000)] | Annotated[str, Field(min_length=1)] | None = Field(
+        None, description="of a FOLD file: a frame number from 0 (the key frame), or the title of a frame"
     )
 
 

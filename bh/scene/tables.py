@@ -172,6 +172,9 @@ class FoldTable(Table):
     )
     Lstar: Positive | None = Field(None, description=LSTAR)
     stiffness: Positive | None = Field(None, description="a positive stiffness a length, N mm / (mm rad)")
+    part: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        1.0, description='a part of the drawn angles from 0 to 1, with by = "drawn"'
+    )
 
 
 class PinchTable(Table):

@@ -15,6 +15,7 @@ from meshes.curves import Array
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import shown
 from meshes.io.perforation import join_dashes
+from meshes.io.sizes import check_lengths, size_remarks
 from meshes.io.strokes import Rules, Stroke, Strokes
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
@@ -23,11 +24,11 @@ from meshes.sheet import pattern_of, region_of
 
 OUTLINES = ("drawn", "hull")
 DRAWINGS = (".svg", ".svgz", ".dxf", ".cp", ".opx")
-UPWARDS = (".dxf", ".cp", ".opx")  # keep their coordinates; the page of an SVG file begins anywhere
+PATTERNS = (*DRAWINGS, ".fold")
+UPWARDS = (".dxf", ".cp", ".opx", ".fold")  # keep their coordinates; the page of an SVG file begins anywhere
 TOLERANCE, GAP = 2e-5, 5e-4  # of the drawing's diagonal
 SHORT = 0.4  # of its shortest line: a larger gap by default would swallow it
 LONGEST = 1e6  # mm
-SMALL, LARGE = 5.0, 5000.0  # mm; a longer side beyond these gets a remark
 LETTERS = {"mountain": "M", "valley": "V", "boundary": "B", "cut": "C", "facet": "F", "flat": "U"}
 
 Read = TypeVar("Read")
@@ -45,6 +46,7 @@ class DrawingOptions(TypedDict, total=False):
             more than 0.4 of the shortest line.
         lines: what colours, layers and dashes stand for, in front of the defaults (see `meshes.io.strokes`).
         outline: "hull" takes the convex hull of what is drawn as the outline.
+        frame: of a FOLD file, see `meshes.io.read_fold`.
     """
 
     scale: float | None
@@ -53,16 +55,17 @@ class DrawingOptions(TypedDict, total=False):
     gap: float | None
     lines: Mapping[str, str] | None
     outline: str
+    frame: int | str | None
 
 
 def read_pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> CreasePattern:
-    """The crease pattern of a drawing (SVG, DXF, .cp, .opx), lengths in mm.
+    """The crease pattern of a drawing (SVG, DXF, FOLD, .cp, .opx), lengths in mm.
 
     Mountain and valley are as seen on the drawing, that is from +z. The sheet of an SVG file has the lower left corner
     of its bounding box at the origin; that of a DXF file keeps its coordinates (unless `fit` scales it).
 
     Args:
-        path: of an .svg, .svgz, .dxf, .cp or .opx file.
+        path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
         **options: see `DrawingOptions`.
 
     Raises:
@@ -77,7 +80,7 @@ def read_drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) 
     For drawings whose facet lines are to be the mesh. The names are those of `meshes.io.read_fold`.
 
     Args:
-        path: of an .svg, .svgz, .dxf, .cp or .opx file.
+        path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
         **options: as for `read_pattern`.
 
     Raises:
@@ -133,17 +136,19 @@ def read_graph(
     gap: float | None = None,
     lines: Mapping[str, str] | None = None,
     outline: str = "drawn",
+    frame: int | str | None = None,
 ) -> tuple[Graph, list[DrawnLine], list[str]]:
     """The healed plane graph of a drawing.
 
     Args:
-        path: of an .svg, .svgz, .dxf, .cp or .opx file.
+        path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
         scale: mm a unit of the drawing; None for the unit that the file states.
         fit: length of the longer side of the sheet's bounding box, mm, in place of a scale.
         tolerance: how far chords may stay off curves, mm; None for a part of the diagonal.
         gap: lines that miss each other by up to so much are joined, mm; None for a part of the diagonal.
         lines: what colours, layers and dashes stand for, in front of the defaults.
         outline: "drawn", or "hull" for the convex hull of what is drawn.
+        frame: of a FOLD file.
 
     Returns:
         The graph, the lines that its edges belong to, and one remark for each thing that was taken for
@@ -155,7 +160,7 @@ def read_graph(
         PatternError: lines that cannot be healed, see `meshes.planar.heal`.
     """
     _check({"scale": scale, "fit": fit, "tolerance": tolerance, "gap": gap}, outline)
-    found = _read(path)
+    found = _read(path, frame)
     strokes, unit, remarks = found.strokes, found.unit, list(found.remarks)
     rules = Rules(lines)
     kept = [(stroke, kind) for stroke in strokes if (kind := rules.kind(stroke)) != "ignore"]
@@ -177,7 +182,7 @@ def read_graph(
     if tolerance is not None:
         sampled = [_finite(stroke, stroke.sample(tolerance / unit)) for stroke, _ in kept]
     if scale is None:
-        remarks += _size_remarks(unit * float((high - low).max()), found.stated)
+        remarks += size_remarks(unit * float((high - low).max()), found.stated)
     moved = np.zeros(2) if Path(path).suffix.lower() in UPWARDS and fit is None else low
     partly = any(stroke.opacity < 1.0 for stroke, kind in kept if kind in ("mountain", "valley"))
     drawn = []
@@ -202,13 +207,9 @@ def read_graph(
 
 def _check(lengths: Mapping[str, float | None], outline: str) -> None:
     """Refuse options that cannot be."""
-    for name, value in lengths.items():
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise FileFormatError(f"{name} = {value} cannot be; give a positive number")
+    check_lengths(lengths)
     if outline not in OUTLINES:
         raise FileFormatError(f"outline = '{outline}' is not known; use {' or '.join(OUTLINES)}")
-    if lengths["scale"] is not None and lengths["fit"] is not None:
-        raise FileFormatError("scale and fit are both given; give one of them")
 
 
 def _hull(lines: list[DrawnLine]) -> DrawnLine:
@@ -221,7 +222,7 @@ def _hull(lines: list[DrawnLine]) -> DrawnLine:
     return DrawnLine(np.asarray(hull.exterior.coords), "boundary", "the hull of the drawing")
 
 
-def _read(path: str | os.PathLike[str]) -> Strokes:
+def _read(path: str | os.PathLike[str], frame: int | str | None) -> Strokes:
     suffix = Path(path).suffix.lower()
     if suffix in (".svg", ".svgz"):
         from meshes.io.svg import read_svg
@@ -235,18 +236,11 @@ def _read(path: str | os.PathLike[str]) -> Strokes:
         from meshes.io.oripa import read_cp, read_opx
 
         return (read_cp if suffix == ".cp" else read_opx)(path)
-    raise FileFormatError(f"suffix '{suffix}' is no drawing; give one of {', '.join(DRAWINGS)}")
+    if suffix == ".fold":
+        from meshes.io.fold_lines import read_fold_lines
 
-
-def _size_remarks(size: float, stated: bool) -> list[str]:
-    """What to say of a sheet whose longer side is `size` mm: few are smaller than a stamp or longer than a room."""
-    if SMALL <= size <= LARGE:
-        return []
-    told = "as the file says" if stated else "as the file states no unit"
-    return [
-        f"the sheet is {size:.3g} mm long, {told}; if that is not meant, give its longer side: fit = 200.0 (mm), or "
-        "scale (mm a unit of the drawing)"
-    ]
+        return read_fold_lines(path, frame)
+    raise FileFormatError(f"suffix '{suffix}' is no drawing; give one of {', '.join(PATTERNS)}")
 
 
 def _finite(stroke: Stroke, points: Array) -> Array:

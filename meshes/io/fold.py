@@ -11,6 +11,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,9 @@ from meshes.cuts import CUTS, open_cuts
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import replacing, shown
 from meshes.io.fold_faces import area, faces_of_graph, orient, sides_of, triangulate
-from meshes.io.fold_frame import Frame, Side, check, load, select, show, side
+from meshes.io.fold_frame import UNITS, Frame, Side, check, laid_flat, load, select, show, side
 from meshes.io.loose_cuts import tie_cuts
+from meshes.io.sizes import check_lengths, size_remarks
 from meshes.mesh import SheetMesh
 from meshes.pattern import FoldKind
 from meshes.topology import boundary_loops, build
@@ -32,7 +34,13 @@ SETS = {"F": "edge:flat", "U": "edge:unassigned", "J": "edge:join"}
 STRAIGHT = 1e-3  # rad; files give coordinates to some six digits
 
 
-def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMesh:
+def read_fold(
+    path: str | os.PathLike[str],
+    frame: int | str | None = None,
+    *,
+    scale: float | None = None,
+    fit: float | None = None,
+) -> SheetMesh:
     """The sheet of one frame of a FOLD file, with faces triangulated, in mm.
 
     Vertices keep their order; those that belong to no face are dropped. Faces are turned to agree with each
@@ -47,10 +55,13 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
 
     Args:
         path: of the file.
-        frame: 0 for the key frame, i + 1 for file_frames[i]; None for the first frame that has vertices.
+        frame: 0 for the key frame, i + 1 for file_frames[i], or the frame_title of one; None for the first frame that
+            has vertices and is no folded form (the first that has vertices where all are).
+        scale: mm a unit of the file, in place of its frame_unit.
+        fit: length of the longer side of the sheet's bounding box, mm, in place of a scale.
 
     Returns:
-        The mesh, mm, of kind "imported".
+        The mesh, mm, of kind "imported". A flat pattern in another plane is laid into z = 0.
 
     Raises:
         FileFormatError: the file cannot be read, is not FOLD, or its frame is not one manifold sheet.
@@ -58,10 +69,30 @@ def read_fold(path: str | os.PathLike[str], frame: int | None = None) -> SheetMe
     import shapely
 
     try:
-        return sheet_of_frame(check(select(load(path), frame)))
+        chosen = select(load(path), frame)
+        found = _sized(laid_flat(check(chosen)), chosen, scale, fit)
+        mesh = sheet_of_frame(found)
+        told = _remarks(found, chosen, scale is None and fit is None)
+        return replace(mesh, remarks=(*told, *mesh.remarks))
     except (InputError, shapely.errors.ShapelyError) as error:
         text = " ".join(str(error).split())
         raise FileFormatError(f"{shown(path)}: {text}") from error
+
+
+def _sized(frame: Frame, told: dict[str, Any], scale: float | None, fit: float | None) -> Frame:
+    """The frame at another size."""
+    check_lengths({"scale": scale, "fit": fit})
+    if scale is not None:
+        return replace(frame, points=frame.points * (scale / UNITS[told.get("frame_unit", "unit")]))
+    if fit is not None:
+        longest = float(np.ptp(frame.points, axis=0).max())
+        return replace(frame, points=frame.points * (fit / (longest or 1.0)))
+    return frame
+
+
+def _remarks(frame: Frame, told: dict[str, Any], as_told: bool) -> tuple[str, ...]:
+    size = float(np.ptp(frame.points, axis=0).max())
+    return tuple(size_remarks(size, told.get("frame_unit", "unit") != "unit")) if as_told else ()
 
 
 # --- the sheet ------------------------------------------------------------------------------------
@@ -82,7 +113,9 @@ def sheet_of_frame(frame: Frame) -> SheetMesh:
     for number, face in enumerate(faces):
         try:
             if frame.flat and area(frame.points[:, :2], face) < 0.0:
-                raise FileFormatError("is turned over (folded flat); choose a frame where it lies open")
+                raise FileFormatError(
+                    "is turned over (folded flat): the frame is a folded form; choose one where the sheet lies open"
+                )
             corners += triangulate(frame.points, face, frame.flat)
         except FileFormatError as error:
             names = ", ".join(map(str, face[0][:5])) + (", ..." if len(face[0]) > 5 else "")
@@ -158,8 +191,8 @@ def _check_overlap(xy: Array, triangles: list[list[int]]) -> None:
     total, covered = float(shapely.area(parts).sum()), float(shapely.union_all(parts).area)
     if covered < (1.0 - 1e-6) * total:
         raise FileFormatError(
-            f"faces of the flat sheet lie over each other ({1.0 - covered / total:.2g} of its area); "
-            "draw every face in its own place"
+            f"faces of the flat sheet lie over each other ({1.0 - covered / total:.2g} of its area): a form that is "
+            "folded flat, or faces twice; choose a frame where the sheet lies open, or draw every face in its own place"
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ UNITS = {
     "nm": 1e-6,
 }  # mm a unit
 LETTERS = "MVFBUCJ"
+PLANE = 1e-6  # of the size: points that are no farther off lie in a plane
 LIMIT = 1e12  # mm; beyond it products of coordinates lose all meaning
 
 Face = list[list[int]]  # rings of vertices: the outside, then holes the other way round
@@ -55,6 +56,35 @@ class Frame:
     def flat(self) -> bool:
         """True if all vertices have one z (to 1e-9 of the size)."""
         return bool(np.ptp(self.points[:, 2]) <= 1e-9 * np.linalg.norm(np.ptp(self.points, axis=0)))
+
+
+def laid_flat(frame: Frame) -> Frame:
+    """The frame turned into the plane z = 0, if it lies in some other plane.
+
+    The side that the faces show (or, without faces, the side of the positive axis that is nearest to the normal) comes
+    to look along +z; nothing is mirrored, so mountains stay mountains.
+
+    Args:
+        frame: checked.
+    """
+    if frame.flat or len(frame.points) < 3:
+        return frame
+    middle = frame.points.mean(axis=0)
+    away = frame.points - middle
+    _, size, axes = np.linalg.svd(away, full_matrices=False)
+    if size[2] > PLANE * size[0] or size[1] <= PLANE * size[0]:
+        return frame
+    normal = axes[2] * np.sign(axes[2][np.argmax(np.abs(axes[2]))])
+    if frame.faces:
+        ring = away[frame.faces[0][0]]
+        normal = normal * (np.sign(np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0) @ normal) or 1.0)
+    normal = np.where(np.abs(normal) < PLANE, 0.0, normal)
+    normal /= np.linalg.norm(normal)
+    across = np.array((1.0, 0.0, 0.0)) if abs(normal[0]) < 0.9 else np.array((0.0, 1.0, 0.0))
+    across = across - (across @ normal) * normal
+    across /= np.linalg.norm(across)
+    turned = np.column_stack((frame.points @ across, frame.points @ np.cross(normal, across)))
+    return replace(frame, points=np.column_stack((turned, np.zeros(len(turned)))))
 
 
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -89,12 +119,13 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
     return data
 
 
-def select(data: dict[str, Any], frame: int | None) -> dict[str, Any]:
+def select(data: dict[str, Any], frame: int | str | None) -> dict[str, Any]:
     """The frame asked for, with all it inherits.
 
     Args:
         data: the top of the file.
-        frame: 0 for the key frame, i + 1 for file_frames[i]; None for the first frame that has vertices.
+        frame: 0 for the key frame, i + 1 for file_frames[i], or the frame_title of one; None for the first frame that
+            has vertices and is no folded form, or the first that has vertices where all are.
 
     Raises:
         FileFormatError: there is no such frame, or frames inherit in a circle.
@@ -103,15 +134,31 @@ def select(data: dict[str, Any], frame: int | None) -> dict[str, Any]:
     for number, each in enumerate(frames):
         if not isinstance(each, dict):
             raise FileFormatError(f"file_frames[{number - 1}] is {show(each)}; a frame is an object {{...}}")
+    if isinstance(frame, str):
+        return _inherited(frames, _titled(frames, frame))
     if frame is not None:
         if isinstance(frame, bool) or not isinstance(frame, int | np.integer) or not 0 <= frame < len(frames):
             raise FileFormatError(f"there is no frame {frame!r}; the file has frames 0 to {len(frames) - 1}")
         return _inherited(frames, int(frame))
-    for number in range(len(frames)):
-        found = _inherited(frames, number)
-        if found.get("vertices_coords"):
-            return found
-    raise FileFormatError("no frame has vertices_coords; give the coordinates of the vertices")
+    found = [_inherited(frames, number) for number in range(len(frames))]
+    found = [each for each in found if each.get("vertices_coords")]
+    if not found:
+        raise FileFormatError("no frame has vertices_coords; give the coordinates of the vertices")
+    return next((each for each in found if not _is_folded(each)), found[0])
+
+
+def _is_folded(frame: dict[str, Any]) -> bool:
+    classes = frame.get("frame_classes")
+    return isinstance(classes, list) and "foldedForm" in classes
+
+
+def _titled(frames: list[dict[str, Any]], title: str) -> int:
+    """Number of the frame that has a title (that of the file stands for the key frame)."""
+    titles = [str(each.get("frame_title") or each.get("file_title") or "") for each in frames]
+    if title not in titles:
+        listed = ", ".join(show(each) for each in titles if each) or "none has one"
+        raise FileFormatError(f"there is no frame titled {show(title)}; titles: {listed}")
+    return titles.index(title)
 
 
 def _inherited(frames: list[dict[str, Any]], number: int) -> dict[str, Any]:

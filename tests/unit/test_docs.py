@@ -20,7 +20,6 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     'pattern, kind = "parallel_creases"': scene_patterns.ParallelPattern,
     "pattern, corrugations": scene_patterns.CorrugationPattern,
     'pattern, kind = "curved-corrugation"': scene_patterns.CurvedCorrugationPattern,
-    "pattern, file": scene_patterns.FilePattern,
     'pattern, kind = "two_arcs"': scene_patterns.TwoArcsPattern,
     'pattern, kind = "sine_tessellation"': scene_patterns.SineTessellationPattern,
     'pattern, kind = "parabolic_canopy"': scene_patterns.ParabolicCanopyPattern,

@@ -388,7 +388,7 @@ class TestFrames:
             ([], 1, "no frame 1; the file has frames 0 to 0"),
             ([{}], -1, "no frame -1"),
             ([{}], True, "no frame True"),
-            ([{}], "0", "no frame '0'"),
+            ([{}], "0", 'no frame titled "0"'),
             ([{}], 1, "vertices_coords"),
             ([3], None, "file_frames[0] is 3"),
             ({"a": 1}, None, "file_frames is an object"),

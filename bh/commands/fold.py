@@ -1,0 +1,191 @@
+"""`bh fold`: a drawing to a folded sheet. Scenes are proposed and solved in turn until one folds all the way.
+
+Each is solved in a folder of its own inside the output folder; that of the best goes where results belong, with the
+scene, and the others are taken away.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bh.analysis.contact import first_contact
+from bh.commands.run import FINISHED, UNFINISHED, extras, make_folder, remove_extras, result, solve, take_back
+from bh.errors import InputError
+from bh.paths.path import Path as Trace
+from bh.runtime.progress import ProgressMeter, meter, stage
+from bh.scene.folding import Proposal, Wish, proposals
+from bh.scene.load import Scene, parse_scene
+from bh.solving.levels import folder_of, move
+from meshes.io.export import replacing
+
+SHARE = 0.6  # of the time that is left goes to each of the scenes but the last
+LONG = 60.0  # s, after which a run that is not watched says what it does all the same
+
+
+class TimeUpError(InputError):
+    """The time for one of the scenes is over."""
+
+
+@dataclass(frozen=True)
+class Folded:
+    """What has come of a file.
+
+    Attributes:
+        path: as far as it goes.
+        scene: that it is of.
+        proposal: the scene's text, and what is assumed in it.
+        written: the files, the scene first.
+        notes: what was tried before, and why it was left; one line each.
+        seconds: processor time of all of it.
+    """
+
+    path: Trace
+    scene: Scene
+    proposal: Proposal
+    written: tuple[Path, ...]
+    notes: tuple[str, ...]
+    seconds: float
+
+
+class _Clock:
+    """A meter that hands on to another one and ends a run whose time is over."""
+
+    def __init__(self, inner: ProgressMeter, seconds: float) -> None:
+        self._inner = inner
+        self._until = time.process_time() + seconds
+        self._seconds = seconds
+
+    def stage(self, words: str) -> None:
+        stage(self._inner, words)
+
+    def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
+        self._inner.update(step, steps, lam, iterations, energy)
+        if time.process_time() > self._until:
+            raise TimeUpError(f"its {self._seconds:.0f} s were over at lambda = {lam:.2f}")
+
+    def close(self, outcome: str) -> None:
+        self._inner.close(outcome)
+
+
+def fold_file(
+    file: Path,
+    folder: Path,
+    wish: Wish,
+    *,
+    seconds: float = 60.0,
+    progress: bool | ProgressMeter = False,
+    force: bool = False,
+) -> Folded:
+    """Fold a file into a folder: NAME.toml, path.bh, result.json, folded.png and what else is wished for.
+
+    Args:
+        file: .svg, .dxf, .fold, .cp or .opx.
+        folder: for the results; made if need be.
+        wish: how to fold.
+        seconds: processor time; a scene that takes more than its share of it makes room for the next.
+        progress: as for `bh.trace`.
+        force: write over a scene that is there.
+
+    Raises:
+        InputError: the file cannot be read or meshed, or the folder has a scene of that name already.
+    """
+    began = time.process_time()
+    target = folder / f"{file.stem}.toml"
+    if target.exists() and not force:
+        raise InputError(f"'{target}' is there already; run it (bh run {target}), or add --force")
+    offers = proposals(file, wish)
+    made = make_folder(folder)
+    copy = folder / file.name  # a scene names no file outside its folder
+    own = copy.exists()
+    if not own or not copy.samefile(file):
+        with replacing(copy) as draft:
+            shutil.copyfile(file, draft)
+    tried: list[tuple[Proposal, Scene, Trace, Path]] = []
+    notes: list[str] = []
+    failed: InputError | None = None
+    for number, offer in enumerate(offers):
+        left = seconds - (time.process_time() - began)
+        if left <= 0.0 and tried:
+            break
+        share = left if number == len(offers) - 1 else SHARE * left
+        place = folder / f".fold-{number}"
+        shutil.rmtree(place, ignore_errors=True)
+        try:
+            scene = replace(parse_scene(offer.text, folder, file.stem), source=target)
+            report = meter(progress)
+            stage(report, offer.mesh)
+            path, why = _solved(scene, place, _Clock(report, max(share, 1.0)))
+        except InputError as error:
+            failed = failed or error
+            notes.append(f"{offer.mesh}: {error}")
+            shutil.rmtree(place, ignore_errors=True)
+            continue
+        tried.append((offer, scene, path, place))
+        if path.reached and (path.accuracy is None or path.accuracy.met):
+            break
+        if path.reached:
+            why = f"folds, but its accuracy is not met in the time for it: {path.accuracy}"
+        notes.append(f"{offer.mesh}: {why}")
+    if not tried:
+        take_back(None if own else copy, made)
+        raise failed or InputError(f"{file}: no mesh of it can be solved")
+    best = max(enumerate(tried), key=lambda item: (item[1][2].reached, item[1][2][-1].lam, item[0]))[1]
+    return _kept(best, folder, target, tuple(notes), began, [item[3] for item in tried])
+
+
+def _solved(scene: Scene, place: Path, clock: _Clock) -> tuple[Trace, str]:
+    """The path of a scene, as far as its time allows, and why it ended early.
+
+    Raises:
+        InputError: it cannot be solved at all.
+    """
+    try:
+        path = solve(scene, place, progress=clock, estimate=False).path
+    except TimeUpError as over:
+        levels = sorted(folder_of(place / FINISHED[0]).glob("*.bh"), key=lambda found: found.stat().st_mtime)
+        file = place / FINISHED[0]
+        if not file.is_file() and levels:
+            file = levels[-1]
+        path = Trace.load(file)
+        if file is not place / FINISHED[0]:
+            path.save(place / FINISHED[0])
+        return path, str(over)
+    return path, f"{path.outcome} at lambda = {path[-1].lam:.2f}" if not path.reached else ""
+
+
+def _kept(
+    best: tuple[Proposal, Scene, Trace, Path],
+    folder: Path,
+    target: Path,
+    notes: tuple[str, ...],
+    began: float,
+    places: list[Path],
+) -> Folded:
+    """Move the best to its place, with its scene and pictures, and take the others away."""
+    offer, scene, path, place = best
+    remove_extras(folder, "")
+    for name in (*FINISHED, *UNFINISHED):
+        (folder / name).unlink(missing_ok=True)
+    (place / FINISHED[0]).replace(folder / FINISHED[0])
+    move(folder_of(place / FINISHED[0]), folder_of(folder / FINISHED[0]))
+    for each in places:
+        shutil.rmtree(each, ignore_errors=True)
+    with replacing(target) as draft:
+        draft.write_text(offer.text, encoding="utf-8")
+    text = result(path, scene, first_contact(path)) | {"assumed": list(offer.assumed), "tried": list(notes)}
+    with replacing(folder / FINISHED[1]) as draft:
+        draft.write_text(json.dumps(text, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    written = [target, *(folder / name for name in FINISHED)]
+    for name, write in extras(path, scene, folder, False, False).items():
+        try:
+            write()
+        except (InputError, ImportError, OSError) as error:
+            raise InputError(
+                f"the result is in '{folder}', but {name} could not be written: {error}"
+            ) from error
+        written.append(folder / name)
+    return Folded(path, scene, offer, tuple(written), notes, time.process_time() - began)

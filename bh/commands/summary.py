@@ -1,0 +1,79 @@
+"""A solved scene in lines, and the scene that `bh fold` makes of a drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bh.runtime.terminal import say
+
+if TYPE_CHECKING:
+    from bh.analysis.contact import Contact
+    from bh.paths.path import Path as Trace
+    from bh.scene.load import Scene
+
+
+def summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact | None) -> None:
+    """Print what has come of a scene.
+
+    Args:
+        path: solved, as far as it goes.
+        scene: that it is of.
+        written: the files.
+        contact: the first self-contact.
+    """
+    from math import degrees
+
+    from bh.formulations.registry import takes_nu
+
+    energy, last = path[-1].energy, path[-1]
+    say(
+        f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
+        f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
+    )
+    for remark in path.remarks[:6]:
+        say(remark)
+    model = path.model
+    if model.sheet.nu != 0.0 and not takes_nu(model.formulation):
+        say(f"{model.formulation} take Poisson's ratio as 0, not as nu = {model.sheet.nu:g}")
+    say(
+        f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
+        f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
+    )
+    creases = model.mesh.creases
+    for crease in creases[:6]:
+        a = last.fold_angle(crease)
+        say(
+            f"fold angle of {crease}: {a.mean():.4f} rad ({degrees(a.mean()):.1f} degrees), "
+            f"{a.min():.4f} to {a.max():.4f}"
+        )
+    if len(creases) > 6:
+        say(f"and {len(creases) - 6} more creases")
+    if contact is None:
+        say("self-contact: none")
+    else:
+        say(f"self-contact (reported, not prevented), first in {contact}")
+    if path.accuracy is not None:
+        say(f"accuracy: {path.accuracy}")
+    if path.estimate_reason:
+        say(f"accuracy: no estimate: {path.estimate_reason}")
+    say("files: " + " ".join(str(file) for file in written))
+
+
+def scene_of_drawing(file: Path) -> Scene:
+    """What `bh fold` would begin with; what it assumes is printed.
+
+    Args:
+        file: a drawing, or a FOLD file.
+
+    Raises:
+        InputError: as `bh.scene.folding.proposals`.
+    """
+    from bh.scene.folding import proposals
+    from bh.scene.load import parse_scene
+
+    first = proposals(file)[0]
+    for line in first.assumed:
+        say(f"assumed: {line}")
+    return parse_scene(first.text, file.parent, file.stem)

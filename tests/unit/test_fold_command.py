@@ -1,0 +1,235 @@
+"""`bh fold`, and files that `bh check`, `bh init` and scenes take: any drawing to a folded sheet."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bh
+from bh.commands.cli import main
+from bh.commands.fold import TimeUpError, _Clock
+from bh.errors import InputError
+from bh.runtime.progress import Silent
+from bh.scene.folding import proposals, radians_of
+from bh.scene.load import load_scene, parse_scene
+from meshes import unstructured
+from meshes.errors import FileFormatError
+from meshes.io import read_fold, read_pattern
+
+RIM = '<rect width="80" height="60" stroke="black" fill="none"/>'
+CREASE = '<line x1="40" y1="0" x2="40" y2="60" stroke="blue"/>'
+
+
+def svg(folder: Path, body: str = RIM + CREASE, size: str = 'width="80mm" height="60mm"') -> Path:
+    file = folder / "sheet.svg"
+    file.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 80 60">{body}</svg>')
+    return file
+
+
+def fold(folder: Path, **keys: object) -> Path:
+    """A strip of two squares of 1 unit in the plane y = 0, as Origami Simulator writes it."""
+    data = {
+        "vertices_coords": [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 0, -1], [1, 0, -1], [0, 0, -1]],
+        "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 0], [1, 4]],
+        "edges_assignment": ["B", "B", "B", "B", "B", "B", "V"],
+        "faces_vertices": [[0, 1, 4, 5], [1, 2, 3, 4]],
+        "edges_foldAngle": [0, 0, 0, 0, 0, 0, 70.0],
+        **keys,
+    }
+    file = folder / "strip.fold"
+    file.write_text(json.dumps({key: value for key, value in data.items() if value is not None}))
+    return file
+
+
+def result(folder: Path) -> dict[str, object]:
+    found: dict[str, object] = json.loads((folder / "result.json").read_text())
+    return found
+
+
+def folds(folder: Path, crease: str = "valley") -> float:
+    angle = result(folder)["fold_angle"][crease]["mean"]  # type: ignore[index]
+    return math.degrees(abs(angle))
+
+
+class TestOneCommand:
+    def test_a_drawing_folds_by_80_percent(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        out = tmp_path / "out"
+        assert main(["fold", str(svg(tmp_path)), "-o", str(out), "--write", "glb", "--write", "stl"]) == 0
+        assert folds(out) == pytest.approx(144.0, abs=0.01)
+        assert {"folded.png", "folded.glb", "folded.stl", "path.bh", "sheet.toml"} <= {
+            p.name for p in out.iterdir()
+        }
+        assert not list(out.glob(".fold-*"))
+        assert "assumed: springs at every crease want 144 degrees, 80 % of the way" in capsys.readouterr().out
+        again = load_scene(out / "sheet.toml")
+        energy = bh.trace(again.model)[-1].energy.total
+        assert energy == pytest.approx(result(out)["energy"]["total"], abs=1e-9)  # type: ignore[index]
+
+    def test_the_scene_is_not_written_over(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        file, out = svg(tmp_path), tmp_path / "out"
+        assert main(["fold", str(file), "-o", str(out), "-q", "--angle", "60deg"]) == 0
+        assert folds(out) == pytest.approx(60.0, abs=0.01)
+        assert main(["fold", str(file), "-o", str(out), "-q"]) == 2
+        assert "add --force" in capsys.readouterr().err
+        assert main(["fold", str(file), "-o", str(out), "-q", "--percent", "20", "--force"]) == 0
+        assert folds(out) == pytest.approx(36.0, abs=0.01)
+
+    def test_angles_of_the_file_are_used(self, tmp_path: Path) -> None:
+        file = fold(tmp_path)
+        assert main(["fold", str(file), "-o", str(tmp_path / "out"), "-q", "--fit", "100"]) == 0
+        assert folds(tmp_path / "out") == pytest.approx(70.0, abs=0.01)
+        size = np.ptp(load_scene(tmp_path / "out" / "strip.toml").model.mesh.points, axis=0)
+        np.testing.assert_allclose(size, [100.0, 50.0, 0.0], atol=1e-9)
+
+    def test_a_size_that_cannot_be_is_said(self, tmp_path: Path) -> None:
+        first = proposals(fold(tmp_path))[0]
+        assert any("fitted to 200 mm" in line for line in first.assumed)
+        assert not any("fitted" in line for line in proposals(fold(tmp_path, frame_unit="cm"))[0].assumed[1:])
+
+    def test_closed_angles_go_by_80_percent(self, tmp_path: Path) -> None:
+        file = fold(tmp_path, edges_foldAngle=[0, 0, 0, 0, 0, 0, 180.0])
+        assert "part = 0.8" in proposals(file)[0].text
+
+    def test_a_cp_file(self, tmp_path: Path) -> None:
+        file = tmp_path / "x.cp"
+        rim = [(0, 0, 80, 0), (80, 0, 80, 60), (80, 60, 0, 60), (0, 60, 0, 0)]
+        rows = [(1, *row) for row in rim] + [(2, 40, 0, 40, 60)]
+        file.write_text("\n".join(" ".join(map(str, row)) for row in rows))
+        assert main(["fold", str(file), "-o", str(tmp_path / "out"), "-q"]) == 0
+        assert folds(tmp_path / "out", "mountain") == pytest.approx(144.0, abs=0.01)
+
+    def test_a_curve_is_folded_on_a_finer_mesh(self, tmp_path: Path) -> None:
+        body = RIM + '<path d="M0 20 Q40 45 80 20" stroke="red" fill="none"/>'
+        offers = proposals(svg(tmp_path, body))
+        assert offers[0].text.count("accuracy")
+        assert "staggered" in offers[1].text
+        for offer in offers:
+            assert parse_scene(offer.text, tmp_path).model.mesh.folds["m1"] == "mountain"
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (["--material", "jelly"], "'jelly' is not known; use one of paper"),
+            (["--angle", "60"], "--angle 60 is no angle"),
+            (["--angle", "200deg"], "200 degrees cannot be"),
+            (["--percent", "0"], "0 percent cannot be"),
+            (["--angle", "60deg", "--percent", "20"], "give one of them"),
+            (["--fit", "-1"], "fit = -1.0 cannot be"),
+        ],
+    )
+    def test_bad_wishes(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+    ) -> None:
+        assert main(["fold", str(svg(tmp_path)), "-o", str(tmp_path / "out"), *arguments]) == 2
+        assert words in capsys.readouterr().err
+        assert not (tmp_path / "out").exists()
+
+    def test_no_crease(self, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match="no mountain or valley crease to fold"):
+            proposals(svg(tmp_path, RIM))
+
+    def test_a_clock_ends_a_run(self) -> None:
+        clock = _Clock(Silent(), -1.0)
+        with pytest.raises(TimeUpError, match=r"lambda = 0\.50"):
+            clock.update(0, 1, 0.5, 3, 1.0)
+
+    def test_angles(self) -> None:
+        assert radians_of("90deg") == pytest.approx(math.pi / 2)
+        assert radians_of("1.5 rad") == 1.5
+
+
+class TestChecksAndScenes:
+    def test_check_takes_drawings(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        picture = tmp_path / "flat.png"
+        assert main(["check", str(fold(tmp_path)), "--picture", str(picture)]) == 0
+        out = capsys.readouterr().out
+        assert picture.is_file()
+        assert "drawn to 70 degrees" in out
+        assert "sheet: 200 x 100 mm" in out
+
+    def test_init_takes_fold_files(self, tmp_path: Path) -> None:
+        fold(tmp_path)
+        assert main(["init", str(tmp_path / "scene.toml"), "--drawing", str(tmp_path / "strip.fold")]) == 0
+        assert load_scene(tmp_path / "scene.toml").accuracy is not None
+
+    def test_a_fold_file_is_meshed_anew(self, tmp_path: Path) -> None:
+        fold(tmp_path, frame_unit="cm")
+        tail = '[sheet]\nE = 4000.0\nt = 0.2\n[[steps]]\nfold = { crease = "all", by = "drawn" }\n'
+        own = parse_scene(f'[pattern]\nfile = "strip.fold"\nscale = 30.0\n{tail}', tmp_path).model.mesh
+        new = parse_scene(
+            f'[pattern]\nfile = "strip.fold"\nscale = 30.0\n[mesh]\nkind = "gmsh"\nsize = 8.0\n{tail}',
+            tmp_path,
+        ).model.mesh
+        assert len(own.triangles) == 4 < len(new.triangles)
+        for mesh in (own, new):
+            assert mesh.areas.sum() == pytest.approx(1800.0)
+            assert mesh.folds["v1"] == "valley"
+            np.testing.assert_allclose(mesh.fold_angles["v1"], -math.radians(70.0))
+
+    def test_the_hull_is_taken_in_a_scene(self, tmp_path: Path) -> None:
+        svg(tmp_path, CREASE + '<line x1="0" y1="30" x2="80" y2="30" stroke="red"/>')
+        tail = '[sheet]\nE = 4000.0\nt = 0.2\n[[steps]]\nfold = { crease = "all", by = 0.1, Lstar = 9.0 }\n'
+        text = f'[pattern]\nfile = "sheet.svg"\noutline = "hull"\n[mesh]\nkind = "gmsh"\nsize = 9.0\n{tail}'
+        assert parse_scene(text, tmp_path).model.mesh.areas.sum() == pytest.approx(2400.0)
+
+
+class TestFoldFiles:
+    def test_frames_by_title(self, tmp_path: Path) -> None:
+        frame = {"frame_title": "wide", "frame_inherit": True, "frame_parent": 0, "frame_unit": "in"}
+        file = fold(tmp_path, file_frames=[frame])
+        assert np.ptp(read_fold(file, "wide").points[:, 0]) == pytest.approx(50.8)
+        with pytest.raises(FileFormatError, match='no frame titled "high"; titles: "wide"'):
+            read_fold(file, "high")
+
+    def test_an_open_frame_goes_before_a_folded_one(self, tmp_path: Path) -> None:
+        flat = {"vertices_coords": [[0, 0], [3, 0], [6, 0], [6, 3], [3, 3], [0, 3]]}
+        frame = {**flat, "frame_classes": ["creasePattern"], "frame_inherit": True, "frame_parent": 0}
+        file = fold(tmp_path, frame_classes=["foldedForm"], file_frames=[frame])
+        assert np.ptp(read_fold(file).points[:, 0]) == pytest.approx(6.0)
+
+    def test_a_flat_folded_form_is_told(self, tmp_path: Path) -> None:
+        over = [[0, 0], [1, 0], [0.1, 0], [0.1, 1], [1, 1], [0, 1]]
+        with pytest.raises(FileFormatError, match="folded flat"):
+            read_fold(fold(tmp_path, vertices_coords=over))
+
+    @pytest.mark.parametrize("axis", [0, 1, 2])
+    def test_any_plane_is_laid_flat(self, tmp_path: Path, axis: int) -> None:
+        flat = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [1, 1], [0, 1]], dtype=float)
+        u, v = np.roll(np.eye(3), axis, axis=1)[[0, 1]]
+        tilt = np.linalg.qr(np.array([[1.0, 0.2, 0.1], [0.3, 1.0, 0.4], [0.2, 0.5, 1.0]]))[0]
+        tilt *= np.sign(np.linalg.det(tilt))
+        points = (flat @ np.array([u, v])) @ tilt.T
+        for faces in ([[0, 1, 4, 5], [1, 2, 3, 4]], None):
+            mesh = read_fold(fold(tmp_path, vertices_coords=points.tolist(), faces_vertices=faces))
+            assert mesh.flat
+            assert mesh.areas.sum() == pytest.approx(2.0)
+            assert mesh.folds["v1"] == "valley"
+
+    def test_inches_and_scale(self, tmp_path: Path) -> None:
+        file = fold(tmp_path, frame_unit="in")
+        assert np.ptp(read_fold(file).points[:, 0]) == pytest.approx(50.8)
+        assert np.ptp(read_pattern(file).rings[0][:, 0]) == pytest.approx(50.8)
+        assert np.ptp(read_fold(file, scale=10.0).points[:, 0]) == pytest.approx(20.0)
+        assert np.ptp(read_pattern(file, scale=10.0).rings[0][:, 0]) == pytest.approx(20.0)
+        with pytest.raises(FileFormatError, match="give one of them"):
+            read_fold(file, scale=10.0, fit=20.0)
+
+
+class TestDrawnAngles:
+    def test_by_drawn_for_all_on_every_mesh(self, tmp_path: Path) -> None:
+        """A crease that ends inside is one of 'all mountains', too: its angle counts under both names."""
+        body = RIM + '<line x1="20" y1="30" x2="60" y2="30" stroke="red" stroke-opacity="0.35"/>'
+        mesh = unstructured(read_pattern(svg(tmp_path, body)), size=10.0)
+        np.testing.assert_allclose(mesh.fold_angles["mountain"], 0.35 * math.pi)
+        model = bh.Model(mesh, bh.Sheet(E=4000.0, nu=0.3, t=0.2), formulation="consistent")
+        path = bh.trace(model.fold("all", by="drawn", part=0.5, Lstar=0.1))
+        assert path.reached
+        assert np.median(path[-1].fold_angle("m1")) > 0.3
+
+    def test_a_part_of_drawn_angles_only(self) -> None:
+        with pytest.raises(bh.ModelError, match="part"):
+            bh.Fold("all", by=0.5, part=0.5)
