@@ -30,11 +30,12 @@ def folded(kind: str, formulation: str = "bars-and-hinges", along: int = 24, row
 
 
 def test_kept_sections_bend_as_a_beam() -> None:
-    """The straight one about y: 48 E I / L^3, less what the panels shear, with nu = 0.38 and what shallow cells add."""
+    """The straight one about y: 48 E I / L^3, less what the panels shear."""
     sheet = folded("straight", "consistent", 24, 3)
     beam = 48.0 * POLYESTER.E * top_down(sheet, 0.5 * math.pi) / 50.0**3
     kept = tangent_bending(sheet, [0.5 * math.pi]).stiffness[0]
-    assert 0.7 * beam < kept < beam
+    # 48 x 6 cells: 0.622 of it, and 0.663 with constant strains, which come down from 0.763 with 24 x 3
+    assert kept == pytest.approx(0.622 * beam, rel=0.1)
 
 
 def test_symmetric_patterns_are_symmetric() -> None:
