@@ -23,6 +23,7 @@ from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy, Walk, walk
 from fem.loads import EdgeMoments
 from fem.observables import observe
+from fem.remarks import straight_edges
 from fem.shell import ShellElements, shell_elements
 from fem.state import ShellState
 from fem.system import ShellSystem
@@ -65,8 +66,8 @@ class Shell:
         return ShellSystem(model, load_step, start, _elements(model.mesh, model.sheet, self.degree), moments)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
-        """None: the shell asks nothing of the pattern of its mesh."""
-        return ()
+        """What to know of the mesh of a model: only whether curved edges have lost their curves."""
+        return straight_edges(model) if self.degree == 2 else ()
 
     def observe(
         self,

@@ -137,7 +137,7 @@ def stresses(elements: ShellElements, sheet: Sheet, moments: Array, strain: Arra
     Returns:
         Membrane forces, N/mm, and moments, N.
     """
-    X = elements.mesh.nodes[elements.mesh.triangles, :2]
+    X = elements.mesh.planar[elements.mesh.triangles]
     slopes = gradients(MIDDLE)[0] if elements.mesh.degree == 2 else SLOPES
     F = np.einsum("tnc,nd->tcd", X, slopes)
     middle = elements.tables.middle

@@ -29,7 +29,7 @@ from bh.model.sheet import Sheet
 from fem import kernels
 from fem.kernels import Frames, Loops
 from fem.spaces import MOMENTS, STRAINS, Tables, tables
-from meshes.curved import ElementMesh
+from meshes.curved import ElementMesh, plane_axes
 
 Array = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
         sheet: material and thickness.
     """
     table = tables(mesh.degree)
-    X = mesh.nodes[mesh.triangles, :2]
+    X = mesh.planar[mesh.triangles]
     F = np.einsum("tnc,qnd->tqcd", X, table.slopes)
     J = np.linalg.det(F)
     metric = np.einsum("tqca,tqcb->tqab", F, F)
@@ -225,7 +225,7 @@ def unit(vectors: Array) -> Array:
 def flat_frames(mesh: ElementMesh) -> Frames:
     """Frames of the flat sheet: its own normal."""
     t0 = unit(edge_tangents(mesh, mesh.nodes))
-    return Frames(t0, np.ascontiguousarray(np.broadcast_to([0.0, 0.0, 1.0], t0.shape)))
+    return Frames(t0, np.ascontiguousarray(np.broadcast_to(plane_axes(mesh.sheet)[2], t0.shape)))
 
 
 def carried_frames(mesh: ElementMesh, frames: Frames, x: Array, alpha: Array) -> Frames:

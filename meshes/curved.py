@@ -30,11 +30,16 @@ class LinearMesh:
 
     sheet: SheetMesh
 
+    degree = 1
+
     def __post_init__(self) -> None:
         """Refuse a sheet that is not flat."""
-        check_flat(self.sheet)
+        plane_axes(self.sheet)
 
-    degree = 1
+    @cached_property
+    def planar(self) -> Array:
+        """(n, 2) node positions along the axes of the sheet's plane, mm."""
+        return _planar(self.sheet, self.nodes)
 
     @property
     def nodes(self) -> Array:
@@ -78,6 +83,11 @@ class QuadraticMesh:
 
     degree = 2
 
+    @cached_property
+    def planar(self) -> Array:
+        """(n + e, 2) node positions along the axes of the sheet's plane, mm."""
+        return _planar(self.sheet, self.nodes)
+
     @property
     def carriers(self) -> Ints:
         """(t, 6) places that unknowns of an element belong to: its corners, then its edges, numbered from n."""
@@ -112,18 +122,36 @@ class QuadraticMesh:
 ElementMesh = LinearMesh | QuadraticMesh
 
 
+def _planar(sheet: SheetMesh, nodes: Array) -> Array:
+    axes = plane_axes(sheet)
+    return nodes[:, :2] if axes[2, 2] == 1.0 else nodes @ axes[:2].T
+
+
 def _with_edges(mesh: SheetMesh) -> Ints:
     return np.column_stack((mesh.triangles, len(mesh.points) + mesh.topology.triangle_edges))
 
 
-def check_flat(mesh: SheetMesh) -> None:
-    """Refuse a sheet that does not lie in z = 0.
+def plane_axes(mesh: SheetMesh) -> Array:
+    """(3, 3) axes of the plane that a sheet lies in, anywhere in space: two in it, then its normal.
+
+    Triangles are counter-clockwise from the normal's side. For a sheet in a plane z = const, so seen from +z, they are
+    x, y and z.
 
     Raises:
         MeshError: the sheet is not flat.
     """
-    if not mesh.flat:
-        raise MeshError("the shell takes only a sheet that is flat in z = 0; unfold it first")
+    corners = mesh.points[mesh.triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    normal /= max(float(np.linalg.norm(normal)), 1e-300)
+    height = (mesh.points - mesh.points.mean(axis=0)) @ normal
+    if float(np.abs(height).max()) > 1e-9 * mesh.size:
+        raise MeshError("the shell takes only a sheet that is flat; unfold it first")
+    if normal[2] > 1.0 - 1e-15:
+        return np.eye(3)
+    first = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    first = first - (first @ normal) * normal
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(normal, first), normal])
 
 
 def lift(mesh: SheetMesh) -> QuadraticMesh:
@@ -139,7 +167,7 @@ def lift(mesh: SheetMesh) -> QuadraticMesh:
         MeshError: the sheet is not flat, an edge set does not lie on its curve, or a curved edge turns a
             triangle inside out (the mesh is too coarse for its curves).
     """
-    check_flat(mesh)
+    plane_axes(mesh)
     ends = mesh.points[mesh.topology.edges]
     middle = ends.mean(axis=1)
     for name, curve in mesh.curves.items():
@@ -191,7 +219,7 @@ def _parameters(curve: Curve, points: Array) -> tuple[Array, float]:
 
 def _check_orientation(mesh: QuadraticMesh) -> None:
     """The Jacobian of the quadratic map keeps its sign at corners and middles of edges."""
-    x = mesh.nodes[mesh.triangles, :2]
+    x = mesh.planar[mesh.triangles]
     corners = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]])
     slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
     for b in corners:

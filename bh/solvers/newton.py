@@ -18,6 +18,7 @@ from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
 INDEFINITE = "indefinite tangent"  # why full Newton gave up
+ENDLESS = 1e100  # size of a step that a singular tangent has made
 NEAR_SADDLE = 1e-3  # imbalance below which an indefinite tangent is that of a saddle
 
 
@@ -112,6 +113,8 @@ class Newton:
             if factor is None:
                 return Solution(q, now, iteration, False, INDEFINITE)
             dq = -factor.solve(now.residual)
+            if not float(np.abs(dq).max(initial=0.0)) < ENDLESS:
+                return Solution(q, now, iteration, False, "singular tangent")
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, globalised=False)
             sizes.append(float(np.linalg.norm(dq[: system.primal])))

@@ -83,7 +83,7 @@ def test_a_mesh_off_its_curve_is_refused() -> None:
 
 
 def test_a_folded_sheet_is_refused() -> None:
-    with pytest.raises(MeshError, match="flat in z = 0"):
+    with pytest.raises(MeshError, match="takes only a sheet that is flat"):
         lift(
             replace(
                 SECTOR,
