@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bh.plotting import interactive
-from meshes.errors import FileFormatError
+from meshes.errors import FileFormatError, InputError
 from meshes.io.export import replacing
 from reports import formatting
 from reports.changes import MOST, changes
@@ -19,6 +19,7 @@ from reports.claims import Claim, claims, claims_csv
 from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
 from reports.records import Case, CaseInfo, Frames, Results, known_cases, read, schema, shortfall, validated
 from verification.framework.chapters import CHAPTERS, OTHER, Chapter, chapter_of
+from verification.framework.folder import refuse_links
 
 SOURCE = (
     "Equation numbers, “the source” and “App. B” refer to the dissertation “How Curved Creases Enhance the "
@@ -69,6 +70,10 @@ def build(results_folder: Path, out_file: Path) -> Path:
         ReportError: results that are missing or not valid, or pages that cannot be written.
     """
     folder, target = Path(results_folder), Path(out_file)
+    try:
+        refuse_links(folder)
+    except InputError as error:
+        raise ReportError(str(error)) from error
     site = Site(folder, target.stem, target.name)
     pages = {
         page.file: site.render("chapter.html", page) for page in site.pages if page.cases or page.missing

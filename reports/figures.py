@@ -92,6 +92,8 @@ def svg(plot: Plot, prefix: str) -> str:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
+    prefix = re.sub(r"[^\w-]", "-", prefix)  # what a file of results calls a plot is part of it
+
     settings: Any = {
         "svg.fonttype": "none",
         "svg.hashsalt": prefix,

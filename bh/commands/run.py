@@ -22,6 +22,7 @@ from bh.model.serialise import fingerprint
 from bh.paths.export import FOLDED, write_flat, write_state
 from bh.paths.path import Path as Trace
 from bh.paths.storage import PathFile, reading
+from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
@@ -74,26 +75,42 @@ def solve(
     """
     names = _names(folder, scene, resume)
     made = make_folder(folder)
+    ours = False
+    try:
+        with only_writer(folder):
+            ours = True
+            return _solved(scene, folder, names, resume=resume, progress=progress, estimate=estimate)
+    except (InputError, KeyboardInterrupt):
+        if ours and not resume and not holds_states(folder):
+            remove_levels(folder_of(folder / names[0]))
+            take_back(folder / names[0], made)
+        raise
+
+
+def _solved(
+    scene: Scene,
+    folder: Path,
+    names: tuple[str, str],
+    *,
+    resume: bool,
+    progress: bool | ProgressMeter,
+    estimate: bool,
+) -> Solved:
+    """What `solve` gives, of a folder that nobody else writes."""
     file = folder / names[0]
     before = resume and _is_whole(file, scene)
     solved = _solved_meshes(file)
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
         (folder / names[1]).unlink(missing_ok=True)
-    try:
-        path = trace(
-            scene.model,
-            progress=progress,
-            file=file,
-            resume=resume,
-            accuracy=scene.accuracy,
-            symmetry=scene.symmetry,
-            estimate=estimate and scene.accuracy is None,
-        )
-    except (InputError, KeyboardInterrupt):
-        if not resume and not holds_states(folder):
-            remove_levels(folder_of(file))
-            take_back(file, made)
-        raise
+    path = trace(
+        scene.model,
+        progress=progress,
+        file=file,
+        resume=resume,
+        accuracy=scene.accuracy,
+        symmetry=scene.symmetry,
+        estimate=estimate and scene.accuracy is None,
+    )
     clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
     if path.reached:
         if names == UNFINISHED:
@@ -212,6 +229,11 @@ def make_folder(folder: Path) -> list[Path]:
         raise InputError(
             f"the output folder '{folder}' cannot be written ({why}); choose another with -o"
         ) from error
+    for name in (*FINISHED, *UNFINISHED):
+        if (folder / name).is_dir():
+            raise InputError(
+                f"'{folder / name}' is a folder where a file is to be written; remove it, or choose another with -o"
+            )
     return made
 
 

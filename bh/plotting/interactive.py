@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -231,10 +232,12 @@ def figure(data: Frames, name: str, title: str, still: str = "") -> str:
         title: for readers who do not see it.
         still: HTML shown until it draws (an <img>).
     """
+    name = re.sub(r"[^\w-]", "-", name)  # from files of results
     kinds = [*data["tops"], *(["total"] if len(data["tops"]) > 1 else [])]
     shown = "bending" if "bending" in kinds else (kinds or ["none"])[0]
     options = "".join(
-        f'<option value="{kind}"{" selected" if kind == shown else ""}>{kind}</option>' for kind in kinds
+        f'<option value="{escape(kind)}"{" selected" if kind == shown else ""}>{escape(kind)}</option>'
+        for kind in kinds
     )
     last, label = len(data["lambdas"]) - 1, escape(data["label"])
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")

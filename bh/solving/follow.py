@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ from bh.model.serialise import fingerprint
 from bh.paths.path import Path, new_file
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import PathFile
+from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter, meter
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.automatic import Automatic
@@ -48,8 +50,16 @@ def follow(
         PathFileError: the file cannot be written, or is of another model.
     """
     strategy = strategy or Automatic()
-    path, target = _opened(model, symmetry, file, resume, after)
     report = meter(progress)
+    with nullcontext() if file is None else only_writer(FilePath(file)):
+        path, target = _opened(model, symmetry, file, resume, after)
+        _walk(path, target, strategy, report)
+    return path
+
+
+def _walk(path: Path, target: PathFile | None, strategy: Strategy, report: ProgressMeter) -> None:
+    """Solve the steps that are left."""
+    model = path.model
     try:
         for step in range(len(path.steps), len(model.steps)):
             with one_blas_thread():
@@ -65,7 +75,6 @@ def follow(
         report.close(path.outcome)
         if target is not None:
             target.close()
-    return path
 
 
 def _opened(

@@ -21,7 +21,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
+from bh.errors import PathFileError
 from bh.paths.provenance import versions
+from bh.runtime.lock import only_writer
 from bh.sweep import runner
 from bh.sweep.dataset import ABOUT_RUN, Label, dataset, load, save
 from bh.sweep.journal import Journal, Meta
@@ -144,11 +146,10 @@ def run(
             kept.
     """
     file, batch = Path(file), _Batches(**batches)
-    chunk = batch.chunk
     if batch.warm:
         if not isinstance(task, SceneTask) or not points.grid:
             raise SweepError("warm starts need a scene and a grid; leave warm out")
-        task, chunk = replace(task, warm=True), len(points.values[-1])
+        task = replace(task, warm=True)
     began = time.time()
     meta = _meta(task, points, labels, attributes, began)
     if resume and file.is_file() and not _journal(file).is_file():
@@ -159,6 +160,23 @@ def run(
     check = getattr(task, "check", None)
     if check is not None:
         check([points[i] for i in sorted({0, len(points) // 2, len(points) - 1})])
+    try:
+        with only_writer(_journal(file)):
+            return _run((task, points, file, meta), batch, pool, resume, progress)
+    except PathFileError as error:
+        raise SweepError(f"{error}; -o names another output") from error
+
+
+def _run(
+    what: tuple[Task, Points, Path, Meta],
+    batch: _Batches,
+    pool: Pool | Executor | int | None,
+    resume: bool,
+    progress: bool | runner.Meter,
+) -> Dataset:
+    """What `run` does where nobody else writes the journal."""
+    task, points, file, meta = what
+    chunk = len(points.values[-1]) if batch.warm else batch.chunk
     journal = _open(file, meta, resume)
     meter = (Bar() if progress else Silent()) if isinstance(progress, bool) else progress
     with closing(journal):

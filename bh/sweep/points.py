@@ -15,6 +15,8 @@ import numpy as np
 from bh.errors import InputError
 
 Value = float | int | str | bool
+# what the data set has of its own; see `bh.sweep.dataset`
+OWN = ("outcome", "reason", "wall_time_s", "attempts", "worker", "point")
 MOST = 50_000_000  # points; more would not fit into the journal's index in memory
 
 
@@ -133,6 +135,10 @@ def _plain(values: Sequence[Value | np.generic]) -> tuple[Value, ...]:
 
 
 def _check(name: str, values: tuple[Value, ...], once: bool) -> None:
+    if not name.strip() or "/" in name or not name.isprintable() or name in OWN:
+        raise SweepError(
+            f"parameter {name!r} cannot be called so; give a word without / that is none of {', '.join(OWN)}"
+        )
     for value in values:
         if not isinstance(value, bool | int | float | str):
             raise SweepError(f"parameter '{name}': {value!r} is no number, word or truth value")

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
-import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
-from multiprocessing import get_context, parent_process
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from bh.runtime.workers import Workers, interrupts_wait
 from bh.sweep.points import SweepError
 
 if TYPE_CHECKING:
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
 
 Result = TypeVar("Result")
 ANSWER_S = 15.0  # until a scheduler counts as silent
@@ -141,8 +139,7 @@ class Local:
         self._start()
 
     def _start(self) -> None:
-        # spawned, not forked: the parent may have threads, and macOS and Windows can do nothing else
-        self._executor = ProcessPoolExecutor(self.slots, get_context("spawn"), _begin)
+        self._executor = Workers(self.slots)
         try:
             self._executor.submit(os.getpid).result()
         except BrokenExecutor as error:
@@ -176,9 +173,7 @@ class Local:
     def close(self) -> None:
         """End the processes, also in the middle of a point."""
         # an interrupted sweep does not wait for points of minutes: nothing of them would be kept
-        for process in list((getattr(self._executor, "_processes", None) or {}).values()):
-            process.terminate()
-        self._executor.shutdown(wait=True, cancel_futures=True)
+        self._executor.end()
 
 
 class Dask:
@@ -195,18 +190,24 @@ class Dask:
     def __init__(self, address: str | None = None, workers: int = 0) -> None:
         """Connect to the scheduler."""
         try:
-            from distributed import Client, LocalCluster
+            from distributed import Client, LocalCluster, Security
         except ImportError as error:
             raise SweepError(
                 "Dask is not installed; add the extra: pip install 'curved-crease-workbench[cluster]'"
             ) from error
         self._cluster: LocalCluster | None = None
+        security: Security | None = None
         if address is None:
-            self._cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
-            )
+            security = _temporary_certificate(Security)
+            self._cluster = _local_cluster(LocalCluster, workers, security)
         try:
-            self._client: Client = Client(self._cluster or address, timeout=ANSWER_S, set_as_default=False)
+            self._client: Client = Client(
+                self._cluster or address, timeout=ANSWER_S, set_as_default=False, security=security
+            )
+        except KeyboardInterrupt:
+            if self._cluster is not None:
+                self._cluster.close(timeout=2)
+            raise
         except (OSError, ValueError) as error:  # a time-out is an OSError
             raise SweepError(
                 f"the scheduler '{address}' does not answer ({' '.join(str(error).split())}); start it with "
@@ -276,14 +277,47 @@ class Dask:
                 self._cluster.close(timeout=5)
 
 
-def _begin() -> None:
-    """A worker leaves interrupts to its parent, and ends when that has gone, also if it was killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is not None:
+def _temporary_certificate(kind: type[Security]) -> Security:
+    """Keys that only this process has and hands to its workers.
 
-        def follow() -> None:
-            parent.join()
-            os._exit(1)
+    A scheduler runs what it is sent: without them, whoever reaches its port on this machine runs code as this user.
+    """
+    try:
+        return kind.temporary()
+    except ImportError as error:
+        raise SweepError(
+            "a Dask cluster of one's own needs cryptography; add the extra: "
+            "pip install 'curved-crease-workbench[cluster]'"
+        ) from error
 
-        threading.Thread(target=follow, daemon=True).start()
+
+def _local_cluster(kind: type[LocalCluster], workers: int, security: Security) -> LocalCluster:
+    """A cluster of processes on this machine, or nothing at all where its start is interrupted."""
+    import logging
+
+    from distributed.utils import LoopRunner
+
+    with (
+        interrupts_wait()
+    ):  # what the thread of this loop starts inherits it: workers leave Ctrl-C to this process
+        runner = LoopRunner()
+        runner.start()
+    cluster: LocalCluster = object.__new__(kind)
+    try:
+        kind.__init__(
+            cluster,
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=None,
+            silence_logs=50,
+            protocol="tls://",
+            loop=runner.loop,
+            security=security,
+        )
+    except KeyboardInterrupt:
+        # what is half begun cannot be closed in good order, as Dask would try at exit; its processes end with this one
+        cluster.shutdown_on_close = False
+        for name in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+        raise
+    return cluster

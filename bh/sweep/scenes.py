@@ -22,6 +22,9 @@ from bh.sweep.points import SweepError, Value
 from bh.sweep.task import Measured
 
 TOKEN = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
+MEASURED = re.compile(
+    r"(energy|dihedral|points)_.*|stable|critical_points|iterations|unknowns|points|flat_points|node|node_.*|xyz?"
+)
 ENERGIES = ("stretching", "bending", "folding", "total")
 
 
@@ -55,6 +58,10 @@ class SceneTask:
         """See that the scene has the keys."""
         tables = read_toml(self.text)
         for name, keys in self.keys.items():
+            if MEASURED.fullmatch(name):
+                raise SweepError(
+                    f"parameter '{name}' is called as something that is measured; give it another name"
+                )
             for key in keys:
                 _setter(tables, key, name)
 

@@ -521,3 +521,83 @@ def test_command_says_where_the_report_is(
     assert "15 of 17 checks passed, 5 reported" in done.output
     assert f"report: {tmp_path / 'report.html'}" in done.output.replace("\n", "")
     assert (tmp_path / "report.html").is_file()
+
+
+# ------------------------------------------------------------------------------------------ results of strangers
+
+HOSTILE = """x"'><script src=file:///tmp/x.js></script><img src=x onerror=alert(1)><!--"""
+WORDS = {"file", "still", "kind", "style", "verdict", "outcome", "date"}  # not free
+
+
+def poisoned(data: Any, key: str = "") -> Any:
+    """The data with something hostile at the end of every text and every name."""
+    if isinstance(data, dict):
+        free = key in ("params", "versions", "machine", "tops", "density", "energy")
+        return {k + HOSTILE if free else k: poisoned(v, k) for k, v in data.items()}
+    if isinstance(data, list):
+        return [poisoned(item, key) for item in data]
+    return data + HOSTILE if isinstance(data, str) and key not in WORDS else data
+
+
+class Loud(HTMLParser):
+    """What a page has that acts: scripts and handlers of events."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.found += [f"{tag} {name}" for name in given if name.startswith("on")]
+        if tag == "script" and "x.js" in str(given.get("src")):
+            self.found.append("script")
+        if tag == "img" and given.get("src") == "x":
+            self.found.append("img")
+
+
+def test_names_in_results_cannot_run_scripts(tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    data = poisoned(results(folder))
+    (folder / "checks.json").write_text(json.dumps(data), encoding="utf-8")
+    front = build(folder, folder / "report.html")
+    pages = [front, *front.with_suffix("").glob("*.html")]
+    assert len(pages) > 1
+    for page in (*(page.read_text(encoding="utf-8") for page in pages), one_page(folder)):
+        parser = Loud()
+        parser.feed(page)
+        assert parser.found == []
+        assert "x&#" in page or "&lt;script" in page or len(pages) > 2
+
+
+def test_names_in_frames_cannot_run_scripts() -> None:
+    import bh
+    import meshes
+    from bh.plotting import interactive
+
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.7), along=6)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges").fold("crease", by=0.2)
+    data = poisoned(dict(interactive.view(bh.trace(model)).data))
+    parser = Loud()
+    parser.feed(interactive.figure(data, "sheet" + HOSTILE, "title" + HOSTILE))
+    assert parser.found == []
+
+
+@pytest.mark.parametrize(
+    "name", ["checks.schema.json", "report.html", "previous.json", "checks.json.part", "sub/a.png"]
+)
+def test_nothing_is_written_through_links(name: str, tmp_path: Path) -> None:
+    """A results folder from elsewhere, with a link of a name that is written."""
+    from verification.framework.run import run
+
+    folder = tmp_path / "results"
+    results(folder)
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    (folder / name).parent.mkdir(exist_ok=True)
+    (folder / name).symlink_to(victim)
+    with pytest.raises(InputError, match="symbolic link") as caught:
+        build(folder, folder / "report.html")
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="symbolic link"):
+        run(["shear_calibration"], folder)
+    assert victim.read_text() == "mine"

@@ -302,7 +302,8 @@ places = ["corner:inner-end"]
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("BH_ALLOW_OUTSIDE", "1")  # the scene is one of the examples
     place = tmp_path / "folds.toml"
     place.write_text(SWEEP.format(scene=(EXAMPLES / "appendix_b_a.toml").as_posix()))
     return place

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import json
 import math
-import multiprocessing
 import os
 import platform
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import as_completed
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from bh.runtime.workers import Workers
 from meshes.errors import InputError
 from verification.framework.cases import BY_NAME, CASES, LONG_CASES, case
 from verification.framework.checks import CaseResult, Context
 from verification.framework.environment import environment
+from verification.framework.folder import refuse_links
 from verification.framework.records import KEYS
 
 OF_A_RUN = ("versions", "date", "machine", "quick")  # kept for every case, as cases may be run one by one
@@ -53,41 +55,37 @@ def run(
         raise InputError(
             f"cannot write the folder '{folder}' ({error.strerror}); choose another one"
         ) from error
-    found = []
-    for result in _results(names, folder, quick, report, min(jobs, len(names))):
-        passed = sum(check.passed is True for check in result.checks)
-        judged = sum(check.passed is not None for check in result.checks)
-        report(
-            f"{result.name}: {result.verdict}, {passed} of {judged} checks passed, {result.wall_time_s:.1f} s"
-        )
-        found.append(result)
-    found.sort(key=lambda result: names.index(result.name))
-    data = _record(found, quick, jobs)
-    merged = _merged(_known(folder / "checks.json"), data)
-    _keep(folder / "checks.json", folder / "previous.json")
-    write_json(folder / "checks.json", merged)
-    return data
+    refuse_links(folder)
+    file, run_by = folder / "checks.json", _run_by(quick, jobs)
+    found: list[CaseResult] = []
+    with closing(_results(names, folder, quick, report, min(jobs, len(names)))) as results:
+        for result in results:
+            passed = sum(check.passed is True for check in result.checks)
+            judged = sum(check.passed is not None for check in result.checks)
+            report(
+                f"{result.name}: {result.verdict}, {passed} of {judged} checks passed, {result.wall_time_s:.1f} s"
+            )
+            if not found:
+                _keep(file, folder / "previous.json")
+            found.append(result)
+            found.sort(key=lambda result: names.index(result.name))
+            # at once: what is finished outlives whatever happens to the other cases
+            write_json(file, _merged(_known(file), _record(found, run_by)))
+    return _record(found, run_by)
 
 
 def _results(
     names: Sequence[str], folder: Path, quick: bool, report: Callable[[str], None], jobs: int
-) -> Iterator[CaseResult]:
+) -> Generator[CaseResult]:
     """What each case found, as it ends; by several processes if there are jobs for them."""
     if jobs <= 1:
         for name in names:
             yield _timed(name, Context(folder, quick, report))
         return
     report(f"{len(names)} cases, {jobs} at a time; each is told of when it has ended")
-    # fresh processes: forked ones would share what libraries of threads hold
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        futures = [pool.submit(_silent, name, folder, quick) for name in names]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        except BaseException:  # one failed, or the user broke off: what has not begun is not begun
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with Workers(jobs) as pool:  # where one fails, or the user breaks off, all end
+        for future in as_completed([pool.submit(_silent, name, folder, quick) for name in names]):
+            yield future.result()
 
 
 def _silent(name: str, folder: Path, quick: bool) -> CaseResult:
@@ -122,8 +120,8 @@ def _known(file: Path) -> dict[str, Any]:
     return known
 
 
-def _record(found: Sequence[CaseResult], quick: bool, jobs: int) -> dict[str, Any]:
-    run_by = {
+def _run_by(quick: bool, jobs: int) -> dict[str, Any]:
+    return {
         "versions": environment(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": {
@@ -134,6 +132,9 @@ def _record(found: Sequence[CaseResult], quick: bool, jobs: int) -> dict[str, An
         },
         "quick": quick,
     }
+
+
+def _record(found: Sequence[CaseResult], run_by: dict[str, Any]) -> dict[str, Any]:
     return {
         "checks": [check.record() for result in found for check in result.checks],
         **run_by,

@@ -11,10 +11,9 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -22,6 +21,7 @@ import numpy as np
 
 import meshes
 from bh import Automatic, LoadControl, Model, Path, Sheet, trace
+from bh.runtime.workers import Workers
 from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context, line, plot
 from verification.framework.environment import environment
@@ -158,21 +158,17 @@ def play_all(found: Sequence[Scene], store: FilePath, tell: Callable[[str], None
     if done:
         tell(f"campaign: {len(done)} of {len(found)} scenes are known from a run that was cut short")
     with (
-        ProcessPoolExecutor(max_workers=os.cpu_count(), mp_context=get_context("spawn")) as pool,
+        Workers(os.cpu_count() or 1) as pool,
         store.open("a", encoding="utf-8") as file,
     ):
         futures = [pool.submit(_played, job) for job in jobs]
-        try:
-            for future in as_completed(futures):
-                item = future.result()
-                file.write(json.dumps(item) + "\n")
-                file.flush()
-                done[item["index"]] = item
-                if len(done) % 20 == 0:
-                    tell(f"campaign: {len(done)} of {len(found)} scenes")
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)  # a killed run does not play all others first
-            raise
+        for future in as_completed(futures):
+            item = future.result()
+            file.write(json.dumps(item) + "\n")
+            file.flush()
+            done[item["index"]] = item
+            if len(done) % 20 == 0:
+                tell(f"campaign: {len(done)} of {len(found)} scenes")
     results = []
     for index, scene in enumerate(found):
         values = {name: value for name, value in done[index].items() if name != "index"}
