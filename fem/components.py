@@ -64,7 +64,12 @@ class Components:
         return out
 
     def whole(self, q: Array, lam: float) -> Array:
-        """(k,) all components from the unknowns (n,)."""
+        """(k,) all components from the unknowns (n,).
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         out = self.prescribed.at(lam)
         out[self.free] = q
         return out
@@ -125,7 +130,12 @@ class Components:
 
 
 def local_axes(constraints: Constraints, vectors: Array) -> Array:
-    """Nodal vectors (n, 3) in the local axes of oblique supports."""
+    """Nodal vectors (n, 3) in the local axes of oblique supports.
+
+    Args:
+        constraints: with the axes.
+        vectors: (n, 3) in global axes.
+    """
     turned = np.flatnonzero(constraints.frame_of >= 0)
     if len(turned) == 0:
         return vectors
@@ -208,6 +218,13 @@ def _of_element(elements: ShellElements, creases: Connectors) -> Ints:
 
 def edge_set(mesh: SheetMesh, name: str) -> Ints:
     """Numbers of the edges of a named set.
+
+    Args:
+        mesh: has the set.
+        name: of the set.
+
+    Returns:
+        (k,) numbers, in the order of the set.
 
     Raises:
         MeshError: an edge of the set is none of the mesh.

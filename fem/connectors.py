@@ -66,23 +66,43 @@ class Connectors:
         return len(self.edges)
 
     def energy(self, beta: Array, lam: float) -> Array:
-        """(c,) elastic energies of springs, N mm."""
+        """(c,) elastic energies of springs, N mm.
+
+        Args:
+            beta: (c, r) turns of the connectors, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
         turn = beta - self.rest.at(lam)
         out: Array = 0.5 * self.stiffness * np.einsum("ci,cij,cj->c", turn, self.mass, turn)
         return out
 
     def load_energy(self, beta: Array, lam: float) -> float:
-        """Potential of the couples, N mm."""
+        """Potential of the couples, N mm.
+
+        Args:
+            beta: (c, r) turns of the connectors, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
         return -float(np.einsum("c,cij,cj->", self.moment.at(lam), self.mass, beta))
 
     def gradient(self, beta: Array, lam: float) -> Array:
-        """(c, r) derivative of both by beta, N mm."""
+        """(c, r) derivative of both by beta, N mm.
+
+        Args:
+            beta: (c, r) turns of the connectors, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
         turn = self.stiffness[:, None] * (beta - self.rest.at(lam)) - self.moment.at(lam)[:, None]
         out: Array = np.einsum("cij,cj->ci", self.mass, turn)
         return out
 
     def largest(self, beta: Array, lam: float) -> float:
-        """Largest couple of a spring or of a load on one value of beta, N mm / rad."""
+        """Largest couple of a spring or of a load on one value of beta, N mm / rad.
+
+        Args:
+            beta: (c, r) turns of the connectors, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
         turn = self.stiffness[:, None] * (beta - self.rest.at(lam))
         spring = np.abs(np.einsum("cij,cj->ci", self.mass, turn)).max(initial=0.0)
         load = np.abs(self.moment.at(lam)[:, None] * self.mass.sum(axis=2)).max(initial=0.0)

@@ -15,7 +15,11 @@ GENTLE = (
 
 
 def straight_edges(model: Model) -> tuple[Remark, ...]:
-    """A remark where rows of edges bow but lie on no curve, as of a mesh whose nodes were moved without its curves."""
+    """A remark where rows of edges bow but lie on no curve, as of a mesh whose nodes were moved without its curves.
+
+    Returns:
+        the remark, or none.
+    """
     mesh = model.mesh
     on_curves = [mesh.topology.find_edges(mesh.edge_sets[n]) for n in mesh.curves if n in mesh.edge_sets]
     covered = np.zeros(len(mesh.topology.edges), dtype=bool)

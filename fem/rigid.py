@@ -47,7 +47,12 @@ def free_rigid_motions(components: Components, elements: ShellElements, x: Array
 
 
 def ground_triangle(components: Components, elements: ShellElements) -> int:
-    """The triangle that is held against rigid motions: in the middle, with few supports of its own."""
+    """The triangle that is held against rigid motions: in the middle, with few supports of its own.
+
+    Args:
+        components: of the step.
+        elements: of the sheet.
+    """
     centres = elements.mesh.nodes[elements.mesh.triangles].mean(axis=1)
     distance = np.linalg.norm(centres - elements.mesh.nodes.mean(axis=0), axis=1)
     held = (components.number[components.of_element[:, : elements.moves]] < 0).sum(axis=1)
@@ -64,6 +69,9 @@ def ground_stiffness(
         elements: of the sheet.
         triangle: that is held.
         Z: (n, r) orthonormal free rigid motions.
+
+    Returns:
+        unknowns and stiffness.
     """
     number = components.number[components.of_element[triangle, : elements.moves]]
     rows = np.where(number[:, None] >= 0, Z[np.maximum(number, 0)], 0.0)

@@ -66,19 +66,35 @@ class ShellElements:
         return self.moves + 3 * self.tables.rotations
 
     def measures(self, x: Array, gamma: Array, frames: Frames) -> tuple[Array, Array]:
-        """Strains and curvatures, (t, 3 m) each, at positions x (n, 3) and side rotations gamma (t, 3, r), rad."""
+        """Strains and curvatures, (t, 3 m) each, at positions x (n, 3) and side rotations gamma (t, 3, r), rad.
+
+        Args:
+            x: (n, 3) positions, mm.
+            gamma: (t, 3, r) side rotations, rad.
+            frames: of the edges.
+        """
         strain, curvature = np.empty_like(self.strain0), np.empty_like(self.strain0)
         kernels.measures(x, gamma, self.loops, frames, strain, curvature)
         return strain - self.strain0, curvature
 
     def gradients(self, x: Array, frames: Frames) -> Array:
-        """(t, 6 m, w) derivatives of strains and curvatures by positions and side rotations, w = `width`."""
+        """(t, 6 m, w) derivatives of strains and curvatures by positions and side rotations, w = `width`.
+
+        Args:
+            x: (n, 3) positions, mm.
+            frames: of the edges.
+        """
         B = np.empty((len(self.areas), 2 * self.tables.measures, self.width))
         kernels.gradients(x, self.loops, frames, B)
         return B
 
     def forces(self, strain: Array, curvature: Array) -> Array:
-        """(t, 6 m) forces conjugate to the measures."""
+        """(t, 6 m) forces conjugate to the measures.
+
+        Args:
+            strain: (t, 3 m).
+            curvature: (t, 3 m), 1/mm.
+        """
         return np.concatenate(
             (
                 (self.membrane @ strain[:, :, None])[..., 0],
@@ -206,7 +222,12 @@ def bending_stiffness(table: Tables, metric: Array, J: Array, sheet: Sheet) -> A
 
 
 def edge_tangents(mesh: ElementMesh, x: Array) -> Array:
-    """(e, p, 3) derivatives of positions x (n, 3) along every edge, from its lower to its higher node, mm."""
+    """(e, p, 3) derivatives of positions x (n, 3) along every edge, from its lower to its higher node, mm.
+
+    Args:
+        mesh: of the elements.
+        x: (n, 3) positions, mm.
+    """
     s = tables(mesh.degree).s
     edges = mesh.sheet.topology.edges
     low, high, middle = x[edges[:, 0]], x[edges[:, 1]], x[len(mesh.sheet.points) :]
@@ -217,7 +238,11 @@ def edge_tangents(mesh: ElementMesh, x: Array) -> Array:
 
 
 def unit(vectors: Array) -> Array:
-    """Vectors (..., 3) of length one in the directions of the given ones."""
+    """Vectors (..., 3) of length one in the directions of the given ones.
+
+    Returns:
+        of the shape of `vectors`.
+    """
     out: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     return out
 

@@ -36,7 +36,15 @@ INWARD = CORNERS - 0.5 * (np.roll(CORNERS, -1, axis=0) + np.roll(CORNERS, -2, ax
 
 
 def symmetric(a: Array, b: Array) -> Array:
-    """sym(a b) = (a b^T + b a^T) / 2 of vectors (..., 2)."""
+    """sym(a b) = (a b^T + b a^T) / 2 of vectors (..., 2).
+
+    Args:
+        a: (..., 2) vectors.
+        b: (..., 2) vectors.
+
+    Returns:
+        (..., 2, 2).
+    """
     ab = a[..., :, None] * b[..., None, :]
     out: Array = 0.5 * (ab + np.swapaxes(ab, -1, -2))
     return out
@@ -119,7 +127,12 @@ def regge_interpolation() -> Array:
 
 
 def edge_points(edge: int, s: Array) -> Array:
-    """(q, 2) points at parameters s in [0, 1] on an edge, counter-clockwise."""
+    """(q, 2) points at parameters s in [0, 1] on an edge, counter-clockwise.
+
+    Args:
+        edge: of the triangle, 0 to 2.
+        s: (q,) in [0, 1].
+    """
     return np.asarray(CORNERS[(edge + 1) % 3] + s[:, None] * EDGES[edge])
 
 

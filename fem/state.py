@@ -48,7 +48,12 @@ class ShellState(State):
         return out
 
     def crease_curve(self, crease: str, points: int = 5) -> Array:
-        """(k, 3) points on the deformed crease: `points` on every edge, in order, mm."""
+        """(k, 3) points on the deformed crease: `points` on every edge, in order, mm.
+
+        Args:
+            crease: its name.
+            points: on every edge, its ends included.
+        """
         pairs = self.mesh.crease_edges(crease)
         low, high = self.nodes[pairs[:, 0]], self.nodes[pairs[:, 1]]
         corners = len(self.mesh.points)

@@ -184,7 +184,12 @@ class ShellSystem:
         return carried_frames(self.mesh, self.frames, x, self.components.alpha(components))
 
     def at(self, q: Array, lam: float) -> Here:
-        """Everything at (q, lam); the last one is remembered."""
+        """Everything at (q, lam); the last one is remembered.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         here = self._here
         if here is not None and here.lam == lam and np.array_equal(here.q, q):
             return here
@@ -206,7 +211,11 @@ class ShellSystem:
         return gamma.reshape(len(gamma), 3, -1)
 
     def gradient(self, here: Here) -> Array:
-        """Derivative of the potential by all components; at prescribed ones the reactions."""
+        """Derivative of the potential by all components; at prescribed ones the reactions.
+
+        Returns:
+            (k,) N, and N mm for rotations.
+        """
         out = self.components.spread(here.pull) - self.load.at(here.lam)
         out[self.components.first_beta :] += self.creases.gradient(
             self.components.beta(here.components), here.lam
@@ -272,7 +281,12 @@ class ShellSystem:
         return 0.5 * float((turn * moments).sum()), float(push.max()), float(couple.max())
 
     def element_tangents(self, here: Here, forces: Array) -> Array:
-        """(t, w, w) element tangents at a state, with the given forces in their geometric part."""
+        """(t, w, w) element tangents at a state, with the given forces in their geometric part.
+
+        Args:
+            here: the state.
+            forces: (t, 6 m) of the geometric part.
+        """
         return self.elements.tangent(here.x, forces.reshape(here.forces.shape), here.B, self.frames)
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:

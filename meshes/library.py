@@ -223,7 +223,11 @@ def _graph(width: float, y: Callable[[Array], Array]) -> Polyline:
 
 
 def alternating(count: int) -> list[FoldKind]:
-    """Mountain and valley in turn, mountain first."""
+    """Mountain and valley in turn, mountain first.
+
+    Returns:
+        `count` words.
+    """
     return ["valley" if i % 2 else "mountain" for i in range(count)]
 
 

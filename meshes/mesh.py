@@ -19,7 +19,12 @@ from meshes.topology import Ints, Topology, build
 
 
 def count(number: int, what: str) -> str:
-    """A number and its noun, as in "1 crease" and "2 creases"."""
+    """A number and its noun, as in "1 crease" and "2 creases".
+
+    Args:
+        number: how many.
+        what: noun in the singular.
+    """
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
@@ -33,7 +38,14 @@ class Origin:
 
     @classmethod
     def of(cls, pattern: CreasePattern, cells: Cells, points: Array, triangles: Ints) -> Origin:
-        """The origin of a mesh with points (n, 2 or 3) and triangles (t, 3): `pattern`, cut into `cells`."""
+        """The origin of a mesh with points (n, 2 or 3) and triangles (t, 3): `pattern`, cut into `cells`.
+
+        Args:
+            pattern: that was cut.
+            cells: into which.
+            points: (n, 2) or (n, 3), mm.
+            triangles: (t, 3) node indices.
+        """
         return cls(pattern, _mark(points, triangles), cells)
 
 

@@ -112,6 +112,9 @@ def with_groups(pattern: CreasePattern, sets: dict[str, Ints]) -> dict[str, Ints
     Args:
         pattern: has the groups.
         sets: (k, 2) node pairs by name, such as "crease:m1".
+
+    Returns:
+        (k, 2) node pairs by name.
     """
     joined = {
         name: np.vstack([sets[member] for member in members])

@@ -64,7 +64,11 @@ class Graph:
     gap: float
 
     def select(self, kinds: Sequence[str]) -> Ints:
-        """Numbers of the edges of some kinds, rising."""
+        """Numbers of the edges of some kinds, rising.
+
+        Returns:
+            (k,) numbers.
+        """
         return np.flatnonzero([kind in kinds for kind in self.kinds])
 
 

@@ -95,7 +95,15 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
 
 
 def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
-    """What the lines enclose; arguments and errors as for `pattern_of`."""
+    """What the lines enclose; arguments and errors as for `pattern_of`.
+
+    Args:
+        graph: healed lines.
+        lines: as they are drawn.
+
+    Raises:
+        PatternError: as for `pattern_of`.
+    """
     import shapely
 
     segments = shapely.linestrings(graph.points[graph.edges])

@@ -274,7 +274,12 @@ def _badness(a: Array, b: Array, c: Array) -> Array:
 
 
 def smallest_angles(points: Array, triangles: Ints) -> Array:
-    """(t,) smallest angle of every triangle (t, 3), rad; points (n, 2 or 3) in any unit."""
+    """(t,) smallest angle of every triangle (t, 3), rad; points (n, 2 or 3) in any unit.
+
+    Args:
+        points: (n, 2) or (n, 3), in any unit.
+        triangles: (t, 3) node indices.
+    """
     corner = points[triangles]
     angles = []
     for k in range(3):

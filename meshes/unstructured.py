@@ -66,6 +66,9 @@ class Sizes:
             a: parameter in [0, 1] where the part begins.
             b: parameter in [0, 1] where it ends.
             least: number of edges at least.
+
+        Returns:
+            the parameters, rising; the last one is `b`.
         """
         u = np.linspace(a, b, 257 if self.near else 2)
         density = curve.length / self.at(curve.point(u))

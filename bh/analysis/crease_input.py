@@ -70,6 +70,9 @@ def derivatives(
         method: differentiates functions and samples.
         highest: order of the derivatives.
 
+    Returns:
+        the values first, then derivatives by u of rising order.
+
     Raises:
         ModelError: values that are not finite or do not fit.
     """

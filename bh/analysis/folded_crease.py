@@ -221,6 +221,9 @@ class FoldedCrease:
             rows: of cells on either side.
             trim: end generators before the regression curve.
 
+        Returns:
+            the flat mesh, and its nodes (n, 3) as they are folded, mm.
+
         Raises:
             ModelError: a generator reaches the regression curve.
         """

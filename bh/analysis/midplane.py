@@ -55,6 +55,13 @@ class MidPlane:
 
         Positive where the outer side rises above that plane. The source measures from the plane of the unfolded
         sheet, in which its supports keep the section at the pinch.
+
+        Args:
+            u: shares of the crease's length, 0 to 1.
+            at: share at which the pinch is.
+
+        Returns:
+            of the shape of `u`.
         """
         across = self.outer - self.inner
         across = across / np.linalg.norm(across, axis=1)[:, None]

@@ -45,6 +45,14 @@ def of_nodes(path: Path, observables: Sequence[Observable], index: int = -1) -> 
     calibrated, stay what they are. With the moves dX/dp of a parametrised pattern the chain rule gives
     sum(gradient * dX/dp).
 
+    Args:
+        path: that is solved.
+        observables: as of `bh.sensitivities`.
+        index: of the state.
+
+    Returns:
+        one for each observable.
+
     Raises:
         ModelError: a sheet that is not flat, a pinch (whose zone depends on the whole crease), or a state that has no
             sensitivities.
@@ -96,7 +104,13 @@ def _add(out: Array, weight: Data, rates: Data, support: dict[str, Ints], moving
 
 
 def colours(hinges: Ints, triangles: Ints, nodes: int) -> Ints:
-    """(nodes,) colours from 0, different for any two nodes of a hinge or a triangle; greedy, in the nodes' order."""
+    """(nodes,) colours from 0, different for any two nodes of a hinge or a triangle; greedy, in the nodes' order.
+
+    Args:
+        hinges: (m, 4) node indices.
+        triangles: (t, 3) node indices.
+        nodes: how many there are.
+    """
     import scipy.sparse as sp
 
     pairs = [np.column_stack((group[:, i], group[:, j])) for group in (hinges, triangles)

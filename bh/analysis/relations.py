@@ -32,6 +32,9 @@ def folded_curvature(flat: ArrayLike, dihedral: ArrayLike) -> Array:
     Args:
         flat: kappa_0, 1/mm.
         dihedral: phi, rad.
+
+    Returns:
+        broadcast from the arguments.
     """
     return np.asarray(flat, dtype=float) / np.sin(0.5 * np.asarray(dihedral, dtype=float))
 
@@ -42,6 +45,9 @@ def flat_curvature(folded: ArrayLike, dihedral: ArrayLike) -> Array:
     Args:
         folded: kappa, 1/mm.
         dihedral: phi, rad.
+
+    Returns:
+        broadcast from the arguments.
     """
     return np.asarray(folded, dtype=float) * np.sin(0.5 * np.asarray(dihedral, dtype=float))
 
@@ -53,6 +59,9 @@ def dihedral_of(flat: ArrayLike, folded: ArrayLike, valley: bool = False) -> Arr
         flat: kappa_0, 1/mm.
         folded: kappa, 1/mm.
         valley: phi in [pi, 2 pi) in place of (0, pi].
+
+    Returns:
+        broadcast from the arguments.
     """
     half = np.arcsin(np.asarray(flat, dtype=float) / np.asarray(folded, dtype=float))
     return np.asarray(2.0 * (np.pi - half) if valley else 2.0 * half)
@@ -66,6 +75,9 @@ def torsion_of(flat: ArrayLike, dihedral: ArrayLike, left: ArrayLike, right: Arr
         dihedral: phi, rad.
         left: gamma_L, rad.
         right: gamma_R, rad.
+
+    Returns:
+        broadcast from the arguments.
     """
     return -0.5 * _bending(flat, dihedral) * (_cot(left) + _cot(right))
 
@@ -81,6 +93,9 @@ def fold_rate_of(
         left: gamma_L, rad.
         right: gamma_R, rad.
         speed: s, mm a unit of u.
+
+    Returns:
+        broadcast from the arguments.
     """
     return -np.asarray(speed, dtype=float) * _bending(flat, dihedral) * (_cot(left) - _cot(right))
 
@@ -97,6 +112,9 @@ def torsion_from_fold_rate(
         left: gamma_L, rad.
         right: gamma_R, rad.
         speed: s, mm a unit of u.
+
+    Returns:
+        broadcast from the arguments.
     """
     total, difference = _cot(left) + _cot(right), _cot(left) - _cot(right)
     none = np.abs(difference) <= VANISHING * (1.0 + np.abs(total))

@@ -88,13 +88,21 @@ class Panel:
         return np.asarray(kappa / (1.0 - q * v))
 
     def surface(self, v: ArrayLike) -> Array:
-        """(k, ..., 3) points c + v g of the folded panel at distances v (k, ...), mm (A.9)."""
+        """(k, ..., 3) points c + v g of the folded panel at distances v (k, ...), mm (A.9).
+
+        Returns:
+            broadcast to (k, ..., 3).
+        """
         v = np.asarray(v, dtype=float)
         shape = (len(self.u), *[1] * (v.ndim - 1), 3)
         return self.crease.reshape(shape) + v[..., None] * self.generator.reshape(shape)
 
     def development(self, v: ArrayLike) -> Array:
-        """(k, ..., 2) the same points in the flat sheet, mm."""
+        """(k, ..., 2) the same points in the flat sheet, mm.
+
+        Returns:
+            broadcast to (k, ..., 2).
+        """
         v = np.asarray(v, dtype=float)
         shape = (len(self.u), *[1] * (v.ndim - 1), 2)
         return self.flat_crease.reshape(shape) + v[..., None] * self.flat_generator.reshape(shape)

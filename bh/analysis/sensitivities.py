@@ -73,7 +73,11 @@ class Position:
     direction: str | Sequence[float]
 
     def forces(self, at: Situation) -> Array:
-        """(n, 3) unit force along the direction, shared equally among the nodes."""
+        """(n, 3) unit force along the direction, shared equally among the nodes.
+
+        Raises:
+            ModelError: the direction is not one direction.
+        """
         nodes = select(at.model.mesh, self.at)
         axes = directions(self.direction if isinstance(self.direction, str) else [self.direction])
         if len(axes) != 1:
@@ -263,6 +267,9 @@ def of(
         index: of the state, at the end of a step (in the first step any).
         steps: (k,) of the differences, by default a thousandth of each parameter (0.001 where it is zero).
 
+    Returns:
+        one for each observable.
+
     Raises:
         ModelError: the path is not that of the design, its topology changes, the state cannot have sensitivities.
     """
@@ -306,7 +313,13 @@ def _gradient(at: Situation, slope: Slope, value: float, around: _Around) -> tup
 
 
 def derivatives_to_data(at: Situation, slope: Slope, value: float) -> Data:
-    """Derivatives of an observable to element data at equilibrium: its own, and by way of the state (the adjoint)."""
+    """Derivatives of an observable to element data at equilibrium: its own, and by way of the state (the adjoint).
+
+    Args:
+        at: the state that is asked about.
+        slope: derivatives of the observable, in its unit.
+        value: of the observable, in its unit.
+    """
     adjoint = at.solve(at.load(slope.points, slope.other), value)
     v, w = at.system.vectors(adjoint), adjoint[at.moving :]
     by_data = {key: -part for key, part in at.derivatives.residual_to_data(v, w).items()}
@@ -344,7 +357,15 @@ class _Around:
 
 
 def data_of(at: Situation, model: Model) -> Data:
-    """Element data of another model where a situation is."""
+    """Element data of another model where a situation is.
+
+    Args:
+        at: the state of the first model.
+        model: of another design, with the same unknowns.
+
+    Raises:
+        ModelError: the unknowns, or the directions of oblique supports, change with the design.
+    """
     system = at.formulation.system(model, load_steps(model)[at.step], at.start)
     if system.size != at.system.size:
         raise ModelError("the unknowns change with the design; keep supports and creases fixed")

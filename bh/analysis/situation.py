@@ -91,6 +91,10 @@ class Situation:
     def solve(self, load: Array, value: float = 0.0) -> Array:
         """Response (size,) of the unknowns to a load, the slope of an observable of that value.
 
+        Args:
+            load: (size,) slope of an observable, in its unit a unit of the unknowns.
+            value: of the observable, in its unit.
+
         Raises:
             ModelError: a free sheet would be moved as a rigid body.
         """
@@ -108,7 +112,12 @@ class Situation:
         return np.asarray(x - self._rigid @ (self._rigid.T @ x))
 
     def load(self, points: Array, other: Array) -> Array:
-        """(size,) derivatives to the unknowns from those to all positions and to the other unknowns."""
+        """(size,) derivatives to the unknowns from those to all positions and to the other unknowns.
+
+        Args:
+            points: (nodes, 3) derivatives to all positions.
+            other: derivatives to the other unknowns.
+        """
         out = np.array(self.system.loads(points))
         out[self.moving :] += other
         return out

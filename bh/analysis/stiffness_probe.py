@@ -59,7 +59,11 @@ class Stiffness:
     held: Array
 
     def guided(self, direction: ArrayLike) -> Array:
-        """n.K.n (...,) for directions n (..., 3) of any length: the place moves along n only, N/mm; inf where held."""
+        """n.K.n (...,) for directions n (..., 3) of any length: the place moves along n only, N/mm; inf where held.
+
+        Returns:
+            of the shape of `direction` without its last axis.
+        """
         n = _units(direction)
         out = np.einsum("...i,ij,...j->...", n, self.matrix, n)
         return np.where(self._held_share(n) > RANK, np.inf, out)
@@ -68,6 +72,9 @@ class Stiffness:
         """1 / (n.K^-1.n) (...,) for directions n (..., 3): a force along n, free to move across, N/mm; inf where held.
 
         Zero where the force meets a motion that costs nothing.
+
+        Returns:
+            of the shape of `direction` without its last axis.
         """
         n = _units(direction)
         values, vectors = np.linalg.eigh(self.matrix)
@@ -221,6 +228,9 @@ class Probe:
             count: how many.
             density: kg / m^3. Masses are lumped: each node has a third of the triangles around it. None for
                 the modes of the stiffness alone.
+
+        Returns:
+            the modes in order.
 
         Raises:
             ModelError: a count or density that cannot be.
@@ -397,7 +407,15 @@ class Probe:
 
 
 def sphere(theta: ArrayLike, phi: ArrayLike) -> Array:
-    """(..., 3) unit vectors of azimuths theta (from the x axis) and polar angles phi (from the z axis), rad (3.5.1)."""
+    """(..., 3) unit vectors of azimuths theta (from the x axis) and polar angles phi (from the z axis), rad (3.5.1).
+
+    Args:
+        theta: azimuths, rad.
+        phi: polar angles, rad.
+
+    Returns:
+        broadcast from both.
+    """
     theta, phi = np.asarray(theta, dtype=float), np.asarray(phi, dtype=float)
     sine = np.sin(phi)
     return np.stack(np.broadcast_arrays(sine * np.cos(theta), sine * np.sin(theta), np.cos(phi)), axis=-1)

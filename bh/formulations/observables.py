@@ -22,6 +22,10 @@ Observable = Callable[[State, str | None], float]
 def measure(until: Until, state: State) -> float:
     """The observable of an `Until` at a state, in its own unit.
 
+    Args:
+        until: names the observable.
+        state: of a path.
+
     Raises:
         ModelError: the state has no such thing, or "module:function" cannot be imported.
     """
@@ -70,7 +74,18 @@ def depth_of(state: State) -> tuple[float, Array]:
 
 
 def crease_nodes(mesh: SheetMesh, fold: str) -> Ints:
-    """Nodes of all creases that are drawn as `fold` ("mountain" or "valley")."""
+    """Nodes of all creases that are drawn as `fold` ("mountain" or "valley").
+
+    Args:
+        mesh: has the creases.
+        fold: "mountain" or "valley".
+
+    Returns:
+        (k,) rising node indices.
+
+    Raises:
+        ModelError: no crease is drawn so.
+    """
     names = [name for name in mesh.creases if mesh.folds.get(name) == fold]
     if not names:
         raise ModelError(f"a depth needs mountain and valley creases, but the sheet has no {fold}")

@@ -48,7 +48,12 @@ class SheetSystem(System, Protocol):
         ...
 
     def positions(self, q: Array, lam: float) -> Array:
-        """(nodes, 3) positions of the nodes, mm."""
+        """(nodes, 3) positions of the nodes, mm.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         ...
 
     def vectors(self, dq: Array) -> Array:
@@ -118,7 +123,14 @@ class Formulation(Protocol[S]):
         ...
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
-        """What a user should know of the mesh and the loads of a model with it, before anything is solved."""
+        """What a user should know of the mesh and the loads of a model with it, before anything is solved.
+
+        Args:
+            model: sheet, supports and steps.
+
+        Returns:
+            one remark each, empty where there is nothing to say.
+        """
         ...
 
 
@@ -127,15 +139,44 @@ class Mirrored(Formulation[S], Protocol[S]):
     """Ability of a formulation: a mirror-symmetric sheet is solved by one half of it."""
 
     def half(self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror) -> S:
-        """The system of the kept half; the model, the step and the state that it begins at are those of the whole."""
+        """The system of the kept half; the model, the step and the state that it begins at are those of the whole.
+
+        Args:
+            model: of the whole sheet.
+            load_step: of the whole sheet.
+            start: of the whole sheet, where the step begins; None where it begins flat.
+            plane: of the mirror.
+        """
         ...
 
     def whole(self, whole: S, half: S, plane: Mirror, q: Array, lam: float) -> Array:
-        """Unknowns (`whole.size`,) of the whole sheet from those of its half, q (`half.size`,)."""
+        """Unknowns (`whole.size`,) of the whole sheet from those of its half, q (`half.size`,).
+
+        Args:
+            whole: system of the whole sheet.
+            half: system of its kept half.
+            plane: of the mirror.
+            q: (half.size,) unknowns of the half.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            (whole.size,) unknowns of the whole.
+        """
         ...
 
     def part(self, whole: S, half: S, plane: Mirror, q: Array, lam: float) -> Array:
-        """Unknowns (`half.size`,) of the half from those of the whole sheet, q (`whole.size`,)."""
+        """Unknowns (`half.size`,) of the half from those of the whole sheet, q (`whole.size`,).
+
+        Args:
+            whole: system of the whole sheet.
+            half: system of its kept half.
+            plane: of the mirror.
+            q: (whole.size,) unknowns of the whole.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            (half.size,) unknowns of the half.
+        """
         ...
 
 
@@ -145,6 +186,11 @@ class Differentiable(Formulation[S], Protocol[S]):
 
     def derivatives(self, system: S, q: Array, lam: float) -> Derivatives:
         """Derivatives at unknowns q (n,) of one of its systems.
+
+        Args:
+            system: one of the formulation's own.
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
 
         Raises:
             ModelError: this system has none.
@@ -188,11 +234,19 @@ class Derivatives(Protocol):
         ...
 
     def support(self) -> dict[str, Ints]:
-        """For every entry of the data that depends on the flat mesh the nodes (..., k) that it depends on, then -1."""
+        """For every entry of the data that depends on the flat mesh the nodes (..., k) that it depends on, then -1.
+
+        Returns:
+            by name of the data, (..., k) nodes, filled up with -1.
+        """
         ...
 
     def imposed(self, by_data: Data) -> Array:
-        """(hinges of the mesh,) derivatives by imposed dihedral angles, from those by the data; zero elsewhere."""
+        """(hinges of the mesh,) derivatives by imposed dihedral angles, from those by the data; zero elsewhere.
+
+        Returns:
+            (hinges of the mesh,) derivatives, a rad.
+        """
         ...
 
     def energy_gradient(self, kinds: tuple[str, ...]) -> tuple[Array, Array]:
@@ -200,15 +254,33 @@ class Derivatives(Protocol):
         ...
 
     def angle_gradient(self, hinges: Ints, weights: Array) -> tuple[Array, Array, Data]:
-        """Gradients of the weighted sum of `State.dihedral_angles` of hinges: positions, other unknowns, data."""
+        """Gradients of the weighted sum of `State.dihedral_angles` of hinges: positions, other unknowns, data.
+
+        Args:
+            hinges: (k,) rows of `mesh.topology.hinges`.
+            weights: (k,) of their angles.
+
+        Returns:
+            (nodes, 3) by the positions, rad / mm; (n,) by the other unknowns; and by the data.
+        """
         ...
 
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
-        """Rates along (v, w) of the energy's gradients by all positions (nodes, 3) and by the other unknowns."""
+        """Rates along (v, w) of the energy's gradients by all positions (nodes, 3) and by the other unknowns.
+
+        Args:
+            v: (nodes, 3) rates of the positions.
+            w: rates of the other unknowns, of their shape.
+        """
         ...
 
     def residual_to_data(self, v: Array, w: Array) -> Data:
-        """Derivatives of residual . (v, w) by the data, at fixed positions and other unknowns."""
+        """Derivatives of residual . (v, w) by the data, at fixed positions and other unknowns.
+
+        Args:
+            v: (nodes, 3) rates of the positions.
+            w: rates of the other unknowns, of their shape.
+        """
         ...
 
     def energy_to_data(self, kinds: tuple[str, ...]) -> Data:
@@ -216,5 +288,10 @@ class Derivatives(Protocol):
         ...
 
     def second_to_data(self, v: Array, w: Array) -> Data:
-        """Derivatives of the second variation (v, w) . K (v, w) by the data, at fixed positions and other unknowns."""
+        """Derivatives of the second variation (v, w) . K (v, w) by the data, at fixed positions and other unknowns.
+
+        Args:
+            v: (nodes, 3) rates of the positions.
+            w: rates of the other unknowns, of their shape.
+        """
         ...

@@ -40,7 +40,11 @@ OF_SYSTEM = (*_members(System), *_members(SheetSystem))
 
 
 def names() -> list[str]:
-    """Names of all registered formulations."""
+    """Names of all registered formulations.
+
+    Returns:
+        the names in alphabetical order.
+    """
     return sorted(point.name for point in entry_points(group=GROUP))
 
 
@@ -139,7 +143,11 @@ def checked_system(system: SheetSystem, name: str) -> SheetSystem:
 
 
 def able(has: Callable[[Formulation[SheetSystem]], bool]) -> list[str]:
-    """Names of the registered formulations that have an ability, for messages: `able(lambda f: isinstance(f, ...))`."""
+    """Names of the registered formulations that have an ability, for messages: `able(lambda f: isinstance(f, ...))`.
+
+    Returns:
+        the names for which `has` is true.
+    """
     return [name for name in names() if has(formulation(name))]
 
 

@@ -35,7 +35,11 @@ class Energy:
         return self.stretching + self.bending + self.folding
 
     def as_dict(self) -> dict[str, float]:
-        """Elastic energies by kind and their total, N mm."""
+        """Elastic energies by kind and their total, N mm.
+
+        Returns:
+            N mm by kind; "total" is their sum.
+        """
         return {
             "stretching": self.stretching,
             "bending": self.bending,
@@ -81,15 +85,27 @@ class State:
         return f"State(step {self.step}, lambda {self.lam:.4g}, energy {self.energy.total:.4g} N mm{stable})"
 
     def dihedral(self, crease: str) -> Array:
-        """Dihedral angles along a crease, one an edge in order, rad."""
+        """Dihedral angles along a crease, one an edge in order, rad.
+
+        Returns:
+            (edges,) in order along the crease, 0 to 2 pi, less than pi at a mountain.
+        """
         return self.dihedral_angles[crease_hinges(self.mesh, crease)]
 
     def fold_angle(self, crease: str) -> Array:
-        """Fold angles pi - phi along a crease, one an edge in order, rad; mountain positive."""
+        """Fold angles pi - phi along a crease, one an edge in order, rad; mountain positive.
+
+        Returns:
+            (edges,) in order along the crease.
+        """
         return np.pi - self.dihedral(crease)
 
     def crease_moment(self, crease: str) -> Array:
-        """Moment a length along a crease, one an edge in order, N mm / mm."""
+        """Moment a length along a crease, one an edge in order, N mm / mm.
+
+        Returns:
+            (edges,) in order along the crease.
+        """
         return self.crease_moments[crease_hinges(self.mesh, crease)]
 
     def crease_points(self, crease: str) -> Array:

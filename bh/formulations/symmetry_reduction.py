@@ -31,15 +31,35 @@ class Half:
     sheet: SheetSystem
 
     def unknowns(self, q: Array, lam: float) -> Array:
-        """Unknowns (sheet.size,) of the whole sheet from those of the half, q (system.size,)."""
+        """Unknowns (sheet.size,) of the whole sheet from those of the half, q (system.size,).
+
+        Args:
+            q: (system.size,) unknowns of the half.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            (sheet.size,) unknowns of the whole.
+        """
         return self.formulation.whole(self.sheet, self.system, self.plane, q, lam)
 
     def part(self, q: Array, lam: float) -> Array:
-        """Unknowns (system.size,) of the half from those of the whole sheet, q (sheet.size,)."""
+        """Unknowns (system.size,) of the half from those of the whole sheet, q (sheet.size,).
+
+        Args:
+            q: (sheet.size,) unknowns of the whole.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            (system.size,) unknowns of the half.
+        """
         return self.formulation.part(self.sheet, self.system, self.plane, q, lam)
 
     def mode(self, mode: Array) -> Array:
-        """A mode (system.size,) of the half as one of the whole sheet (sheet.size,), by what the nodes do in it."""
+        """A mode (system.size,) of the half as one of the whole sheet (sheet.size,), by what the nodes do in it.
+
+        Returns:
+            (sheet.size,) mode of the whole.
+        """
         return self.sheet.loads(self.system.vectors(mode))
 
 
@@ -89,5 +109,11 @@ class Halves:
 
     @staticmethod
     def negative(sheet: SheetSystem, q: Array, lam: float) -> int:
-        """Number of negative modes of the whole sheet at unknowns q (sheet.size,), symmetric modes or not."""
+        """Number of negative modes of the whole sheet at unknowns q (sheet.size,), symmetric modes or not.
+
+        Args:
+            sheet: system of the whole.
+            q: (sheet.size,) unknowns of the whole.
+            lam: load parameter of the step, 0 to 1.
+        """
         return count_negative(sheet.tangent(q, lam, sheet.evaluate(q, lam).forces).matrix)

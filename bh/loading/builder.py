@@ -288,6 +288,10 @@ class LoadStepBuilder:
     def end_early(self, step: LoadStep, end: StepEnd) -> None:
         """Let the next step begin where `step` ended before it was complete.
 
+        Args:
+            step: that ended early.
+            end: where it ended.
+
         Raises:
             ModelError: a prescribed crease was released in it, whose rest angle is not known on the way.
         """

@@ -118,7 +118,15 @@ class StepEnd:
 
 
 def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:
-    """Rows of `mesh.topology.hinges` along a crease, in order."""
+    """Rows of `mesh.topology.hinges` along a crease, in order.
+
+    Args:
+        mesh: has the crease.
+        crease: its name.
+
+    Returns:
+        (k,) rows, in order along the crease.
+    """
     found = edge_hinges(mesh, crease)
     return found[found >= 0]
 
@@ -127,6 +135,10 @@ def hinge_name(mesh: SheetMesh, hinge: int) -> str:
     """A row of `mesh.topology.hinges` in words: "crease 'NAME' (edge 3-7)", or "edge 3-7" off creases.
 
     Where several names share the edge (FOLD files name all mountains, and each chain of them) it is the shortest one.
+
+    Args:
+        mesh: has the hinge.
+        hinge: row of `mesh.topology.hinges`.
     """
     a, b = mesh.topology.hinges[hinge, 1:3].tolist()
     on = [name for name in mesh.creases if hinge in crease_hinges(mesh, name)]
@@ -140,6 +152,13 @@ def open_ends(mesh: SheetMesh, step: LoadStep) -> list[str]:
 
     The slopes have a dislocation at such a node and the curvature goes with 1 / r (docs/fem.md). An end that is faded
     out to a tenth of the largest angle, or that another crease goes on from, is none.
+
+    Args:
+        mesh: of the sheet.
+        step: that is asked about.
+
+    Returns:
+        the lines, none where every fold ends well.
     """
     topology = mesh.topology
     angle = np.where(step.law == PRESCRIBED, np.abs(math.pi - step.prescribed.end), 0.0)
@@ -157,6 +176,14 @@ def open_ends(mesh: SheetMesh, step: LoadStep) -> list[str]:
 
 
 def edge_hinges(mesh: SheetMesh, crease: str) -> Ints:
-    """Hinge of every edge of a crease, in order; -1 where the edge lies on the boundary."""
+    """Hinge of every edge of a crease, in order; -1 where the edge lies on the boundary.
+
+    Args:
+        mesh: has the crease.
+        crease: its name.
+
+    Returns:
+        (edges of the crease,) rows, or -1.
+    """
     topology = mesh.topology
     return topology.edge_hinges[topology.find_edges(mesh.crease_edges(crease))]

@@ -83,6 +83,10 @@ class Mirror:
 def mirror(mesh: SheetMesh, plane: Plane) -> Mirror:
     """The mirror of a mesh along "x" or "y" (see the module), or of a plane through its middle with a given normal.
 
+    Args:
+        mesh: of the whole sheet.
+        plane: "x", "y", or the normal (3,) of a plane through the middle of the mesh.
+
     Raises:
         ModelError: the plane cannot be, or the mesh is not its own image; one line.
     """
@@ -172,7 +176,13 @@ def _middles(mesh: SheetMesh) -> Array:
 
 
 def halved(model: Model, plane: Mirror, free: bool) -> Model:
-    """The model with its nodes in the plane held there; `free` if nothing else holds it in some step."""
+    """The model with its nodes in the plane held there; `free` if nothing else holds it in some step.
+
+    Args:
+        model: of the whole sheet.
+        plane: of its mirror.
+        free: nothing else holds it in some step.
+    """
     nodes = np.flatnonzero(plane.side == 0).tolist()
     extra: list[Support | RigidBody] = [Support(nodes, (tuple(plane.normal.tolist()),))] if nodes else []
     if free and not any(isinstance(item, RigidBody) for item in model.supports):
@@ -181,7 +191,16 @@ def halved(model: Model, plane: Mirror, free: bool) -> Model:
 
 
 def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
-    """Raises `ModelError` with one line that names what is not symmetric."""
+    """Raises `ModelError` with one line that names what is not symmetric.
+
+    Args:
+        model: of the whole sheet.
+        steps: its load steps.
+        plane: of its mirror.
+
+    Raises:
+        ModelError: a support, a crease or an actuation has no image in the plane.
+    """
     for number, step in enumerate(steps):
         where = f"step {number + 1}"
         if step.bodies:

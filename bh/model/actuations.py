@@ -99,7 +99,11 @@ class Fold(Actuation):
             builder.spring(builder.creases(self.crease)[0], self.Lstar, self.stiffness)
 
     def apply(self, builder: StepBuilder) -> None:
-        """Ask for the angle, imposed or as a rest angle."""
+        """Ask for the angle, imposed or as a rest angle.
+
+        Raises:
+            ModelError: the angle leaves the range from 0 to 2 pi, or a list of angles does not fit the crease.
+        """
         hinges, sense, drawn = builder.creases(self.crease)
         angle = self._target(sense, drawn)
         if self.rest is not None or self._spring:

@@ -152,6 +152,11 @@ class Model:
         """Hold nodes, and the slope too with `clamp`; at "rigid-body" take out what rigid motions are left.
 
         `at` can be a support of your own. See `bh.model.supports`.
+
+        Args:
+            at: name of a place, node indices, or a support of your own.
+            fix: letters of x, y, z, or directions (k, 3) of any length.
+            clamp: hold the slope too.
         """
         item = (
             at
@@ -163,22 +168,46 @@ class Model:
         return replace(self, supports=(*self.supports, item))
 
     def crease(self, name: str, **law: Any) -> Model:
-        """Give a crease a spring: `Lstar` (mm) or `stiffness` (N mm / (mm rad)), and its `rest` angle (rad)."""
+        """Give a crease a spring: `Lstar` (mm) or `stiffness` (N mm / (mm rad)), and its `rest` angle (rad).
+
+        Args:
+            name: of the crease.
+            **law: `Lstar` (mm) or `stiffness` (N mm / (mm rad)), and `rest` (rad).
+
+        Raises:
+            MeshError: there is no such crease.
+        """
         self.mesh.crease_edges(name)
         return replace(self, creases={**self.creases, name: CreaseLaw(**law)})
 
     def step(self, *actuations: Actuation, until: Until | None = None) -> Model:
-        """Add a step in which all `actuations` act together; it ends before they are complete where `until` says."""
+        """Add a step in which all `actuations` act together; it ends before they are complete where `until` says.
+
+        Args:
+            *actuations: that act together.
+            until: ends the step early; None for never.
+        """
         return replace(self, steps=(*self.steps, Step(actuations, until)))
 
     def fold(self, crease: str, until: Until | None = None, **how: Any) -> Model:
-        """Add a step that folds a crease; arguments of `bh.Fold`."""
+        """Add a step that folds a crease; arguments of `bh.Fold`.
+
+        Args:
+            crease: its name, or "all".
+            until: ends the step early; None for never.
+            **how: `to` or `by` (rad), and what else `bh.Fold` takes.
+        """
         return self.step(Fold(crease, **how), until=until)
 
     def pinch(self, crease: str, until: Until | None = None, **how: Any) -> Model:
         """Add a step that pinches a crease that is folded already; arguments of `bh.Pinch`.
 
         With how="couple" it ends where the angle is reached, on the first crease of the sheet if `crease` is "all".
+
+        Args:
+            crease: its name, or "all".
+            until: ends the step early; None for never.
+            **how: arguments of `bh.Pinch`.
         """
         item = Pinch(crease, **how)
         if item.how == "couple" and until is None:
@@ -187,11 +216,21 @@ class Model:
         return self.step(item, until=until)
 
     def moment(self, crease: str, to: float) -> Model:
-        """Add a step with a couple a length on a crease; see `bh.Moment`."""
+        """Add a step with a couple a length on a crease; see `bh.Moment`.
+
+        Args:
+            crease: its name, or "all".
+            to: couple a length at the end of the step, N mm / mm; positive folds the way that the crease is drawn.
+        """
         return self.step(Moment(crease, to))
 
     def force(self, at: str | Sequence[int], **how: Any) -> Model:
-        """Add a step with dead forces; arguments of `bh.Force`."""
+        """Add a step with dead forces; arguments of `bh.Force`.
+
+        Args:
+            at: name of a place, or node indices.
+            **how: `total` or `each` (3,), N, as `bh.Force` takes them.
+        """
         return self.step(Force(at, **how))
 
     def displace(self, at: str | Sequence[int], direction: str | Sequence[float], by: float) -> Model:

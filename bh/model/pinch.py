@@ -171,13 +171,22 @@ class Chain:
 
 
 def is_chain(mesh: SheetMesh, crease: str) -> bool:
-    """True if the edges of a crease follow one another."""
+    """True if the edges of a crease follow one another.
+
+    Args:
+        mesh: has the crease.
+        crease: its name.
+    """
     pairs = mesh.crease_edges(crease)
     return bool((pairs[:-1, 1] == pairs[1:, 0]).all())
 
 
 def chain(mesh: SheetMesh, crease: str) -> Chain:
     """Arc lengths along a crease of the flat sheet.
+
+    Args:
+        mesh: has the crease.
+        crease: its name.
 
     Raises:
         ModelError: its edges are no chain (FOLD files name all mountains together, and each chain of them).
@@ -196,6 +205,12 @@ def parts(line: Chain, at: float, length: float, profile: str) -> tuple[Array, A
 
     An edge has the mean of the profile along it. Both are scaled so that the largest is one: on any mesh the edge that
     closes most has just the pinched angle (the scale tends to one with the square of the edges' length).
+
+    Args:
+        line: of the crease.
+        at: middle of the zone, as a share of the crease's length.
+        length: of the zone, mm.
+        profile: "cosine" or "grip".
     """
     value, integral = PROFILES[profile]
     middle = at * line.length
@@ -216,6 +231,12 @@ def parts(line: Chain, at: float, length: float, profile: str) -> tuple[Array, A
 
 def zone_length(line: Chain, name: str, at: float, length: float | None) -> float:
     """Length of a pinched zone, mm; a fifth of the crease unless it is given.
+
+    Args:
+        line: of the crease.
+        name: of the crease, for messages.
+        at: middle of the zone, as a share of the crease's length.
+        length: of the zone, mm; None for a fifth of the crease.
 
     Raises:
         ModelError: the zone leaves the crease, or is shorter than two edges of the mesh.

@@ -68,6 +68,11 @@ def from_file(name: str, kind: type | None = None) -> Any:
 def made(name: str, given: Mapping[str, Any], kind: type | None = None) -> Any:
     """What "module:name" of a file makes of keys and values; lists become tuples.
 
+    Args:
+        name: "module:name", imported if it is not yet.
+        given: keys and values.
+        kind: class that the result must be of; None for any.
+
     Raises:
         ModelError: nobody has allowed it, it does not take these keys, or makes something else than a `kind`.
     """

@@ -18,7 +18,11 @@ class Ramp:
     end: Array
 
     def at(self, lam: float) -> Array:
-        """The value at `lam`, of the shape of both ends."""
+        """The value at `lam`, of the shape of both ends.
+
+        Returns:
+            an array of the shape of both ends, linear in `lam` between them.
+        """
         return (1.0 - lam) * self.start + lam * self.end
 
     @property

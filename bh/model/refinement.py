@@ -109,6 +109,11 @@ class Refinement:
 def mesh_at(pattern: CreasePattern, kind: Kind, level: float) -> SheetMesh:
     """The mesh of a level (see `meshes.choices.choices`): structured where the pattern has rails, else by gmsh.
 
+    Args:
+        pattern: to be meshed.
+        kind: how cells are cut.
+        level: the higher, the finer.
+
     Raises:
         MeshError: the pattern has no such mesh; `bh.solving.mesh_choice` tries others.
     """
@@ -116,7 +121,13 @@ def mesh_at(pattern: CreasePattern, kind: Kind, level: float) -> SheetMesh:
 
 
 def with_mesh(model: Model, mesh: SheetMesh, formulation: str) -> Model:
-    """The model on another mesh of the same sheet."""
+    """The model on another mesh of the same sheet.
+
+    Args:
+        model: on any mesh of the sheet.
+        mesh: that replaces it.
+        formulation: name of the one that solves it.
+    """
     return replace(model, mesh=mesh, formulation=formulation)
 
 

@@ -71,6 +71,10 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
 def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
     """The model that `describe` described.
 
+    Args:
+        data: plain data of the model.
+        arrays: its arrays by name.
+
     Raises:
         PathFileError: the data are of another version or incomplete.
         ModelError: they name code that nobody has allowed to run.

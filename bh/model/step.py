@@ -74,7 +74,13 @@ class StepBuilder(Protocol):
         ...
 
     def spring(self, hinges: Ints, Lstar: float | None = None, stiffness: float | None = None) -> None:
-        """Make hinges an elastic crease in all steps (call it in `prepare`); arguments of `bh.CreaseLaw`."""
+        """Make hinges an elastic crease in all steps (call it in `prepare`); arguments of `bh.CreaseLaw`.
+
+        Args:
+            hinges: (k,) rows of `mesh.topology.hinges`.
+            Lstar: mm.
+            stiffness: N mm / (mm rad), in place of `Lstar`.
+        """
         ...
 
     def prescribe(self, hinges: Ints, angle: Array, zone: Zone | None = None) -> None:
@@ -82,23 +88,52 @@ class StepBuilder(Protocol):
 
         With a `zone` each hinge goes its part of the way to `angle` from where the step finds it, or from where a fold
         of the same step brings it.
+
+        Args:
+            hinges: (k,) rows of `mesh.topology.hinges`.
+            angle: (k,) dihedral angles at the end of the step, rad.
+            zone: parts of the way; None for all of it.
         """
         ...
 
     def rest_at(self, hinges: Ints, angle: Array, release: bool = False, zone: Zone | None = None) -> None:
-        """Turn the rest angles (k,) of springs, rad; `release` makes springs of prescribed hinges that are some."""
+        """Turn the rest angles (k,) of springs, rad; `release` makes springs of prescribed hinges that are some.
+
+        Args:
+            hinges: (k,) rows of `mesh.topology.hinges`.
+            angle: (k,) rest angles at the end of the step, rad.
+            release: make springs of those that are prescribed.
+            zone: parts of the way; None for all of it.
+        """
         ...
 
     def couple(self, hinges: Ints, moment: Array, zone: Zone | None = None) -> None:
-        """Dead couples (k,) a length, N mm / mm, positive towards smaller dihedral angles."""
+        """Dead couples (k,) a length, N mm / mm, positive towards smaller dihedral angles.
+
+        Args:
+            hinges: (k,) rows of `mesh.topology.hinges`.
+            moment: (k,) a length, N mm / mm.
+            zone: parts of the moment; None for all of it.
+        """
         ...
 
     def pull(self, nodes: Ints, force: Array) -> None:
-        """Dead forces (k, 3) or (3,) on nodes (k,), N, in place of what pulled there."""
+        """Dead forces (k, 3) or (3,) on nodes (k,), N, in place of what pulled there.
+
+        Args:
+            nodes: (k,) node indices.
+            force: (k, 3) or (3,) on each of them, N.
+        """
         ...
 
     def displace(self, nodes: Ints, direction: Sequence[float], by: float) -> None:
-        """Prescribe the displacement of nodes (k,) along a unit vector (3,), mm from the stress-free position."""
+        """Prescribe the displacement of nodes (k,) along a unit vector (3,), mm from the stress-free position.
+
+        Args:
+            nodes: (k,) node indices.
+            direction: (3,) unit vector.
+            by: displacement at the end of the step, mm.
+        """
         ...
 
     def attach(self, body: Body) -> None:

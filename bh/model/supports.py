@@ -34,7 +34,11 @@ class Constraint:
         raise NotImplementedError
 
     def clamps(self, mesh: SheetMesh) -> Ints:
-        """Rows of `mesh.topology.edges` across which the sheet keeps its slope."""
+        """Rows of `mesh.topology.edges` across which the sheet keeps its slope.
+
+        Returns:
+            (k,) rows; none but for a clamp.
+        """
         return np.zeros(0, dtype=np.int64)
 
 
@@ -111,6 +115,9 @@ class Constraints:
 def directions(fix: str | Sequence[Sequence[float]]) -> list[Array]:
     """Unit direction vectors of a support.
 
+    Returns:
+        (3,) each, of length one.
+
     Raises:
         ModelError: unknown letters, or vectors that are not three finite numbers.
     """
@@ -129,7 +136,18 @@ def directions(fix: str | Sequence[Sequence[float]]) -> list[Array]:
 
 
 def select(mesh: SheetMesh, at: str | Sequence[int]) -> Ints:
-    """Node indices of a place name or of explicit indices; errors name what there is."""
+    """Node indices of a place name or of explicit indices; errors name what there is.
+
+    Args:
+        mesh: has the nodes and the names of places.
+        at: name of a place, or node indices.
+
+    Returns:
+        (k,) node indices.
+
+    Raises:
+        ModelError: no nodes, or indices that are not in the mesh.
+    """
     if isinstance(at, str):
         return mesh.nodes(at)
     nodes = np.asarray(at)
@@ -149,6 +167,12 @@ def resolve(
     """Collect all supports and prescribed displacements into local axes a node.
 
     A sheet without any support gets the rigid-body support by itself, unless it is `in_contact` with what holds it.
+
+    Args:
+        mesh: of the sheet.
+        supports: that hold it.
+        prescribed: displacements.
+        in_contact: something else carries the sheet.
 
     Raises:
         ModelError: supports contradict each other, or leave rigid motions free.
@@ -200,6 +224,13 @@ def resolve(
 def clamped_edges(mesh: SheetMesh, at: str | Sequence[int]) -> Ints:
     """Rows of `mesh.topology.edges` that a clamp at a place holds: its edges, or boundary edges between its nodes.
 
+    Args:
+        mesh: of the sheet.
+        at: name of a place, or node indices.
+
+    Returns:
+        (k,) rows.
+
     Raises:
         ModelError: the place has no edges, or some inside the sheet, where there is no outward direction to hold.
     """
@@ -216,7 +247,11 @@ def clamped_edges(mesh: SheetMesh, at: str | Sequence[int]) -> Ints:
 
 
 def rigid_motions(points: Array) -> Array:
-    """(3 n, 6) displacements of the unit translations and of unit rotations about the centroid."""
+    """(3 n, 6) displacements of the unit translations and of unit rotations about the centroid.
+
+    Returns:
+        columns: three translations, then three rotations; mm.
+    """
     n = len(points)
     arm = points - points.mean(axis=0)
     motions = np.zeros((n, 3, 6))
@@ -231,6 +266,10 @@ def free_motions(points: Array, constraints: Constraints) -> Array:
     """(6, r) combinations of the scaled rigid motions that the supports allow, r from 0 to 6.
 
     Rotations are scaled by the size of the sheet, so that ranks do not depend on the unit of length.
+
+    Args:
+        points: (n, 3) of the stress-free sheet, mm.
+        constraints: what is fixed.
     """
     motions = rigid_motions(points).reshape(len(points), 3, 6)
     scale = np.ones(6)

@@ -84,7 +84,11 @@ class Accuracy:
         return f"{told} ({100 * self.goal.within:g} % {met}): {self.formulation}, {self.mesh}; {meshes}"
 
     def as_dict(self) -> dict[str, object]:
-        """Plain data for result.json and path files."""
+        """Plain data for result.json and path files.
+
+        Returns:
+            plain data by the names of the fields.
+        """
         return {
             "of": self.goal.of,
             "at": self.goal.at,

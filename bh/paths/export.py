@@ -26,6 +26,11 @@ def write_state(file: str | os.PathLike[str], states: Sequence[State], title: st
     .vtu, .vtk and .msh hold the displacement (mm) and the energy densities (N mm / mm^2); .glb has them as colours,
     bending from none (dark) to the most there is.
 
+    Args:
+        file: its suffix says the format.
+        states: of one path, in order; at least one.
+        title: of the FOLD file.
+
     Returns:
         the absolute path of the file.
 
@@ -63,6 +68,11 @@ def write_state(file: str | os.PathLike[str], states: Sequence[State], title: st
 
 def write_flat(file: str | os.PathLike[str], mesh: SheetMesh, facets: bool = False) -> FilePath:
     """Write the flat pattern of a mesh: .svg and .dxf have outline and creases (and `facets`), .fold the whole mesh.
+
+    Args:
+        file: its suffix says the format.
+        mesh: that is flat.
+        facets: draw the edges that are no creases, too.
 
     Raises:
         InputError: an unknown suffix, a mesh that is not flat, or a place that cannot be written to.

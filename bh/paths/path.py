@@ -204,7 +204,14 @@ class Path:
         return self._states[index]
 
     def observe(self, step: int, q: Array, lam: float, stable: bool | None = None) -> State:
-        """What is to be read from unknowns q (n,) of a step at `lam`; of the whole sheet where halves are solved."""
+        """What is to be read from unknowns q (n,) of a step at `lam`; of the whole sheet where halves are solved.
+
+        Args:
+            step: number of the step, from 0.
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+            stable: what is known of it.
+        """
         return self._formulation.observe(self.model, self.system(step), q, lam, step, stable)
 
     def take_over(self, other: Path) -> None:
@@ -217,7 +224,11 @@ class Path:
         return (self[i] for i in range(len(self)))
 
     def solved(self, index: int = -1) -> tuple[SheetSystem, Record]:
-        """The system of the step that a state belongs to, and its record: what analyses of a state begin with."""
+        """The system of the step that a state belongs to, and its record: what analyses of a state begin with.
+
+        Returns:
+            the system and the record.
+        """
         record = self.records[range(len(self))[index]]
         return self.system(record.step), record
 
@@ -321,6 +332,11 @@ class Path:
 
 
 def new_file(path: Path, file: FilePath) -> PathFile:
-    """An empty path file for a path, which replaces an older one."""
+    """An empty path file for a path, which replaces an older one.
+
+    Args:
+        path: whose model and provenance are written.
+        file: place of the path file.
+    """
     data, arrays = describe(path.model)
     return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)

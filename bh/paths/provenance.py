@@ -12,7 +12,11 @@ from bh.model.serialise import fingerprint
 
 @lru_cache(maxsize=1)
 def versions() -> dict[str, str]:
-    """Versions of the project and of what its numbers depend on."""
+    """Versions of the project and of what its numbers depend on.
+
+    Returns:
+        version by name of the package.
+    """
     found = {"python": platform.python_version()}
     for name in ("curved-crease-workbench", "numpy", "scipy", "numba"):
         try:
@@ -23,5 +27,9 @@ def versions() -> dict[str, str]:
 
 
 def provenance_of(model: Model) -> dict[str, object]:
-    """Fingerprint of the input, versions and formulation of a model."""
+    """Fingerprint of the input, versions and formulation of a model.
+
+    Returns:
+        plain data for path files and results.
+    """
     return {"input": fingerprint(model), "versions": versions(), "formulation": model.formulation}

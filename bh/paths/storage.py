@@ -88,6 +88,12 @@ class PathFile:
     ) -> PathFile:
         """Begin a new file; an old one of that name is replaced once the new one has its model.
 
+        Args:
+            file: place of the path file.
+            meta: model and provenance, as plain data.
+            arrays: of the model, by name.
+            replace: take the place of an older file.
+
         Raises:
             PathFileError: the folder cannot be written, or the file exists and `replace` is False.
         """
@@ -178,7 +184,14 @@ class PathFile:
             )
 
     def finish_step(self, step: int, outcome: str, reason: str, iterations: int) -> None:
-        """Store how a step ended; `iterations` are those of an increment that failed."""
+        """Store how a step ended; `iterations` are those of an increment that failed.
+
+        Args:
+            step: number of the step, from 0.
+            outcome: how it ended, a value of `bh.Outcome`.
+            reason: in one line, empty where it is reached.
+            iterations: of an increment that failed.
+        """
         with self._guard():
             self._db.execute(
                 "INSERT OR REPLACE INTO steps VALUES (?, ?, ?, ?)", (step, outcome, reason, iterations)
@@ -190,11 +203,19 @@ class PathFile:
             self._db.execute("DELETE FROM steps WHERE outcome != 'reached'")
 
     def meta(self) -> dict[str, Any]:
-        """Model and provenance as plain data."""
+        """Model and provenance as plain data.
+
+        Returns:
+            plain data by key.
+        """
         return {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
 
     def note(self, key: str, value: Any) -> None:
         """Write a JSON value into `meta` in place of an older one.
+
+        Args:
+            key: of `meta`.
+            value: plain data.
 
         Raises:
             PathFileError: the file cannot be written.
@@ -206,7 +227,11 @@ class PathFile:
             raise PathFileError(f"cannot write '{self.file}' ({error}); is the disk full?") from error
 
     def arrays(self) -> dict[str, AnyArray]:
-        """Arrays of the model by name."""
+        """Arrays of the model by name.
+
+        Returns:
+            the arrays, of the shapes and types that were stored.
+        """
         rows = self._db.execute("SELECT name, dtype, shape, data FROM arrays")
         return {
             name: np.frombuffer(data, dtype).reshape(json.loads(shape)).copy()
@@ -257,7 +282,11 @@ class PathFile:
         return found
 
     def steps(self) -> dict[int, tuple[str, str, int]]:
-        """Outcome, reason and lost iterations of every step that ended."""
+        """Outcome, reason and lost iterations of every step that ended.
+
+        Returns:
+            outcome, reason and iterations by number of the step.
+        """
         rows = self._db.execute("SELECT step, outcome, reason, iterations FROM steps")
         return {step: (outcome, reason, iterations) for step, outcome, reason, iterations in rows}
 
@@ -291,7 +320,11 @@ class _Transaction:
 
 @contextmanager
 def reading(file: FilePath) -> Iterator[None]:
-    """Damaged files are told in one line, whatever comes up while they are read."""
+    """Damaged files are told in one line, whatever comes up while they are read.
+
+    Raises:
+        PathFileError: the file is damaged.
+    """
     try:
         yield
     except InputError as error:

@@ -61,6 +61,9 @@ def best_view(state: State, aspect: float) -> tuple[float, float]:
     Args:
         state: of a path.
         aspect: width of the picture over its height.
+
+    Returns:
+        the two angles.
     """
     triangles = state.points[state.mesh.triangles]
     doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

@@ -15,7 +15,15 @@ class ProgressMeter(Protocol):
     """Told about every accepted increment; `step` counts from 0."""
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
-        """Report an accepted increment; `step` of `steps` counts from 0, energy in N mm."""
+        """Report an accepted increment; `step` of `steps` counts from 0, energy in N mm.
+
+        Args:
+            step: from 0.
+            steps: how many there are.
+            lam: load parameter of the step, 0 to 1.
+            iterations: of the increment.
+            energy: N mm.
+        """
 
     def close(self, outcome: str) -> None:
         """The trace has ended, or was stopped."""
@@ -114,14 +122,24 @@ class Bar:
 
 
 def stage(report: ProgressMeter, words: str) -> None:
-    """Tell a meter what is solved from here on, if it has a method `stage` for that."""
+    """Tell a meter what is solved from here on, if it has a method `stage` for that.
+
+    Args:
+        report: the meter.
+        words: what is solved.
+    """
     tell = getattr(report, "stage", None)
     if tell is not None:
         tell(words)
 
 
 def note(report: ProgressMeter, words: str) -> None:
-    """Tell a meter something in words, if it has a method `note` for that."""
+    """Tell a meter something in words, if it has a method `note` for that.
+
+    Args:
+        report: the meter.
+        words: what it is told.
+    """
     tell = getattr(report, "note", None)
     if tell is not None:
         tell(words)

@@ -17,6 +17,10 @@ def use(viewer: Viewer) -> None:
 def show(path: object, **options: Any) -> Any:
     """Show a path, by what `use` was given last.
 
+    Args:
+        path: that is shown.
+        **options: for the viewer.
+
     Raises:
         LookupError: there is no viewer.
     """

@@ -26,7 +26,13 @@ class Workers(ProcessPoolExecutor):
         super().__init__(count, get_context("spawn"), follow_parent)
 
     def submit(self, fn: Callable[..., Result], /, *args: Any, **options: Any) -> Future[Result]:
-        """Have a process call `fn`; the processes are started here, deaf to interrupts from their first moment."""
+        """Have a process call `fn`; the processes are started here, deaf to interrupts from their first moment.
+
+        Args:
+            fn: that can be pickled.
+            *args: for it.
+            **options: for it, by name.
+        """
         with interrupts_wait():
             return super().submit(fn, *args, **options)
 

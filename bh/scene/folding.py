@@ -95,6 +95,9 @@ def proposals(file: str | os.PathLike[str], wish: Wish | None = None) -> list[Pr
         file: .svg, .dxf, .fold, .cp or .opx.
         wish: how to fold it; None for the defaults.
 
+    Returns:
+        the scenes, at least one.
+
     Raises:
         InputError: it cannot be read, has no crease, or no mesh can be made of it; one line.
     """

@@ -35,6 +35,7 @@ from bh.scene.reading import (
     read_table,
     read_toml,
     shown,
+    waits,
     within,
     without,
 )
@@ -123,6 +124,8 @@ def load_scene(path: str | Path) -> Scene:
         )
     if path.suffix.lower() == ".bh":
         raise SceneError(one_line(f"'{path}' is a solved path, not a scene; look at it with `bh view`"))
+    if waits(path):
+        raise SceneError(one_line(f"'{path}' is a pipe, which may never end; give a file"))
     try:
         with path.open("rb") as file:
             content = file.read(LONGEST_FILE + 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import stat
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -57,6 +58,9 @@ T = TypeVar("T", bound=Table)
 
 def read_toml(text: str) -> dict[str, object]:
     """The tables of a TOML text.
+
+    Returns:
+        the tables by name.
 
     Raises:
         SceneError: the text is empty, or no TOML.
@@ -124,6 +128,13 @@ def check_keys(at: str, table: Mapping[str, object], known: Iterable[str]) -> No
 def as_table(data: object, at: str) -> dict[str, object]:
     """The value at a path, if it is a table.
 
+    Args:
+        data: what the scene has there.
+        at: its dotted path.
+
+    Returns:
+        the table.
+
     Raises:
         SceneError: it is none.
     """
@@ -135,6 +146,13 @@ def as_table(data: object, at: str) -> dict[str, object]:
 
 def as_tables(data: object, at: str) -> list[object]:
     """The value at a path, if it is a list of tables.
+
+    Args:
+        data: what the scene has there.
+        at: its dotted path.
+
+    Returns:
+        the tables in order.
 
     Raises:
         SceneError: it is none.
@@ -155,6 +173,9 @@ def one_or_more(value: object, at: str) -> list[tuple[str, object]]:
         value: what the scene has there.
         at: its dotted path.
 
+    Returns:
+        dotted path and value of each.
+
     Raises:
         SceneError: the list is empty.
     """
@@ -167,7 +188,11 @@ def one_or_more(value: object, at: str) -> list[tuple[str, object]]:
 
 @contextmanager
 def within(at: str) -> Iterator[None]:
-    """Errors inside get the dotted path in front, as a `SceneError`."""
+    """Errors inside get the dotted path in front, as a `SceneError`.
+
+    Raises:
+        SceneError: any error of the input inside.
+    """
     try:
         yield
     except InputError as error:
@@ -175,7 +200,12 @@ def within(at: str) -> Iterator[None]:
 
 
 def nearest(key: object, known: Iterable[str]) -> str:
-    """A known name like `key` as ` (did you mean ...?)`, or ""."""
+    """A known name like `key` as ` (did you mean ...?)`, or "".
+
+    Args:
+        key: that is not known.
+        known: names to compare it with.
+    """
     close = difflib.get_close_matches(str(key), list(known), n=1) or [
         name for name in known if name.lower() == str(key).lower()
     ]
@@ -210,11 +240,25 @@ def one_line(text: str) -> str:
 
 
 def is_inside(folder: Path, place: Path) -> bool:
-    """Whether a file lies below a folder, symbolic links followed."""
+    """Whether a file lies below a folder, symbolic links followed.
+
+    Args:
+        folder: that is allowed.
+        place: of the file, which need not exist.
+    """
     try:
         return place.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):  # a loop of links, a null character: told where it is opened
         return True
+
+
+def waits(place: Path) -> bool:
+    """Whether it is a pipe or socket: opening one waits until somebody writes, which may be for ever."""
+    try:
+        mode = place.stat().st_mode
+    except (OSError, ValueError):  # told where it is opened
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
 
 
 def inside(folder: Path, name: str, at: str) -> Path:
@@ -234,14 +278,28 @@ def inside(folder: Path, name: str, at: str) -> Path:
             f"{at} = {shown(name)} lies outside the folder of the file that names it; copy it there, or add "
             "--allow-outside (BH_ALLOW_OUTSIDE=1, or bh.allow_outside() in Python)"
         )
+    if waits(place):
+        raise SceneError(f"{at} = {shown(name)} is a pipe, which may never end; give a file")
     return place
 
 
 def without(table: dict[str, object], key: str) -> dict[str, object]:
-    """The table without one of its keys."""
+    """The table without one of its keys.
+
+    Args:
+        table: stays as it is.
+        key: to leave out.
+
+    Returns:
+        a new table.
+    """
     return {name: value for name, value in table.items() if name != key}
 
 
 def arguments(table: Table) -> dict[str, Any]:
-    """The keys of a table as keyword arguments; lists become the tuples of frozen data."""
+    """The keys of a table as keyword arguments; lists become the tuples of frozen data.
+
+    Returns:
+        the arguments by name.
+    """
     return {name: tuple(value) if isinstance(value, list) else value for name, value in table}

@@ -28,7 +28,11 @@ SHOWN = 12  # creases or places in a list
 
 
 def report(scene: Scene) -> list[str]:
-    """The scene in lines: sheet, mesh, creases, places, supports, steps, and what to know of them."""
+    """The scene in lines: sheet, mesh, creases, places, supports, steps, and what to know of them.
+
+    Returns:
+        the lines in order.
+    """
     model, mesh = scene.model, scene.model.mesh
     size = np.ptp(mesh.points, axis=0)
     lines = [

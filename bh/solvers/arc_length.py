@@ -36,11 +36,23 @@ class Control(Protocol):
         ...
 
     def normal(self, system: System, tangent: Array) -> Array:
-        """(primal,) normal of the hyperplane, from the tangent dq / dlambda of the path."""
+        """(primal,) normal of the hyperplane, from the tangent dq / dlambda of the path.
+
+        Args:
+            system: whose equilibrium is sought.
+            tangent: (n,) dq / dlambda of the path.
+        """
         ...
 
     def scale(self, length: float, measure: float, first: float, first_measure: float) -> float:
-        """Increment of lambda for a given length; `measure` is |normal . tangent| / |normal|, also at the start."""
+        """Increment of lambda for a given length; `measure` is |normal . tangent| / |normal|, also at the start.
+
+        Args:
+            length: of the increment along the path, by the measure of the control.
+            measure: |normal . tangent| / |normal| here.
+            first: first increment of lambda.
+            first_measure: `measure` where the path began.
+        """
         ...
 
 

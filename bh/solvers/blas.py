@@ -46,7 +46,11 @@ _call = intrinsic(_code_of_call)
 
 
 def constants() -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """The two arrays (see above) that the calls below need."""
+    """The two arrays (see above) that the calls below need.
+
+    Returns:
+        integers and floats, both constant.
+    """
     whole = np.zeros(16, dtype=np.int32)
     whole[:5] = [ord(letter) for letter in "NTRLU"]  # little endian: the first byte is the letter
     whole[5] = 1  # step between the entries of a vector

@@ -45,7 +45,15 @@ class Branch(NamedTuple):
     iterations: int
 
     def increments(self, cuts: tuple[str, ...], spent: int) -> list[Increment]:
-        """The states as accepted increments; the first has what was `spent` on finding them."""
+        """The states as accepted increments; the first has what was `spent` on finding them.
+
+        Args:
+            cuts: what was cut before, in words.
+            spent: iterations.
+
+        Returns:
+            one for each state, in the order of lambda.
+        """
         found = []
         for k, there in enumerate(self.points):
             before = self.points[k - 1].lam if k else self.critical[0].lam

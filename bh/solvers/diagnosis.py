@@ -21,6 +21,10 @@ def diagnose(system: System, failure: Increment) -> Increment:
 
     In this order: what the system itself sees (contact of panels, loads that turn a free sheet), a motion without
     stiffness ("mechanism"), and what the strategy has found ("limit-point", "bifurcation", "stalled").
+
+    Args:
+        system: whose equilibrium is sought.
+        failure: the increment that failed.
     """
     here = failure.point
     obstacle = system.obstacle(here.q, here.lam)
@@ -38,7 +42,12 @@ def diagnose(system: System, failure: Increment) -> Increment:
 
 
 def free_motion(system: System, failure: Increment) -> str:
-    """The motion of the last state that nothing resists, in words, or an empty string."""
+    """The motion of the last state that nothing resists, in words, or an empty string.
+
+    Args:
+        system: whose equilibrium is sought.
+        failure: the increment that failed.
+    """
     here = failure.point
     matrix = system.tangent(here.q, here.lam, here.forces).matrix
     try:

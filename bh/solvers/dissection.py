@@ -38,6 +38,11 @@ def dissect(indptr: Ints, indices: Ints, places: Array | None = None) -> Dissect
 
     `places` (v, d) are positions in the flat sheet, if there are any. Cuts follow straight lines there, which are
     short, or lines of equal distance in the graph, which follow cells that are slender or lie on a bow.
+
+    Args:
+        indptr: (n + 1,) where the neighbours of each vertex begin.
+        indices: of the neighbours.
+        places: (n, d) positions in the flat sheet; None if there are none.
     """
     keys = _graph_keys(indptr, indices)
     if places is not None and len(places):

@@ -76,6 +76,12 @@ class Matrix(Protocol):
         """Factor of A, definite or not, and its number of negative eigenvalues (on the constraints' null space).
 
         Raises `IndefiniteError` only where A is singular to rounding.
+
+        Returns:
+            the factor, and the number.
+
+        Raises:
+            IndefiniteError: A is singular to rounding.
         """
         ...
 
@@ -85,7 +91,15 @@ class Matrix(Protocol):
 
 
 def unpermuted(rows: Array, order: Ints) -> Array:
-    """Rows in the order of the unknowns again; `order[k]` is the unknown in row k."""
+    """Rows in the order of the unknowns again; `order[k]` is the unknown in row k.
+
+    Args:
+        rows: (n,) or (n, k), in the order of elimination.
+        order: (n,) unknown of each row.
+
+    Returns:
+        of the shape of `rows`.
+    """
     out = np.empty_like(rows)
     out[order] = rows
     return out

@@ -28,6 +28,18 @@ def locate_zero(
     halves the value of an end that stays (Illinois; Dowell and Jarratt 1971).
 
     Returns the point, its imbalance and the iterations, or None if the path between the two is lost.
+
+    Args:
+        system: whose equilibrium is sought.
+        a: one end of the path's piece.
+        b: the other end.
+        values: of the goal at both, of different sign.
+        goal: what is to be zero at a point.
+        tolerance: on the goal, in its unit.
+        accuracy: imbalance of the states between, relative.
+
+    Returns:
+        the point, its imbalance and the iterations, or None if the path between the two is lost.
     """
     normal = (b.q - a.q)[: system.primal]
     (low, high), (g_low, g_high) = (a, b), values

@@ -30,6 +30,15 @@ def correct(
 
     `normal` (primal,) is that of the hyperplane in the primal unknowns. Stable or not: the tangent may be indefinite
     (Riks 1979; Wempner 1971; Batoz and Dhatt 1979 for a normal along one unknown).
+
+    Args:
+        system: whose equilibrium is sought.
+        q: (n,) guess of the unknowns.
+        lam: guess of the load parameter.
+        forces: (f,) element forces that go with the guess.
+        normal: (primal,) of the hyperplane, in the primal unknowns.
+        tolerance: relative imbalance that is asked for.
+        most: steps at most.
     """
     p = system.primal
     for iteration in range(most):

@@ -107,13 +107,27 @@ def point(
     evaluation: Evaluation | None = None,
     negative: int | None = None,
 ) -> Point:
-    """The point of a path at given unknowns; `evaluation` is the system's there, if it is known already."""
+    """The point of a path at given unknowns; `evaluation` is the system's there, if it is known already.
+
+    Args:
+        system: whose equilibrium is sought.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+        mode: how the path came there.
+        evaluation: the system's at (q, lam), if it is known already.
+        negative: number of negative modes; None if it is not known.
+    """
     evaluation = evaluation or system.evaluate(q, lam)
     return Point(lam, q, evaluation.forces, evaluation.energy, system.power(q, lam), mode, negative)
 
 
 def power_rate(system: System, here: Point) -> float:
-    """Rate d power / d lambda along the path's own tangent, N mm; nan where the state is critical."""
+    """Rate d power / d lambda along the path's own tangent, N mm; nan where the state is critical.
+
+    Args:
+        system: whose equilibrium is sought.
+        here: of the path.
+    """
     try:
         factor, _ = system.tangent(here.q, here.lam, here.forces).matrix.factorise_any()
     except IndefiniteError:
@@ -123,7 +137,15 @@ def power_rate(system: System, here: Point) -> float:
 
 
 def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:
-    """Unknowns and element forces at `lam` by the polynomial through up to three points (constant, line, parabola)."""
+    """Unknowns and element forces at `lam` by the polynomial through up to three points (constant, line, parabola).
+
+    Args:
+        points: last ones of the path, in order; one to three.
+        lam: where to.
+
+    Returns:
+        (n,) unknowns and (f,) element forces, N or N mm.
+    """
     q, forces = np.zeros_like(points[-1].q), np.zeros_like(points[-1].forces)
     for i, item in enumerate(points):
         weight = 1.0
@@ -140,6 +162,10 @@ def fold_ahead(points: Sequence[Point], primal: int) -> float:
 
     Close to a limit point lambda* - lambda goes with the square of the distance in q, so (d lambda / d q)^2, which is
     a current stiffness parameter (Bergan et al. 1978), falls to zero as a straight line.
+
+    Args:
+        points: last ones of the path, in order.
+        primal: number of unknowns that are no multipliers.
     """
     if len(points) < 3:
         return np.inf

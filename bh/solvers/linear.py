@@ -17,7 +17,12 @@ class LinearSystem(System, Protocol):
     """A system that also knows its second derivative with respect to lambda."""
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """Second derivative of the energy by lambda at fixed q (n,), N mm."""
+        """Second derivative of the energy by lambda at fixed q (n,), N mm.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         ...
 
 
@@ -36,7 +41,16 @@ class LinearResponse:
 
 
 def linear_response(system: LinearSystem, q: Array, lam: float = 0.0) -> LinearResponse:
-    """Linear response of `system` at (q, lam); raises `IndefiniteError` where the state is not stable."""
+    """Linear response of `system` at (q, lam); raises `IndefiniteError` where the state is not stable.
+
+    Args:
+        system: that is asked.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+
+    Raises:
+        IndefiniteError: the state is not stable.
+    """
     now = system.evaluate(q, lam)
     rate = system.control_rate(q, lam)
     dq = -system.tangent(q, lam, now.forces).matrix.factorise().solve(rate)

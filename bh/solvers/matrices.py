@@ -226,7 +226,13 @@ class FreeBodyFactor(Factor):
 
 
 def reverse_cuthill_mckee(rows: Ints, columns: Ints, n: int) -> tuple[Ints, int]:
-    """Order (n,) of small bandwidth for a symmetric pattern, and that bandwidth (order[k] is the old index)."""
+    """Order (n,) of small bandwidth for a symmetric pattern, and that bandwidth (order[k] is the old index).
+
+    Args:
+        rows: of the entries, 0 to n - 1.
+        columns: of the entries, 0 to n - 1.
+        n: number of unknowns.
+    """
     from scipy.sparse.csgraph import reverse_cuthill_mckee as rcm
 
     pattern = sp.coo_array((np.ones(len(rows)), (rows, columns)), shape=(n, n)).tocsr()

@@ -35,6 +35,15 @@ def factorise_shifted(
 
     Neutral modes, such as the phase of the waves of a buckled ring, are first given a stiffness at the level of
     rounding. Returns None where the shift would exceed `largest`.
+
+    Args:
+        matrix: symmetric.
+        shift: the first one tried, in parts of the diagonal.
+        largest: shift at most.
+        least: shift at least.
+
+    Returns:
+        the factor and its shift; None for the factor where the shift would exceed `largest`.
     """
     if shift < 1e-9:
         shift = least
@@ -54,6 +63,16 @@ def lowest_mode(
 
     Inverse iteration with the shifted matrix K + s D (D = |diag K|), started from a fixed pseudo-random vector so that
     the same input gives the same mode. The mode has unit length and its largest component is positive.
+
+    Args:
+        matrix: symmetric.
+        size: number of unknowns.
+        primal: number of unknowns that are no multipliers.
+        iterations: at most.
+        tolerance: relative change of the quotient at which it ends.
+
+    Raises:
+        IndefiniteError: no shift makes the matrix definite.
     """
     # the penalty of the augmented matrix keeps its low modes in the null space of the constraints
     matrix = matrix.augmented if isinstance(matrix, MultiplierMatrix) else matrix
@@ -75,6 +94,12 @@ def nearest_mode(matrix: Matrix, size: int, primal: int, iterations: int = 6) ->
     """(size,) mode of the eigenvalue nearest to zero, of unit length in its displacements, largest component positive.
 
     Inverse iteration with the matrix as it is, definite or not: for tangents that are nearly singular.
+
+    Args:
+        matrix: symmetric.
+        size: number of unknowns.
+        primal: number of unknowns that are no multipliers.
+        iterations: at most.
     """
     factor, _ = matrix.factorise_any()
     mode = np.zeros(size)

@@ -391,7 +391,15 @@ def _solve(L, start, border_start, border, panel, x, y, blas, whole, real):  # t
 
 
 def factorise(data: Array, f: Fronts) -> tuple[Array, int]:
-    """Factor of the lower values `data`, and its number of negative pivots (-1: a pivot is zero)."""
+    """Factor of the lower values `data`, and its number of negative pivots (-1: a pivot is zero).
+
+    Args:
+        data: (k,) values of the lower triangle, in the order of elimination.
+        f: fronts of the pattern.
+
+    Returns:
+        (l,) the factor, front by front; and the number.
+    """
     L = np.zeros(int(f.panel[-1]))
     rows = f.rows
     widest = int((rows * np.diff(f.start)).max(initial=1))
@@ -403,7 +411,13 @@ def factorise(data: Array, f: Fronts) -> tuple[Array, int]:
 
 
 def solve(L: Array, f: Fronts, b: Array) -> Array:
-    """Solution (n,) or (n, k) in the order of elimination."""
+    """Solution (n,) or (n, k) in the order of elimination.
+
+    Args:
+        L: (l,) from `factorise`.
+        f: fronts of the pattern.
+        b: (n,) or (n, k) right-hand sides, in the order of elimination.
+    """
     room = np.empty(int(f.rows.max(initial=1)))
     x = np.array(b, dtype=float, order="F")
     for column in x.T if x.ndim == 2 else (x,):

@@ -81,6 +81,13 @@ class Newton:
         """Equilibrium at `lam` from the guess `q`; `forces` are the element forces that go with the guess.
 
         `second_guess` makes another one, tried by full Newton before the globalised way.
+
+        Args:
+            system: whose equilibrium is sought.
+            q: (n,) guess.
+            lam: load parameter of the step, 0 to 1.
+            forces: (f,) element forces that go with the guess; None for those of the system there.
+            second_guess: makes unknowns and forces of another guess.
         """
         first = self.solve_full(system, q, lam, forces)
         if not first.converged and second_guess is not None:
@@ -100,7 +107,14 @@ class Newton:
         return self._finish(system, q, lam, now, second.iterations + steps, globalised=True)
 
     def solve_full(self, system: System, q: Array, lam: float, forces: Array | None = None) -> Solution:
-        """Full steps with independent forces; gives up on an indefinite tangent or when it runs away."""
+        """Full steps with independent forces; gives up on an indefinite tangent or when it runs away.
+
+        Args:
+            system: whose equilibrium is sought.
+            q: (n,) guess.
+            lam: load parameter of the step, 0 to 1.
+            forces: (f,) element forces that go with the guess; None for those of the system there.
+        """
         now = system.evaluate(q, lam)
         forces = now.forces if forces is None else forces
         least, before = now.imbalance, np.inf
@@ -139,7 +153,13 @@ class Newton:
             return None
 
     def solve_globalised(self, system: System, q: Array, lam: float) -> Solution:
-        """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns."""
+        """Minimise the energy: shifted Newton with an Armijo line search in the primal unknowns.
+
+        Args:
+            system: whose equilibrium is sought.
+            q: (n,) guess.
+            lam: load parameter of the step, 0 to 1.
+        """
         now = system.evaluate(q, lam)
         shift, least, before = 0.0, ROUNDED, np.inf
         for iteration in range(self.globalised):
@@ -210,6 +230,16 @@ def roll_off(
     """From next to a saddle down along the direction of most negative curvature, as far as the merit falls.
 
     None where no curvature is negative but for rounding (More and Sorensen 1979 use such steps).
+
+    Args:
+        system: whose equilibrium is sought.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+        now: the system's evaluation there.
+        matrix: its tangent.
+
+    Returns:
+        (n,) unknowns and their evaluation, or None.
     """
     p = system.primal
     try:
@@ -233,7 +263,19 @@ def roll_off(
 def full_step(
     system: System, q: Array, lam: float, now: Evaluation, dq: Array
 ) -> tuple[Array, Evaluation, float] | None:
-    """Newton's whole step where it at least halves the imbalance; close to a solution it does far better."""
+    """Newton's whole step where it at least halves the imbalance; close to a solution it does far better.
+
+    Args:
+        system: whose equilibrium is sought.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+        now: the system's evaluation there.
+        dq: (n,) Newton's step.
+
+    Returns:
+        (n,) unknowns, their evaluation and the part of the step that was taken; None where the imbalance does not
+        halve.
+    """
     there = system.evaluate(q + dq, lam)
     return (q + dq, there, 1.0) if there.imbalance < 0.5 * now.imbalance else None
 
@@ -244,6 +286,16 @@ def line_search(
     """Step along a direction that lowers the merit enough (Armijo); None if there is none.
 
     Multipliers are changed before and held while looking.
+
+    Args:
+        system: whose equilibrium is sought.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+        now: the system's evaluation there.
+        descent: the direction and its slopes.
+
+    Returns:
+        (n,) unknowns, their evaluation and the part of the step that was taken, or None.
     """
     p = system.primal
     dq, slope = descent.direction, descent.slope

@@ -100,7 +100,14 @@ class Handle:
         weakref.finalize(self, _release, self.memory, len(indptr) - 1, self.options).atexit = False
 
     def call(self, phase: int, data: Array, b: Array | None = None, x: Array | None = None) -> int:
-        """Run one phase; PARDISO's error, 0 if there was none."""
+        """Run one phase; PARDISO's error, 0 if there was none.
+
+        Args:
+            phase: as PARDISO counts them.
+            data: (k,) values of the matrix.
+            b: (n,) or (n, k) right-hand sides.
+            x: of the shape of `b`; the solution is written there.
+        """
         return _call(self.memory, self.options, phase, len(self.indptr) - 1, data, self.indptr, self.indices,
                      self.order, b, x)  # fmt: skip
 
@@ -145,6 +152,16 @@ class Analysis:
         """Factor of the matrix with the lower values `data`, and its number of negative eigenvalues.
 
         Raises `IndefiniteError` where it is singular to rounding.
+
+        Args:
+            data: (k,) values of the lower triangle.
+            order: (n,) unknown of each row.
+
+        Returns:
+            the factor, and the number.
+
+        Raises:
+            IndefiniteError: the matrix is singular to rounding.
         """
         try:
             handle = self._spare.pop()

@@ -31,7 +31,17 @@ class PseudoTransient:
     largest: float = 1e8
 
     def relax(self, system: System, q: Array, lam: float, tolerance: float) -> tuple[Array, Evaluation, int]:
-        """State, its evaluation and the number of steps taken; at rest where the imbalance is within `tolerance`."""
+        """State, its evaluation and the number of steps taken; at rest where the imbalance is within `tolerance`.
+
+        Args:
+            system: whose equilibrium is sought.
+            q: (n,) unknowns to begin with.
+            lam: load parameter of the step, 0 to 1.
+            tolerance: relative imbalance of a state at rest.
+
+        Returns:
+            (n,) unknowns, their evaluation, and the steps.
+        """
         p = system.primal
         now = system.evaluate(q, lam)
         shift, steps = self.shift, 0

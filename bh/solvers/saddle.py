@@ -55,7 +55,11 @@ class ConstraintRows:
         return out
 
     def sizes(self, x: Array) -> Array:
-        """Sums of |G_ij x_j|: rounding errors of `times` go with them."""
+        """Sums of |G_ij x_j|: rounding errors of `times` go with them.
+
+        Returns:
+            (c,) sums, one a constraint.
+        """
         out = np.empty(len(self.values))
         _times(np.abs(self.values), self.columns, np.abs(x), out)
         return out
@@ -200,7 +204,14 @@ class DenseSchurFactor(Factor):
 
     @classmethod
     def of(cls, factor: Factor, G: ConstraintRows, gamma: Array, compliance: Array) -> DenseSchurFactor:
-        """The factor of a saddle, from one of its augmented block A."""
+        """The factor of a saddle, from one of its augmented block A.
+
+        Args:
+            factor: of the augmented block A.
+            G: rows of the constraints.
+            gamma: (c,) weights of the augmentation.
+            compliance: (c,) of the constraints.
+        """
         scale = 1.0 - gamma * compliance
         rows = G.dense()
         influence = factor.solve(np.ascontiguousarray(rows.T))

@@ -31,6 +31,10 @@ def band_is_cheaper(n: int, bandwidth: int) -> bool:
 
     Per unknown the band costs 3e-11 (b + 1)^2 s and more for narrow ones, the sparse factor about 1e-6 s on sheets of
     that width, whatever their length; on sheets of 1,000 to 50,000 unknowns the two meet at b = 140 to 220.
+
+    Args:
+        n: number of unknowns.
+        bandwidth: half-bandwidth b.
     """
     return bandwidth <= WIDEST and 8 * n * (bandwidth + 1) < 2e9
 
@@ -103,6 +107,10 @@ class SparseMatrix:
     @classmethod
     def of(cls, matrix: sp.sparray, pattern: SparsePattern | None = None) -> SparseMatrix:
         """From any symmetric matrix (n, n), both triangles given; `pattern` is that of an earlier one with its entries.
+
+        Args:
+            matrix: (n, n), symmetric.
+            pattern: of an earlier matrix with the same entries; None to find one.
 
         Raises:
             ValueError: the matrix has other entries than the pattern.

@@ -22,6 +22,15 @@ def leave_saddle(system: System, saddle: Solution, lam: float, newton: Newton) -
 
     Both senses of the mode are tried where they are not mirror images, and the state of lower energy is taken.
     Returns the stable state and a note; if none of lower energy is found, the saddle itself and an empty note.
+
+    Args:
+        system: whose equilibrium is sought.
+        saddle: unstable equilibrium.
+        lam: load parameter of the step, 0 to 1.
+        newton: settings of the way down.
+
+    Returns:
+        the stable state and a note; the saddle itself and an empty note if none of lower energy is found.
     """
     tangent = system.tangent(saddle.q, lam, saddle.evaluation.forces)
     _, mode = lowest_mode(tangent.matrix, len(saddle.q), system.primal)
@@ -60,6 +69,17 @@ def locate(
     States between are found on hyperplanes normal to the chord, so that limit points are no obstacle. `width` is the
     last interval in parts of the chord. Points that cannot be bracketed (another branch comes in between) are left
     out: a point that is returned has been seen from both sides.
+
+    Args:
+        system: whose equilibrium is sought.
+        a: one end of the path's piece.
+        b: the other end.
+        negative: numbers of negative modes at both.
+        tolerance: relative imbalance of the states between.
+        width: last interval, in parts of the chord.
+
+    Returns:
+        the points in order along the path.
     """
     found: list[CriticalPoint] = []
     low, high, before = (a, 0.0), (b, 1.0), negative[0]

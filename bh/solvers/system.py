@@ -100,7 +100,12 @@ class System(Protocol):
         ...
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
-        """Energy, its gradient and the element forces at unknowns q (n,)."""
+        """Energy, its gradient and the element forces at unknowns q (n,).
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         ...
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
@@ -108,35 +113,83 @@ class System(Protocol):
 
         With `forces` of `evaluate(q, lam)` its matrix is the Hessian; with those that the tangent before had predicted
         it is that of Newton's method with independent forces (Magisano, Leonetti and Garcea 2017).
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+            forces: (f,) element forces of the geometric part.
         """
         ...
 
     def control_rate(self, q: Array, lam: float) -> Array:
-        """(n,) d residual / d lambda at fixed q."""
+        """(n,) d residual / d lambda at fixed q.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         ...
 
     def power(self, q: Array, lam: float) -> float:
-        """Rate of work of the actuation, d energy / d lambda at fixed q, N mm."""
+        """Rate of work of the actuation, d energy / d lambda at fixed q, N mm.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         ...
 
     def control_stiffness(self, q: Array, lam: float) -> float:
-        """Second derivative of the energy by lambda at fixed q, N mm."""
+        """Second derivative of the energy by lambda at fixed q, N mm.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         ...
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Why an increment from one state to the next is not to be trusted, or an empty string."""
+        """Why an increment from one state to the next is not to be trusted, or an empty string.
+
+        Args:
+            q: (n,) unknowns of the state before.
+            lam: its load parameter.
+            q_new: (n,) unknowns of the state after.
+            lam_new: its load parameter.
+        """
         ...
 
     def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """What passed through itself between two states, which no increment may, or an empty string."""
+        """What passed through itself between two states, which no increment may, or an empty string.
+
+        Args:
+            q: (n,) unknowns of the state before.
+            lam: its load parameter.
+            q_new: (n,) unknowns of the state after.
+            lam_new: its load parameter.
+        """
         ...
 
     def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
-        """Outcome and reason where the state itself tells why a path ends (contact, ...), else None."""
+        """Outcome and reason where the state itself tells why a path ends (contact, ...), else None.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            the outcome and one line, or None.
+        """
         ...
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
-        """A motion (n,) of the unknowns in words, such as "crease 'a' turns freely"."""
+        """A motion (n,) of the unknowns in words, such as "crease 'a' turns freely".
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+            motion: (n,) of any length.
+        """
         ...
 
 

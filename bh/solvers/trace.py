@@ -18,7 +18,11 @@ class Strategy(Protocol):
     """How a step is walked: load control, arc length, or one that chooses."""
 
     def limits(self, system: System) -> tuple[float, float]:
-        """First and largest increment of lambda for a system."""
+        """First and largest increment of lambda for a system.
+
+        Returns:
+            two numbers in (0, 1].
+        """
         ...
 
     def follow(
@@ -31,6 +35,12 @@ class Strategy(Protocol):
         """Accepted increments from the last of up to three points to lambda = 1, or one failure last.
 
         `increment` is the next one to try, `origin` the point that the step began with, where they are known.
+
+        Args:
+            system: whose equilibrium is sought.
+            history: last points of the path, in order; one to three.
+            increment: of lambda, to be tried first; None to choose it.
+            origin: point that the step began with; None if it is the last of the history.
         """
         ...
 

@@ -199,7 +199,11 @@ def snapped(path: Path) -> bool:
 
 
 def mark_doubtful(trials: Sequence[Trial]) -> list[Trial]:
-    """The trials, marked where one snapped and the next mesh of its formulation, which was reached, did not."""
+    """The trials, marked where one snapped and the next mesh of its formulation, which was reached, did not.
+
+    Returns:
+        the trials in order.
+    """
     found = list(trials)
     for k, trial in enumerate(found):
         after = next((t for t in found[k + 1 :] if t.formulation == trial.formulation), None)
@@ -211,7 +215,15 @@ def mark_doubtful(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def trusted(trials: Sequence[Trial], name: str) -> list[Array]:
-    """Values of a formulation that an estimate may be made of, coarse to fine."""
+    """Values of a formulation that an estimate may be made of, coarse to fine.
+
+    Args:
+        trials: coarse to fine.
+        name: of the formulation.
+
+    Returns:
+        one vector a trial.
+    """
     return [t.value for t in trials if t.formulation == name and not t.doubtful]
 
 
@@ -241,6 +253,9 @@ def estimate(values: Sequence[Array], nothing: float = 0.0) -> tuple[float, floa
 
 def candidates(halves: bool = False) -> dict[str, Refinement]:
     """The formulations that say on which meshes they converge; those only that can be solved by `halves`, if asked.
+
+    Returns:
+        how each refines, by name.
 
     Raises:
         ModelError: there is none.
@@ -273,7 +288,18 @@ def _check(model: Model, goal: Goal) -> None:
 
 
 def reading(path: Path, goal: Goal) -> Array:
-    """The goal at the last state, as a vector."""
+    """The goal at the last state, as a vector.
+
+    Args:
+        path: that reached its end.
+        goal: what is measured.
+
+    Returns:
+        (k,) in the goal's own unit.
+
+    Raises:
+        ModelError: the place is held in the direction of the goal and has no stiffness there.
+    """
     state = path[-1]
     if goal.of == "energy":
         return np.array([state.energy.total])
@@ -289,7 +315,12 @@ def reading(path: Path, goal: Goal) -> Array:
 
 
 def nothing(model: Model, goal: Goal) -> float:
-    """The size below which a goal is none."""
+    """The size below which a goal is none.
+
+    Args:
+        model: of the sheet.
+        goal: what is measured.
+    """
     return NOTHING * model.sheet.E * model.sheet.t**3 if goal.of == "energy" else 0.0
 
 

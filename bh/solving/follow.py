@@ -42,6 +42,15 @@ def follow(
 ) -> Path:
     """Follow the equilibrium of a model on its own mesh through all its steps; arguments as of `bh.trace`.
 
+    Args:
+        model: sheet, supports and steps.
+        symmetry: "x" or "y" to solve one half.
+        progress: True for a line on stderr, or a meter.
+        strategy: chooses increments.
+        file: path file that every state is written to.
+        resume: go on from what the file has.
+        after: path whose end this one begins at.
+
     Returns:
         the path up to where it got.
 

@@ -38,7 +38,14 @@ def add_estimate(
     strategy: Strategy | None = None,
     symmetry: Plane | None = None,
 ) -> None:
-    """Give a path its `accuracy`, of the energy, or the `estimate_reason` why it has none."""
+    """Give a path its `accuracy`, of the energy, or the `estimate_reason` why it has none.
+
+    Args:
+        path: that is solved.
+        progress: as of `bh.trace`.
+        strategy: as the path was solved with.
+        symmetry: as the path was solved with.
+    """
     began = time.perf_counter()
     why = _why_not(path)
     cells = path.model.mesh.cells

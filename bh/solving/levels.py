@@ -45,7 +45,12 @@ class Levels:
             ) from error
 
     def file(self, formulation: str, cells: Cells) -> FilePath:
-        """The path file of a mesh: `consistent-64-x-4-staggered-cells.bh`."""
+        """The path file of a mesh: `consistent-64-x-4-staggered-cells.bh`.
+
+        Args:
+            formulation: its name.
+            cells: of the mesh.
+        """
         words = re.sub(r"[^A-Za-z0-9.]+", "-", f"{formulation} {cells}").strip("-")
         return self.folder / f"{words}.bh"
 
@@ -64,7 +69,12 @@ def remove(folder: FilePath) -> None:
 
 
 def move(old: FilePath, new: FilePath) -> None:
-    """Put the meshes of a run in the place of those of an earlier one."""
+    """Put the meshes of a run in the place of those of an earlier one.
+
+    Args:
+        old: folder of this run.
+        new: folder of the earlier run, which it replaces.
+    """
     if old.is_dir():
         remove(new)
         with contextlib.suppress(OSError):

@@ -41,6 +41,13 @@ class Ladder:
         Where the mesh cannot be made for the formulation, the next choice is taken. All meshes of a ladder that was
         begun are of one choice, as an estimate needs them.
 
+        Args:
+            step: number of the mesh.
+            how: solves a model on it.
+
+        Returns:
+            the path and the cells of its mesh.
+
         Raises:
             MeshError: no mesh of this pattern can be made for the formulation (what was wrong with the first), or the
                 ladder was begun and its next mesh cannot be made.

@@ -54,7 +54,13 @@ class Race:
         return self.options[name].level(self.goal.within) / 4.0
 
     def judge(self, name: str, trials: Sequence[Trial], errors: Sequence[float]) -> None:
-        """Give a formulation up that is of no use after its last trial; `errors` are its estimates so far."""
+        """Give a formulation up that is of no use after its last trial; `errors` are its estimates so far.
+
+        Args:
+            name: of the formulation.
+            trials: its own, coarse to fine.
+            errors: estimates of its error, relative.
+        """
         own = [trial for trial in trials if trial.formulation == name]
         finer = 4 * own[-1].triangles
         if all(trial.outcome is not Outcome.REACHED for trial in own[-LOST:]) and len(own) >= LOST:
@@ -66,7 +72,12 @@ class Race:
             self.out[name] = f"the next mesh of {name} has some {finer:,} triangles, more than {most:,}"
 
     def too_long(self, trials: Sequence[Trial], spent: float) -> str:
-        """Why the level that `next` has just named is not begun, empty where there is the time for it."""
+        """Why the level that `next` has just named is not begun, empty where there is the time for it.
+
+        Args:
+            trials: of the formulation, coarse to fine.
+            spent: seconds so far.
+        """
         if self.goal.seconds is None or not trials:
             return ""
         name = next(reversed(self.tried))

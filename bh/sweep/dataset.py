@@ -87,6 +87,10 @@ def dataset(
 def save(data: Dataset, file: Path) -> None:
     """Write a data set; it appears whole or not at all.
 
+    Args:
+        data: that is written.
+        file: its place.
+
     Raises:
         SweepError: the place cannot be written to.
     """

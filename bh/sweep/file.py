@@ -44,7 +44,11 @@ class AxisTable(Table):
         return self
 
     def expanded(self) -> list[Value]:
-        """The values."""
+        """The values.
+
+        Returns:
+            the values in order.
+        """
         if self.values is not None:
             return list(self.values)
         assert self.start is not None

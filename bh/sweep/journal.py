@@ -56,6 +56,10 @@ class Journal:
     def create(cls, file: Path, meta: Meta) -> Journal:
         """Begin a new journal; an old one of that name is replaced.
 
+        Args:
+            file: its place.
+            meta: what the sweep is of.
+
         Raises:
             SweepError: the folder cannot be written.
         """

@@ -28,7 +28,12 @@ class Pool(Protocol):
         """How many tasks run at the same time."""
 
     def submit(self, function: Callable[..., Result], *args: object) -> Future[Result]:
-        """Have a worker call `function(*args)`."""
+        """Have a worker call `function(*args)`.
+
+        Args:
+            function: that can be pickled.
+            *args: for it, that can be pickled.
+        """
 
     def lost(self, error: BaseException) -> str:
         """Why a task came to nothing by no fault of its own: "worker" (it died), "pool" (all are gone), or ""."""

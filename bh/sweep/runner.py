@@ -22,7 +22,15 @@ class Meter(Protocol):
     """Told about every finished task: points done of all, how many of them failed, done in this run, its seconds."""
 
     def update(self, done: int, total: int, failed: int, now: int, seconds: float) -> None:
-        """Report points done of all, how many of them failed, how many were done in this run, and its seconds."""
+        """Report points done of all, how many of them failed, how many were done in this run, and its seconds.
+
+        Args:
+            done: points that are done.
+            total: points of the sweep.
+            failed: points that failed.
+            now: points done in this run.
+            seconds: of this run.
+        """
 
     def close(self) -> None:
         """The sweep has ended, or was stopped."""
@@ -70,6 +78,9 @@ def jobs(indices: Sequence[int], chunk: int) -> list[Job]:
     Args:
         indices: of the points to do.
         chunk: points a job.
+
+    Returns:
+        the jobs in order.
 
     Raises:
         SweepError: a chunk of less than one point.

@@ -99,7 +99,11 @@ class SceneTask:
         return Measured(self.measure(path))
 
     def line(self, points: Sequence[Mapping[str, Value]]) -> list[Measured] | None:
-        """All points of a line by warm starts, or None where one of them cannot be or is not reached."""
+        """All points of a line by warm starts, or None where one of them cannot be or is not reached.
+
+        Returns:
+            one for each point, in order, or None.
+        """
         if not self.warm:
             return None
         from bh.sweep.warm import line
@@ -115,7 +119,11 @@ class SceneTask:
         return [Measured(self.measure(path)) for path in paths] if reached else None
 
     def measure(self, path: Trace) -> dict[str, object]:
-        """Energies in N mm, dihedral angles of the creases in rad, positions in mm, and what it took."""
+        """Energies in N mm, dihedral angles of the creases in rad, positions in mm, and what it took.
+
+        Returns:
+            values by name.
+        """
         state, mesh = path[-1], path.model.mesh
         energy = state.energy.as_dict()
         found: dict[str, object] = {f"energy_{kind}": energy[kind] for kind in ENERGIES}
@@ -140,7 +148,11 @@ class SceneTask:
         return found
 
     def labelled(self) -> dict[str, Label]:
-        """Units and texts of what is measured, where they are known beforehand."""
+        """Units and texts of what is measured, where they are known beforehand.
+
+        Returns:
+            labels by name.
+        """
         known = {f"energy_{kind}": Label("N mm", f"{kind} energy") for kind in ENERGIES}
         for place in self.places:
             known[f"points_{word(place)}"] = Label(

@@ -48,7 +48,12 @@ def line(models: Sequence[Model]) -> list[Path]:
 
 
 def same(one: Path, other: Path) -> bool:
-    """Whether two paths end in one state: all nodes within `SAME` of the sheet's size."""
+    """Whether two paths end in one state: all nodes within `SAME` of the sheet's size.
+
+    Args:
+        one: a path of the model.
+        other: another one.
+    """
     if not one.reached or not other.reached:
         return False
     apart = np.abs(one[-1].points - other[-1].points).max()

@@ -46,6 +46,9 @@ def sides_of(faces: Sequence[Face]) -> dict[Side, list[int]]:
 def faces_of_graph(frame: Frame) -> list[Face]:
     """The bounded faces of a plane graph, without the holes that B edges outline.
 
+    Returns:
+        the faces, each with its rings of vertices.
+
     Raises:
         FileFormatError: the frame lies in space, its edges cross or hang loose, or B edges enclose nothing.
     """
@@ -181,6 +184,10 @@ def area(xy: Array, face: Face) -> float:
     """Signed area of a face, counter-clockwise positive, in the square of the unit of `xy` (n, 2).
 
     It is taken from the first vertex, lest far-off sheets lose digits.
+
+    Args:
+        xy: (n, 2) in any unit.
+        face: rings of vertices.
     """
     total = 0.0
     for ring in face:

@@ -90,6 +90,9 @@ def laid_flat(frame: Frame) -> Frame:
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
     """The JSON object at the top of a FOLD file.
 
+    Returns:
+        the object, as JSON has it.
+
     Raises:
         FileFormatError: the file cannot be read, or is not a JSON object.
     """
@@ -126,6 +129,9 @@ def select(data: dict[str, Any], frame: int | str | None) -> dict[str, Any]:
         data: the top of the file.
         frame: 0 for the key frame, i + 1 for file_frames[i], or the frame_title of one; None for the first frame that
             has vertices and is no folded form, or the first that has vertices where all are.
+
+    Returns:
+        the keys of the frame.
 
     Raises:
         FileFormatError: there is no such frame, or frames inherit in a circle.
@@ -295,5 +301,10 @@ def show(value: object) -> str:
 
 
 def side(a: int, b: int) -> Side:
-    """The pair of two vertices, the smaller one first."""
+    """The pair of two vertices, the smaller one first.
+
+    Args:
+        a: vertex.
+        b: vertex.
+    """
     return (a, b) if a < b else (b, a)

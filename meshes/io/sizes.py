@@ -37,6 +37,9 @@ def size_remarks(size: float, stated: bool) -> list[str]:
     Args:
         size: mm.
         stated: whether the file names its unit.
+
+    Returns:
+        the lines, none where there is nothing to say.
     """
     if not absurd(size):
         return []

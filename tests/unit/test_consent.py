@@ -329,3 +329,16 @@ def test_a_drawn_name_is_printed_plainly(tmp_path: FilePath, capsys: pytest.Capt
     scene = write(tmp_path, DRAWN.replace("FILE", "sheet.svg"))
     assert main(["check", str(scene), "--no-picture"]) == 0
     assert all(line.isprintable() for line in capsys.readouterr().out.splitlines())
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="has no pipes with names")
+@pytest.mark.parametrize("name", ["scene.toml", "sheet.svg", "sheet.dxf"])
+def test_a_pipe_is_refused_at_once(name: str, tmp_path: FilePath, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(tmp_path / name)
+    scene = tmp_path / "scene.toml"
+    if name != "scene.toml":
+        write(tmp_path, DRAWN.replace("FILE", name))
+    assert main(["check", str(scene), "--no-picture"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "is a pipe" in said

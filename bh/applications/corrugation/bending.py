@@ -298,6 +298,9 @@ def lid(folded: Folded, points: Array, along: Array, across: Array, half: float)
         along: (3,) unit vector along the bar.
         across: (3,) unit vector along the span.
         half: half the width of the bar, mm.
+
+    Returns:
+        the slope and the height, mm.
     """
     under = _under(folded, points, across, half)
     w = under @ along

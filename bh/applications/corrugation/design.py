@@ -38,7 +38,12 @@ class Design:
     panels: int
 
     def pattern(self, area: float, aspect: float = 1.0) -> CreasePattern:
-        """The pattern with a flat area (mm^2) and H / W = `aspect`."""
+        """The pattern with a flat area (mm^2) and H / W = `aspect`.
+
+        Args:
+            area: of the flat sheet, mm^2.
+            aspect: height over width, H / W.
+        """
         unit = curved_corrugation(self.exponent, self.root, self.spread, 100.0, 100.0 * aspect, self.panels)
         scale = math.sqrt(area / sheet_area(unit))
         size = 100.0 * scale

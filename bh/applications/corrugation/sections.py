@@ -50,6 +50,9 @@ def rectangles(segments: Array, thickness: float) -> tuple[float, float]:
     Args:
         segments: (k, 2, 2) ends (along the section, height) of the middle line of each rectangle, mm.
         thickness: of the sheet, mm.
+
+    Returns:
+        the second moment and the area.
     """
     if len(segments) == 0:
         return 0.0, 0.0

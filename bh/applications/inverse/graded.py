@@ -83,6 +83,9 @@ class Graded:
             k0: (...) curvatures before folding, 1/mm.
             length: (...), mm.
             intensity: (...) in [0, 1].
+
+        Returns:
+            broadcast from the arguments.
         """
         k0, length, a = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (k0, length, intensity)))
         at = np.clip(length, *self.full.domain.length)
@@ -133,7 +136,12 @@ class ReachGraded:
         return s * self.graded.full.domain.largest_curvature(length), length, a
 
     def residuals(self, x: Array, on: NDArray[np.bool_]) -> Array:
-        """(N, 3) from the target to the ends, mm."""
+        """(N, 3) from the target to the ends, mm.
+
+        Args:
+            x: (N, m) candidates.
+            on: of no use here.
+        """
         del on  # nothing is switched here
         found: Array = self.graded.forward(*self.split(x))[0][..., -1, :] - self.target
         return found
@@ -149,6 +157,9 @@ class ReachGraded:
             starts: random designs.
             polished: how many of the nearest ones are polished.
             seed: the same seed gives the same design.
+
+        Returns:
+            the variables (3 n,), and their distance, mm.
         """
         rng = np.random.default_rng([seed, self.n])
         x = self.lower + (self.upper - self.lower) * rng.random((starts, 3 * self.n))

@@ -36,7 +36,15 @@ class Problem(Protocol):
         """Number of switches, b."""
 
     def evaluate(self, x: Array, on: Bools) -> tuple[Array, Array]:
-        """Values (N,) and violations (N,), 0 where allowed, of candidates x (N, m) and on (N, b)."""
+        """Values (N,) and violations (N,), 0 where allowed, of candidates x (N, m) and on (N, b).
+
+        Args:
+            x: (N, m) candidates.
+            on: (N, b) what is switched on.
+
+        Returns:
+            values (N,), and violations (N,), not negative.
+        """
 
 
 @dataclass(frozen=True, eq=False)

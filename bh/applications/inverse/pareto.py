@@ -48,6 +48,9 @@ def pareto(
         starts: library designs that each search begins with, for each number of segments.
         books: libraries to take; those of the shipped data set where there is none of a number of segments.
 
+    Returns:
+        the creases, with their lengths and distances, mm.
+
     Raises:
         DesignError: the target is no point, or nothing ends within the largest allowance.
     """

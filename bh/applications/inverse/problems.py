@@ -49,11 +49,19 @@ class Design:
         return Design(-self.k0, self.length, self.pinched)
 
     def lists(self) -> tuple[list[float], list[float], list[bool]]:
-        """Curvatures, lengths and pinches as plain lists: the arguments of `simulate`."""
+        """Curvatures, lengths and pinches as plain lists: the arguments of `simulate`.
+
+        Returns:
+            (n,) each: 1/mm, mm, and truth values.
+        """
         return self.k0.tolist(), self.length.tolist(), self.pinched.tolist()
 
     def rows(self) -> list[dict[str, float | bool]]:
-        """A plain description, one entry a segment."""
+        """A plain description, one entry a segment.
+
+        Returns:
+            the entries in order along the crease.
+        """
         each = zip(self.k0, self.length, self.pinched, strict=True)
         return [{"k0": float(k), "length": float(s), "pinched": bool(f)} for k, s, f in each]
 
@@ -226,6 +234,9 @@ class ReachPoint(_Segments):
         Args:
             x: (..., 2 n) variables.
             on: (..., n) pinches.
+
+        Returns:
+            the ends, mm.
         """
         return self.surrogate.forward(*self.split(x), on, check=False)[0][..., -1, :]
 
@@ -234,6 +245,11 @@ class ReachPoint(_Segments):
         return np.linalg.norm(self.end(x, on) - self.target, axis=-1), self.violation(x, on)
 
     def residuals(self, x: Array, on: Bools) -> Array:
-        """(N, 3) from the target to the ends, mm."""
+        """(N, 3) from the target to the ends, mm.
+
+        Args:
+            x: (N, 2 n) variables.
+            on: (N, n) pinches.
+        """
         found: Array = self.end(x, on) - self.target
         return found

@@ -69,6 +69,9 @@ class Library:
         Args:
             target: (3,), mm.
             count: candidates at most.
+
+        Returns:
+            variables (2 n,) and pinches (n,) of one candidate after another.
         """
         x, on, _ = self.designs
         near = self.tree.query(target, k=min(count, len(x)), distance_upper_bound=REACH[min(self.n, 3)])[1]

@@ -35,7 +35,11 @@ class Domain:
     fold: float = 0.5 * math.pi
 
     def curvature(self, k0: ArrayLike) -> Array:
-        """Curvature after folding, 1/mm (Eq. 6.6)."""
+        """Curvature after folding, 1/mm (Eq. 6.6).
+
+        Returns:
+            of the shape of `k0`.
+        """
         return np.asarray(k0, dtype=float) / math.sin(0.5 * self.fold)
 
     def holds(self, k0: ArrayLike, length: ArrayLike, slack: float = 1e-9) -> NDArray[np.bool_]:
@@ -45,6 +49,9 @@ class Domain:
             k0: curvatures before folding, 1/mm.
             length: mm.
             slack: relative, on every bound.
+
+        Returns:
+            broadcast from `k0` and `length`.
         """
         k0, length = np.asarray(k0, dtype=float), np.asarray(length, dtype=float)
         low, high = self.length
@@ -56,7 +63,11 @@ class Domain:
         )
 
     def largest_curvature(self, length: ArrayLike) -> Array:
-        """Largest |k0| of segments of some lengths, 1/mm."""
+        """Largest |k0| of segments of some lengths, 1/mm.
+
+        Returns:
+            of the shape of `length`.
+        """
         bound = self.sector * math.sin(0.5 * self.fold) / np.asarray(length, dtype=float)
         return np.minimum(self.k0, bound)
 
@@ -87,6 +98,14 @@ def folded_transforms(k0: ArrayLike, length: ArrayLike, fold: float = 0.5 * math
     """Local translations (..., 3), mm, and rotations (..., 3, 3) of segments that are not pinched.
 
     The arguments are those of `folded`.
+
+    Args:
+        k0: (...) curvatures before folding, 1/mm.
+        length: (...), mm.
+        fold: dihedral angle, rad.
+
+    Returns:
+        the translations and the rotations.
     """
     t, uvw = folded(k0, length, fold)
     return t, matrix(uvw)

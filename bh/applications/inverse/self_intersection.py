@@ -104,7 +104,14 @@ class Swept:
         return found
 
     def meets(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> bool:
-        """Whether one design, (n,) each, meets itself, flat, folded or pinched."""
+        """Whether one design, (n,) each, meets itself, flat, folded or pinched.
+
+        Args:
+            surrogate: of the segments.
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+            pinched: (n,).
+        """
         from bh.analysis.contact import candidates
         from bh.analysis.triangles import intersecting
 
@@ -123,7 +130,12 @@ class Swept:
         return False
 
     def flat_is_simple(self, k0: ArrayLike, length: ArrayLike) -> bool:
-        """Whether the flat strip of one design, (n,) each, can be cut out of one sheet."""
+        """Whether the flat strip of one design, (n,) each, can be cut out of one sheet.
+
+        Args:
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+        """
         from meshes import PatternError, parallel_creases
 
         try:
@@ -198,6 +210,9 @@ def allowed(
         k0: (..., n) curvatures before folding, 1/mm.
         length: (..., n), mm.
         pinched: (..., n).
+
+    Returns:
+        not negative.
     """
     total: Array = np.zeros(np.shape(k0)[:-1])
     for rule in rules:

@@ -96,7 +96,11 @@ class Surrogate:
             raise DesignError(f"the data set is incomplete ({error}); make it anew: bh segments") from error
 
     def sector_bound(self, length: ArrayLike) -> Array:
-        """Curvature before folding at which the sector is as large as it may be, 1/mm."""
+        """Curvature before folding at which the sector is as large as it may be, 1/mm.
+
+        Returns:
+            of the shape of `length`.
+        """
         return np.asarray(
             self.domain.sector * math.sin(0.5 * self.setting.fold) / np.asarray(length, dtype=float)
         )
@@ -108,6 +112,9 @@ class Surrogate:
             k0: (...) curvatures before folding, 1/mm.
             length: (...), mm.
             check: refuse segments outside the domain.
+
+        Returns:
+            in mm and rad.
 
         Raises:
             DesignError: a segment outside the domain (unless `check` is off: then it is taken at its edge).
@@ -138,6 +145,9 @@ class Surrogate:
             length: (...), mm.
             pinched: (...) truth values.
             check: refuse pinched segments outside the domain.
+
+        Returns:
+            the translations in mm.
 
         Raises:
             DesignError: a pinched segment outside the domain (unless `check` is off).
@@ -175,6 +185,9 @@ class Surrogate:
         Args:
             k0: (..., n) curvatures before folding, 1/mm.
             length: (..., n), mm.
+
+        Returns:
+            (..., n + 1, 3) points, mm, and (..., n + 1, 3, 3) frames.
         """
         return chain(*folded_transforms(k0, length, self.setting.fold))
 

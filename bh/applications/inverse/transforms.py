@@ -57,6 +57,9 @@ def frame(crease: ArrayLike, left: ArrayLike, right: ArrayLike) -> Array:
         crease: (..., 3) node on the crease, mm.
         left: (..., 3) node on the left edge, mm.
         right: (..., 3) node on the right edge, mm.
+
+    Returns:
+        the unit vectors of the frame.
     """
     p, p_left, p_right = (np.asarray(x, dtype=float) for x in (crease, left, right))
     x = np.cross(p_right - p, p_left - p)
@@ -67,7 +70,12 @@ def frame(crease: ArrayLike, left: ArrayLike, right: ArrayLike) -> Array:
 
 
 def relative(start: tuple[ArrayLike, ArrayLike], end: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Array]:
-    """Translation (..., 3) and rotation (..., 3, 3) from the (point, frame) of a start to that of an end."""
+    """Translation (..., 3) and rotation (..., 3, 3) from the (point, frame) of a start to that of an end.
+
+    Args:
+        start: point (..., 3) and frame (..., 3, 3).
+        end: point (..., 3) and frame (..., 3, 3).
+    """
     (p0, r0), (p1, r1) = (tuple(np.asarray(x, dtype=float) for x in pair) for pair in (start, end))
     back = np.swapaxes(r0, -1, -2)
     return (back @ (p1 - p0)[..., None])[..., 0], back @ r1

@@ -55,6 +55,12 @@ def sheet_elements(
     """Element stiffness of a model in one step; `prescribed_start` and `moment_start` (m,) are what it begins with.
 
     Dihedral angles (rad) and total moments (N mm) of all hinges; moments are zero off creases.
+
+    Args:
+        model: of the sheet.
+        load_step: actuations of the step.
+        prescribed_start: (m,) dihedral angles of all hinges at the start, rad.
+        moment_start: (m,) total moments of all hinges at the start, N mm; zero off creases.
     """
     mesh, sheet = model.mesh, model.sheet
     topology = mesh.topology
@@ -106,7 +112,12 @@ def sheet_elements(
 
 
 def bending_moments(model: Model, angles: Array) -> Array:
-    """(m,) moments, N mm, of all hinges as bending hinges of the sheet at dihedral angles (m,), rad."""
+    """(m,) moments, N mm, of all hinges as bending hinges of the sheet at dihedral angles (m,), rad.
+
+    Args:
+        model: of the sheet.
+        angles: (m,) dihedral angles, rad.
+    """
     topology, points = model.mesh.topology, model.mesh.points
     turn = angles - dihedral_angles(points, topology.hinges)
     if model.stiffness is not None:

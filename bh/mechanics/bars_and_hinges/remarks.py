@@ -53,7 +53,11 @@ MEASURED: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def remarks(model: Model) -> tuple[Remark, ...]:
-    """What to know of a model that bars and hinges solve; empty where there is nothing to say."""
+    """What to know of a model that bars and hinges solve; empty where there is nothing to say.
+
+    Returns:
+        one remark each.
+    """
     looks = (_error, _aspect_ratio, _diagonals, _rows, _rulings, _twisted, _pinched)
     return tuple(remark for look in looks if (remark := look(model)) is not None)
 

@@ -169,6 +169,11 @@ class BarsAndHingesSystem(SupportedSheet):
         """Energy, typical element force, nodal forces (n, 3), element forces (bars, then hinges) and turns (h,), rad.
 
         The turn of a hinge is its dihedral angle less the one at rest.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
         """
         e = self.elements
         f = np.zeros_like(x)
@@ -181,7 +186,12 @@ class BarsAndHingesSystem(SupportedSheet):
         return energy, size, f, forces, turn
 
     def couple(self, q: Array, lam: float) -> Array:
-        """(h,) couples on the hinges, N mm: applied moments, and the multipliers of prescribed creases."""
+        """(h,) couples on the hinges, N mm: applied moments, and the multipliers of prescribed creases.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         couple = self.elements.couple.at(lam)
         if self.elements.prescribed:
             couple[-self.elements.prescribed :] = q[self.primal :]
@@ -277,7 +287,13 @@ class BarsAndHingesSystem(SupportedSheet):
         return total if self.rigid_contact is None else total + self.rigid_contact.control_stiffness(x, lam)
 
     def tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
-        """Tangent of all elements times v (n, 3), in global axes and with no support left out."""
+        """Tangent of all elements times v (n, 3), in global axes and with no support left out.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            v: (nodes, 3) velocities.
+            forces: (f,) element forces of the geometric part, N and N mm.
+        """
         e, bars = self.elements, len(self.elements.bars)
         out = np.zeros_like(x)
         tangent_times(

@@ -47,6 +47,18 @@ class Bending:
         """Energy (N mm), the sum of squared forces (N^2), and whether a hinge is about to close.
 
         Adds the gradient to f (n, 3) and r (rotations,); writes angles and moments.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            alpha: (rotations,) of the edges, rad.
+            rest: (c, a) angles at rest, rad.
+            f: (nodes, 3) N; the gradient is added.
+            r: (rotations,) N mm; the gradient is added.
+            M: (c, a) moments, N mm; written.
+            theta: (c, a) angles less those at rest, rad; written.
+
+        Returns:
+            three numbers.
         """
         p = self.patches
         if self.constant:
@@ -74,13 +86,24 @@ class Bending:
         return np.asarray(0.5 * (B + np.swapaxes(B, 1, 2)))
 
     def angles(self, x: Array, alpha: Array, rest: Array) -> Array:
-        """(c, a) angles at positions x (n, 3) and rotations alpha, rad."""
+        """(c, a) angles at positions x (n, 3) and rotations alpha, rad.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            alpha: (rotations,) of the edges, rad.
+            rest: (c, a) angles at rest, rad.
+        """
         theta = np.empty(self.rotation.shape)
         kernels.bending_angles(x, alpha, self.patches.kind, self.quad, self.ghost, rest, self.rotation, theta)
         return theta
 
     def by_triangle(self, theta: Array, B_triangle: Array) -> Array:
-        """(t,) energies of the triangles, N mm, of which `B_triangle` (t, 3, 3) are the matrices of a linear law."""
+        """(t,) energies of the triangles, N mm, of which `B_triangle` (t, 3, 3) are the matrices of a linear law.
+
+        Args:
+            theta: (c, a) angles less those at rest, rad.
+            B_triangle: (t, 3, 3) N mm.
+        """
         p = self.patches
         out = np.empty(len(B_triangle))
         if not self.constant:

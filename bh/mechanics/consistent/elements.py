@@ -95,10 +95,16 @@ def consistent_elements(
     measure: Measure = smoothed_strain,
     material: Material = LINEAR,
 ) -> ConsistentElements:
-    """Element arrays of a model in one step; `prescribed_start` and `moment_start` (m,) are what creases begin with.
+    """Element arrays of a model in one step.
 
-    Dihedral angles (rad) and total moments (N mm) of all hinges. With a `plane` they are those of the half of a
-    symmetric sheet (`bh.mechanics.shared.mirrored`). `measure` is what measures the strain of the `material`.
+    Args:
+        model: of the sheet.
+        load_step: actuations of the step.
+        prescribed_start: (m,) dihedral angles of all hinges at the start, rad.
+        moment_start: (m,) total moments of all hinges at the start, N mm.
+        plane: of the symmetry, for the half of a sheet (`bh.mechanics.shared.mirrored`); None for all.
+        measure: of the strain.
+        material: laws of strain and of curvature.
 
     Raises:
         ModelError: given element stiffness, or a couple on a crease that is no spring.
@@ -163,7 +169,12 @@ def consistent_elements(
 
 
 def creased(mesh: SheetMesh, law: Ints) -> Bools:
-    """(m,) hinges that are drawn as creases or fold in this step: the strain may jump there, whatever a step does."""
+    """(m,) hinges that are drawn as creases or fold in this step: the strain may jump there, whatever a step does.
+
+    Args:
+        mesh: of the sheet.
+        law: (m,) kind of law of every hinge.
+    """
     topology = mesh.topology
     out = law != SHEET
     for name in mesh.creases:
@@ -176,6 +187,10 @@ def lock_stiffness(model: Model, load_step: LoadStep) -> Array:
     """(m,) stiffness of the locks, N mm / rad: the spring's own or that of uncreased sheet (Eq. 3.11), the larger one.
 
     Held creases follow their angle and have none, nor have hinges that are made closed.
+
+    Args:
+        model: of the sheet.
+        load_step: actuations of the step.
     """
     mesh, topology = model.mesh, model.mesh.topology
     if not model.hinge_lock or len(topology.hinges) == 0:

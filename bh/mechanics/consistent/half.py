@@ -21,7 +21,13 @@ Bools = NDArray[np.bool_]
 
 
 def half_patches(joined: Patches, spring: Bools, plane: Mirror) -> Patches:
-    """The patches that lie in the half, or are their own images, with the energy that belongs to the half."""
+    """The patches that lie in the half, or are their own images, with the energy that belongs to the half.
+
+    Args:
+        joined: patches of the whole sheet.
+        spring: (m,) hinges that are springs.
+        plane: of the mirror symmetry.
+    """
     weight = plane.triangle_weight[joined.members[:, 0]]
     keep = weight > 0.0
     kind, hinge, half_edge = joined.kind[keep], joined.hinge[keep], joined.half_edge[keep]

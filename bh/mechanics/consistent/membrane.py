@@ -81,7 +81,12 @@ class Membrane:
         return self.triangles, self.edges
 
     def weighted(self, triangle: Array, hinge: Array) -> Membrane:
-        """The part of the cells (0: none) that is left of every triangle (t,) and hinge (m,) of the mesh."""
+        """The part of the cells (0: none) that is left of every triangle (t,) and hinge (m,) of the mesh.
+
+        Args:
+            triangle: (t,) part of every triangle, 0 to 1.
+            hinge: (m,) part of every hinge, 0 to 1.
+        """
         some = [
             _select(cells, weight[cells.source])
             for cells, weight in zip(self.cells, (triangle, hinge), strict=True)
@@ -98,7 +103,12 @@ Measure = Callable[[SheetMesh, Bools], Membrane]
 
 
 def constant_strain(mesh: SheetMesh, crease: Bools) -> Membrane:
-    """Every triangle is a cell (constant-strain triangles: Turner et al. 1956)."""
+    """Every triangle is a cell (constant-strain triangles: Turner et al. 1956).
+
+    Args:
+        mesh: of the sheet.
+        crease: (m,) hinges at which the strain may jump; here they make no difference.
+    """
     return _membrane(mesh, np.ones(len(mesh.triangles)), np.zeros(len(crease), dtype=bool))
 
 
@@ -107,6 +117,10 @@ def smoothed_strain(mesh: SheetMesh, crease: Bools) -> Membrane:
 
     What is left of a triangle, a third for each of its edges on a crease or the boundary, keeps the triangle's own
     strain.
+
+    Args:
+        mesh: of the sheet.
+        crease: (m,) hinges at which the strain may jump.
     """
     topology = mesh.topology
     smooth = np.zeros(len(topology.edges), dtype=bool)

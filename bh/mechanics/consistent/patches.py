@@ -18,7 +18,12 @@ JOINED = 1  # rounds of joining patches by twos: pairs of triangles (docs/decisi
 
 
 def triangle_frames(points: Array, triangles: Ints) -> tuple[Array, Array]:
-    """(t, 3, 2) edge vectors in each triangle's own plane, edge k from corner k + 1 to k + 2, and areas (t,)."""
+    """(t, 3, 2) edge vectors in each triangle's own plane, edge k from corner k + 1 to k + 2, and areas (t,).
+
+    Args:
+        points: (n, 3) stress-free positions, mm.
+        triangles: (t, 3) node indices.
+    """
     corner = points[triangles]
     edge = np.roll(corner, 1, axis=1) - np.roll(corner, -1, axis=1)
     normal = np.cross(edge[:, 0], edge[:, 1])
@@ -34,6 +39,10 @@ def curvature_maps(edges: Array, areas: Array) -> Array:
     """(t, 3, 3) curvature (xx, yy, 2 xy) of triangles from the angles at their edges, 1 / mm.
 
     kappa = (1/A) sum_k L_k theta_k mu_k (x) mu_k with the outward normals mu_k of the stress-free edges (t, 3, 2).
+
+    Args:
+        edges: (t, 3, 2) from `triangle_frames`, mm.
+        areas: (t,) mm^2.
     """
     x, y = edges[..., 0], edges[..., 1]
     weight = 1.0 / (np.linalg.norm(edges, axis=2) * areas[:, None])  # L mu = (y, -x)
@@ -41,7 +50,13 @@ def curvature_maps(edges: Array, areas: Array) -> Array:
 
 
 def bending_matrices(maps: Array, areas: Array, moduli: Array) -> Array:
-    """(t, 3, 3) B of 1/2 theta.B.theta = 1/2 A kappa.C.kappa, N mm, with moduli C (3, 3) of curvatures, N mm."""
+    """(t, 3, 3) B of 1/2 theta.B.theta = 1/2 A kappa.C.kappa, N mm, with moduli C (3, 3) of curvatures, N mm.
+
+    Args:
+        maps: (t, 3, 3) from `curvature_maps`, 1 / mm.
+        areas: (t,) mm^2.
+        moduli: (3, 3) N mm.
+    """
     B = np.swapaxes(maps, 1, 2) @ (areas[:, None, None] * moduli) @ maps
     return np.asarray(0.5 * (B + np.swapaxes(B, 1, 2)))
 

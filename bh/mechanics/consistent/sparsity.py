@@ -22,6 +22,12 @@ def rotation_pattern(
 
     Rotations are numbered after the displacements. To the order of the unknowns
     every rotation is a node of its own, in the middle of its edge, with a single unknown.
+
+    Args:
+        mesh: of the sheet.
+        e: its elements.
+        displacements: their unknowns.
+        ground: triangle that is held against rigid motions, or None.
     """
     number, _ = displacements.pattern_nodes(())
     n, moving = len(number), int(number.max()) + 1

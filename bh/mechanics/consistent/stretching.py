@@ -52,7 +52,13 @@ class Stretching:
         return self._last
 
     def forces(self, x: Array, f: Array, N: Array) -> tuple[float, float]:
-        """Energy (N mm) and the sum of squared bar forces (N^2); adds the gradient to f (n, 3) and writes N."""
+        """Energy (N mm) and the sum of squared bar forces (N^2); adds the gradient to f (n, 3) and writes N.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            f: (nodes, 3) N; the gradient is added.
+            N: bar forces, N; written.
+        """
         m, gamma = self.membrane, self.gamma(x)
         if self._K:
             self._by_stiffness(self._K, gamma, N)
@@ -75,7 +81,17 @@ class Stretching:
     def tangent(
         self, x: Array, N: Array, frame_of: Ints, frames: Array, triangles: Slots, hinges: Slots, data: Array
     ) -> None:
-        """Add the tangent with bar forces N to `data`; slots are those of all triangles and hinges."""
+        """Add the tangent with bar forces N to `data`; slots are those of all triangles and hinges.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            N: bar forces of the geometric part, N.
+            frame_of: (nodes,) row of `frames` of each node, -1 where axes are global.
+            frames: (k, 3, 3) axes of oblique supports.
+            triangles: slots of all triangles.
+            hinges: slots of all hinges.
+            data: values of the matrix, N / mm; added to.
+        """
         three, five = self.membrane.cells
         K = self.stiffness(x)
         kernels.triangle_tangent(
@@ -86,18 +102,38 @@ class Stretching:
         )
 
     def rates(self, x: Array, v: Array, dN: Array) -> None:
-        """Writes the rates of N for velocities v (n, 3)."""
+        """Writes the rates of N for velocities v (n, 3).
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            v: (nodes, 3) velocities.
+            dN: rates of the bar forces; written.
+        """
         m = self.membrane
         rate = np.empty(len(m.bars))
         kernels.bar_rates(x, v, m.bars, rate)
         self._by_stiffness(self.stiffness(x), rate, dN)
 
     def force_rates(self, x: Array, v: Array, N: Array, dN: Array, f: Array) -> None:
-        """Add the rate of the gradient to f (n, 3)."""
+        """Add the rate of the gradient to f (n, 3).
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            v: (nodes, 3) velocities.
+            N: bar forces, N.
+            dN: their rates.
+            f: (nodes, 3); the rate is added.
+        """
         kernels.bar_force_rates(x, v, self.membrane.bars, N, dN, f)
 
     def by_triangle(self, x: Array, triangles: int, beside: Ints) -> Array:
-        """(triangles,) energies, N mm; that of an edge is shared by area with `beside` (m, 2), the sides of hinges."""
+        """(triangles,) energies, N mm; that of an edge is shared by area with `beside` (m, 2), the sides of hinges.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            triangles: how many there are.
+            beside: (m, 2) triangles on both sides of every hinge.
+        """
         gamma = self.gamma(x)
         three, five = (cells.area * self.law.energy(cells.strains(gamma)) for cells in self.membrane.cells)
         out = np.zeros(triangles)

@@ -143,7 +143,18 @@ class ConsistentSystem(SupportedSheet):
         return q
 
     def rotations_at(self, x: Array, lam: float) -> Array:
-        """(rotations,) of least energy at positions x (n, 3)."""
+        """(rotations,) of least energy at positions x (n, 3).
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            in rad.
+
+        Raises:
+            ModelError: the minimum is not found.
+        """
         alpha = np.zeros(self.size - self.moving)
         now = self.internal(x, alpha, lam)
         if self.elements.bending.constant:
@@ -188,7 +199,13 @@ class ConsistentSystem(SupportedSheet):
     # ------------------------------------------------------------------------------- the System protocol
 
     def internal(self, x: Array, alpha: Array, lam: float) -> Internal:
-        """Energies, gradient and element forces at positions x and rotations alpha."""
+        """Energies, gradient and element forces at positions x and rotations alpha.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            alpha: (rotations,) of the edges, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
         e = self.elements
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
@@ -324,6 +341,14 @@ class ConsistentSystem(SupportedSheet):
 
         B (c, a, a) are the stiffnesses of the patches there. `controlled` adds what rest angles and couples do while
         lambda grows at the rate 1; without `closing` there are no locks.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            v: (nodes, 3) velocities.
+            w: (rotations,) rates of the rotations.
+            B: (c, a, a) stiffnesses of the patches, N mm.
+            closing: a hinge is in the zone of its lock.
+            controlled: lambda grows at the rate 1.
         """
         e, by = self.elements, float(controlled)
         rates, turns = np.empty(sum(self._counts)), np.empty(len(e.springs))

@@ -86,7 +86,12 @@ class SupportedSheet:
         return out
 
     def angles(self, q: Array, lam: float) -> Array:
-        """(m,) dihedral angles between the triangles at every hinge of the mesh, rad."""
+        """(m,) dihedral angles between the triangles at every hinge of the mesh, rad.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         return dihedral_angles(self.positions(q, lam), self.mesh.topology.hinges)
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
@@ -99,7 +104,12 @@ class SupportedSheet:
         return hinge_penetration.penetration(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def contact(self, q: Array, lam: float) -> str:
-        """Which panels have met at a hinge that is not prescribed, or an empty string."""
+        """Which panels have met at a hinge that is not prescribed, or an empty string.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         reference = dihedral_angles(self.mesh.points, self.mesh.topology.hinges)
         return hinge_penetration.panels_in_contact(
             self.mesh, self.angles(q, lam), reference, self.load_step.law != PRESCRIBED
@@ -130,6 +140,11 @@ def describe_motion(mesh: SheetMesh, x: Array, motion: Array) -> str:
     """What moves in `motion` (n, 3) at positions x (n, 3): the whole sheet, a crease, or a few nodes.
 
     A clause such as "crease 'a' turns" to be followed by how.
+
+    Args:
+        mesh: of the sheet.
+        x: (nodes, 3) positions, mm.
+        motion: (nodes, 3) of any length.
     """
     size = float(np.linalg.norm(motion))
     if size == 0.0:

@@ -76,7 +76,13 @@ class RigidContact:
         return self._from + lam * self.velocity
 
     def forces(self, x: Array, lam: float, f: Array) -> float:
-        """Adds the gradient to f (n, 3), N, and returns the energy, N mm."""
+        """Adds the gradient to f (n, 3), N, and returns the energy, N mm.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+            f: (nodes, 3) N; the gradient is added.
+        """
         moved = x - self.anchor
         f += self.spring * moved
         total = np.zeros((len(self.indenters), 3))
@@ -95,7 +101,12 @@ class RigidContact:
         return float(energy + 0.5 * np.vdot(self.spring, moved**2))
 
     def contact_forces(self, x: Array, lam: float) -> dict[str, Array]:
-        """(3,) force of every indenter on the sheet, N."""
+        """(3,) force of every indenter on the sheet, N.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
         total = np.zeros((len(self.indenters), 3))
         _forces(
             x,
@@ -112,7 +123,16 @@ class RigidContact:
         return {indenter.name: -force for indenter, force in zip(self.indenters, total, strict=True)}
 
     def tangent(self, x: Array, lam: float, frame_of: Ints, frames: Array, slots: Slots, data: Array) -> None:
-        """Adds the Hessian; `slots` are those of the triangles."""
+        """Adds the Hessian; `slots` are those of the triangles.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+            frame_of: (nodes,) row of `frames` of each node, -1 where axes are global.
+            frames: (k, 3, 3) axes of oblique supports.
+            slots: of the triangles.
+            data: values of the matrix, N / mm; added to.
+        """
         _tangent(
             x,
             self.triangles,
@@ -131,7 +151,15 @@ class RigidContact:
         )
 
     def force_rates(self, x: Array, v: Array, lam: float, moving: float, out: Array) -> None:
-        """Adds the rate of the gradient for velocities v (n, 3), indenters moving at `moving` times their speed."""
+        """Adds the rate of the gradient for velocities v (n, 3), indenters moving at `moving` times their speed.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            v: (nodes, 3) velocities.
+            lam: load parameter of the step, 0 to 1.
+            moving: rate of lambda.
+            out: (nodes, 3); the rate is added.
+        """
         out += self.spring * v
         _force_rates(
             x,

@@ -130,19 +130,33 @@ class Displacements:
         return np.asarray(self.number[self.mesh.triangles[self.ground_triangle]].ravel())
 
     def grounding(self, Z: Array, stiffness: float) -> Array:
-        """(9, 9) stiffness (N/mm) of that triangle against the rigid motions Z and nothing else."""
+        """(9, 9) stiffness (N/mm) of that triangle against the rigid motions Z and nothing else.
+
+        Args:
+            Z: (n, r) orthonormal free rigid motions.
+            stiffness: N/mm.
+        """
         rows = np.where(self.ground_numbers[:, None] >= 0, Z[np.maximum(self.ground_numbers, 0)], 0.0)
         Q = np.linalg.qr(rows)[0] if Z.shape[1] else rows
         return np.asarray(stiffness * (Q @ Q.T))
 
     def unbalanced(self, x: Array, force: Array) -> float:
-        """Part of dead forces (n, 3) that works on rigid motions at positions x, of their sum."""
+        """Part of dead forces (n, 3) that works on rigid motions at positions x, of their sum.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            force: (nodes, 3) N.
+        """
         local = self.components(force)
         size = max(float(np.abs(local).sum()), 1e-300)
         return float(np.abs(self.rigid(x).T @ local).max(initial=0.0)) / size
 
     def check_balance(self, force: Ramp) -> None:
-        """Raises `ModelError` where dead forces would push a sheet that is free to move rigidly."""
+        """Raises `ModelError` where dead forces would push a sheet that is free to move rigidly.
+
+        Raises:
+            ModelError: the forces push the sheet as a whole.
+        """
         for load in (force.start, force.end):
             if self.unbalanced(self.reference, load) > 1e-9:
                 raise ModelError(UNBALANCED)

@@ -30,7 +30,11 @@ _OPEN, _WIDTH = 2.0 * math.pi - ZONE, 2.0 * ZONE / math.pi
 
 
 def until_closed(phi: Array) -> Array:
-    """Angle that is left until hinges at dihedral angles `phi` are closed one way or the other, rad."""
+    """Angle that is left until hinges at dihedral angles `phi` are closed one way or the other, rad.
+
+    Returns:
+        of the shape of `phi`, not negative.
+    """
     return np.minimum(phi, 2.0 * math.pi - phi)
 
 
@@ -57,7 +61,12 @@ def lock(phi, k):  # type: ignore[no-untyped-def]
 
 @compiled
 def lock_terms(phi: Array, k: Array) -> Array:
-    """(h, 3) energy, moment and stiffness of the locks of hinges at dihedral angles phi (h,), zero off the zone."""
+    """(h, 3) energy, moment and stiffness of the locks of hinges at dihedral angles phi (h,), zero off the zone.
+
+    Args:
+        phi: (h,) dihedral angles, rad.
+        k: (h,) stiffness of the locks, N mm / rad.
+    """
     out = np.zeros((len(phi), 3))
     for i in range(len(phi)):
         if in_zone(phi[i]):

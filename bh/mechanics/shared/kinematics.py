@@ -123,6 +123,10 @@ def dihedral_angles(x: Array, hinges: NDArray[np.int64]) -> Array:
     """(m,) dihedral angles in [0, 2 pi], rad, of (m, 4) hinges at node positions x (n, 3).
 
     A closed hinge reads 0 or 2 pi; which of them is decided by rounding, since both are the same position.
+
+    Args:
+        x: (nodes, 3) positions, mm.
+        hinges: (m, 4) wing, edge, edge, wing.
     """
     phi = np.empty(len(hinges))
     g = np.empty(12)
@@ -133,7 +137,12 @@ def dihedral_angles(x: Array, hinges: NDArray[np.int64]) -> Array:
 
 @compiled
 def dihedral_gradients(x: Array, hinges: NDArray[np.int64]) -> Array:
-    """(m, 12) gradients of the dihedral angles with respect to (wing, edge, edge, wing), rad / mm."""
+    """(m, 12) gradients of the dihedral angles with respect to (wing, edge, edge, wing), rad / mm.
+
+    Args:
+        x: (nodes, 3) positions, mm.
+        hinges: (m, 4) wing, edge, edge, wing.
+    """
     g = np.empty((len(hinges), 12))
     for i in range(len(hinges)):
         hinge_geometry(x, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3], g[i])
@@ -142,7 +151,12 @@ def dihedral_gradients(x: Array, hinges: NDArray[np.int64]) -> Array:
 
 @compiled
 def dihedral_hessians(x: Array, hinges: NDArray[np.int64]) -> Array:
-    """(m, 12, 12) symmetric Hessians of the dihedral angles, rad / mm^2."""
+    """(m, 12, 12) symmetric Hessians of the dihedral angles, rad / mm^2.
+
+    Args:
+        x: (nodes, 3) positions, mm.
+        hinges: (m, 4) wing, edge, edge, wing.
+    """
     H = np.zeros((len(hinges), 12, 12))
     g = np.empty(12)
     for i in range(len(hinges)):
@@ -157,7 +171,12 @@ def dihedral_hessians(x: Array, hinges: NDArray[np.int64]) -> Array:
 
 @compiled
 def bar_lengths(x: Array, bars: NDArray[np.int64]) -> Array:
-    """(b,) lengths of (b, 2) bars, mm."""
+    """(b,) lengths of (b, 2) bars, mm.
+
+    Args:
+        x: (nodes, 3) positions, mm.
+        bars: (b, 2) node indices.
+    """
     length = np.empty(len(bars))
     for i in range(len(bars)):
         d0 = x[bars[i, 1], 0] - x[bars[i, 0], 0]

@@ -58,7 +58,11 @@ class MirroredDisplacements(Displacements):
         self._axes_kept = self.constraints.frames[self.constraints.frame_of[self._kept[self._turned_kept]]]
 
     def pattern_nodes(self, groups: tuple[Ints, ...]) -> tuple[Ints, tuple[Ints, ...]]:
-        """Images stand for their originals; beyond the nodes of the mesh there may be more, all their own."""
+        """Images stand for their originals; beyond the nodes of the mesh there may be more, all their own.
+
+        Returns:
+            (nodes,) original of every node, and the groups in terms of originals.
+        """
         n = len(self.original)
         return self.own, tuple(
             np.where(group < n, self.original[np.minimum(group, n - 1)], group) for group in groups
@@ -85,7 +89,11 @@ class MirroredDisplacements(Displacements):
         return np.asarray(local[self.free] + images)
 
     def rigid(self, x: Array) -> Array:
-        """Those of the rigid motions that are symmetric, along the plane and the turn in it, orthonormal by weight."""
+        """Those of the rigid motions that are symmetric, along the plane and the turn in it, orthonormal by weight.
+
+        Returns:
+            (n, r) columns in the unknowns.
+        """
         n, kept = self.plane.normal, self._kept
         arm = x[kept] - x.mean(axis=0)
         motions = np.empty((len(kept), 3, 3))
@@ -138,13 +146,23 @@ def _reflected(c: Constraints, plane: Mirror) -> Constraints:
 
 
 def half_load_step(load_step: LoadStep, plane: Mirror) -> LoadStep:
-    """The step with the forces on the half."""
+    """The step with the forces on the half.
+
+    Args:
+        load_step: of the whole sheet.
+        plane: of the mirror symmetry.
+    """
     weight = np.where(plane.side < 0, 1.0, np.where(plane.side == 0, 0.5, 0.0))[:, None]
     return replace(load_step, force=Ramp(weight * load_step.force.start, weight * load_step.force.end))
 
 
 def half_elements(e: Elements, plane: Mirror) -> Elements:
-    """Bars and hinges of the half, with the stiffness that belongs to it."""
+    """Bars and hinges of the half, with the stiffness that belongs to it.
+
+    Args:
+        e: bars and hinges of the whole sheet.
+        plane: of the mirror symmetry.
+    """
     bars = plane.edge_weight > 0.0
     weight = plane.hinge_weight[e.source]
     keep = weight > 0.0

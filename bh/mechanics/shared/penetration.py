@@ -89,6 +89,11 @@ def penetration(mesh: SheetMesh, before: Array, after: Array) -> str:
     """Which panels passed through each other between dihedral angles (m,) of two states, or an empty string.
 
     Angles are known modulo a turn; a hinge passed 0 or 2 pi where the way through closed is the shorter one.
+
+    Args:
+        mesh: of the sheet.
+        before: (m,) dihedral angles, rad.
+        after: (m,) dihedral angles, rad.
     """
     jump = np.abs(after - before)
     if jump.max(initial=0.0) <= np.pi:
@@ -100,6 +105,12 @@ def objection(mesh: SheetMesh, before: Array, after: Array, asked: Array) -> str
     """Why an increment between dihedral angles (m,) of two states is not to be trusted, or an empty string.
 
     `asked` (m,) is how far the actuation turns each hinge, rad: that much it may turn more than the others.
+
+    Args:
+        mesh: of the sheet.
+        before: (m,) dihedral angles, rad.
+        after: (m,) dihedral angles, rad.
+        asked: (m,) how far the actuation turns each hinge, rad.
     """
     turn = float((np.abs(after - before) - asked).max(initial=0.0))
     far = f"a hinge turned by {np.degrees(turn):.0f} degrees" if turn > LARGEST_TURN else ""
@@ -110,6 +121,12 @@ def panels_in_contact(mesh: SheetMesh, angles: Array, reference: Array, asked: N
     """Which panels have met at a hinge (within the zone of closed), or an empty string.
 
     Only `asked` (m,) hinges count, and of them those that are not made closed (`reference` angles).
+
+    Args:
+        mesh: of the sheet.
+        angles: (m,) dihedral angles, rad.
+        reference: (m,) dihedral angles of the sheet as it is made, rad.
+        asked: (m,) hinges that count.
     """
     left = np.where(asked & (until_closed(reference) >= ZONE), until_closed(angles), np.inf)
     if left.min(initial=np.inf) >= ZONE:
