@@ -24,7 +24,11 @@ SHEETS = (4, 6, 20, 65, 112)  # rows of cells a side, four times as many along: 
 
 def supported(mesh: meshes.SheetMesh) -> bh.Model:
     """Supports of App. B (a), with a spring crease: the tangent of the flat state is positive definite."""
-    model = bh.Model(mesh, SHEET).support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+    model = (
+        bh.Model(mesh, SHEET, formulation="bars-and-hinges")
+        .support("corner:inner-start", "xyz")
+        .support("corner:outer-start", "yz")
+    )
     model = model.support("edge:inner", "z").support("edge:outer", "z")
     return model.fold("crease", rest=math.pi / 2, Lstar=25.0)
 

@@ -60,7 +60,9 @@ def test_trace_to_a_file(benchmark: BenchmarkFixture, annulus: bh.Model, tmp_pat
 @pytest.mark.parametrize("held", [True, False], ids=["held crease", "spring crease"])
 def test_one_iteration(benchmark: BenchmarkFixture, annulus: bh.Model, held: bool) -> None:
     """Assembly, factorisation and solve of one Newton iteration at the folded state."""
-    spring = bh.Model(annulus.mesh, annulus.sheet, annulus.supports).fold("crease", rest=1.6, Lstar=25.0)
+    spring = bh.Model(annulus.mesh, annulus.sheet, annulus.supports, formulation="bars-and-hinges").fold(
+        "crease", rest=1.6, Lstar=25.0
+    )
     sheet = annulus if held else spring
     path = bh.trace(sheet)
     system, record = path.solved()

@@ -17,8 +17,8 @@ from bh.model.model import Model
 class Remark:
     """One line of `text` for people, and its `code` for programs.
 
-    Codes are "aspect-ratio", "diagonals", "rows", "rulings", "loads", "pinch" and "drawing" (what was read into a
-    drawing); a formulation may have others.
+    Codes are "crease", "creases", "ring", "aspect-ratio", "diagonals", "rows", "rulings", "loads", "pinch" and
+    "drawing" (what was read into a drawing); a formulation may have others.
     """
 
     code: str

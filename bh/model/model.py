@@ -32,7 +32,8 @@ class Model:
         supports: none at all means the rigid-body support.
         steps: actuations that act together, and what ends them early; steps run one after another.
         creases: laws of spring creases. A crease with no law and no fold is ordinary sheet.
-        formulation: name of a registered formulation.
+        formulation: name of a registered formulation. "consistent" converges to the theory of thin sheets;
+            "bars-and-hinges" is the source's.
         stiffness: given element stiffness (bars and hinges only), or None to derive it from the sheet.
         hinge_lock: bending hinges and spring creases stop before their panels pass through each other (bars and hinges
             only): stiffening without bound within the last 2 degrees before 0 and 2 pi, nothing elsewhere.
@@ -43,7 +44,7 @@ class Model:
     supports: tuple[Constraint, ...] = ()
     steps: tuple[Step, ...] = ()
     creases: Mapping[str, CreaseLaw] = field(default_factory=dict)
-    formulation: str = "bars-and-hinges"
+    formulation: str = "consistent"
     stiffness: ElementStiffness | None = None
     hinge_lock: bool = True
 
@@ -76,7 +77,7 @@ class Model:
             raise ModelError(f"hinge_lock = {self.hinge_lock!r} cannot be; give True or False")
 
     def __repr__(self) -> str:
-        """One line: "Model(384 triangles, 1 crease, 4 supports, 1 step, bars-and-hinges)"."""
+        """One line: "Model(384 triangles, 1 crease, 4 supports, 1 step, consistent)"."""
         supports = count(len(self.supports), "support") if self.supports else "rigid-body support"
         creases = count(len(self.mesh.creases), "crease")
         triangles, steps = count(len(self.mesh.triangles), "triangle"), count(len(self.steps), "step")
@@ -129,7 +130,10 @@ class Model:
             )
         # the sheet only sets the scale of forces here; a mean bar stiffness stands for E t
         model = cls(
-            mesh, Sheet(E=float(np.mean(k_bar)), t=1.0), stiffness=ElementStiffness(k_bar, k_hinge, green)
+            mesh,
+            Sheet(E=float(np.mean(k_bar)), t=1.0),
+            formulation="bars-and-hinges",
+            stiffness=ElementStiffness(k_bar, k_hinge, green),
         )
         if len(creased):
             model = model.crease("fold", stiffness=1.0)

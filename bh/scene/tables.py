@@ -87,7 +87,7 @@ class MeshTable(Table):
 class ModelTable(Table):
     """How the sheet is modelled."""
 
-    formulation: str = Field("bars-and-hinges", description="a name that `bh formulations` lists")
+    formulation: str = Field("consistent", description="a name that `bh formulations` lists")
     hinge_lock: bool = Field(True, description="true or false")
 
 

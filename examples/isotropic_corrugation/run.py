@@ -2,7 +2,7 @@
 
     python examples/isotropic_corrugation/run.py
 
-Searches the family of `meshes.curved_corrugation` at one area and depth (a minute), prints the front of
+Searches the family of `meshes.curved_corrugation` at one area and depth (three minutes), prints the front of
 weakest-direction stiffness against isotropy, and writes front.png, stiffness.png and folded.png beside itself.
 """
 

@@ -34,7 +34,7 @@ def sector(kind: str = "staggered", fold: str = "mountain", along: int = 8) -> S
 
 def free(mesh: SheetMesh) -> Model:
     """A free sheet for imposed angles and springs alike: nothing singles out a direction."""
-    return Model(mesh, SHEET)
+    return Model(mesh, SHEET, formulation="bars-and-hinges")
 
 
 def solve(model: Model) -> bh.State:
@@ -140,7 +140,7 @@ def test_renumbered_and_stretched(kind: str, seed: int) -> None:
     def pulled(mesh: SheetMesh) -> bh.State:
         up = Displace("corner:inner-end", "z", 1.0)
         pull = Displace("corner:outer-end", (-1.0, 1.0, 0.0), 0.2)
-        return solve(Model(mesh, SHEET).support("edge:start").step(pull, up))
+        return solve(Model(mesh, SHEET, formulation="bars-and-hinges").support("edge:start").step(pull, up))
 
     base = pulled(sector(kind))
     assert base.energy.stretching > 0.01 * base.energy.total
@@ -161,7 +161,7 @@ def test_unit_of_length(kind: str, how: str, scale: float) -> None:
     fold = dict(FOLDS[how])
     if "Lstar" in fold:
         fold["Lstar"] *= scale
-    state = solve(Model(other, sheet).fold("crease", **fold))
+    state = solve(Model(other, sheet, formulation="bars-and-hinges").fold("crease", **fold))
     assert_same_energies(base_state(kind, how), state, factor=scale)
     assert_same_shape(state.points / scale, base_state(kind, how).points)
 
@@ -170,7 +170,11 @@ def test_unit_of_length(kind: str, how: str, scale: float) -> None:
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_unit_of_force(kind: str, how: str, factor: float) -> None:
     """E times a factor: all energies times that factor, same shape (a spring by its L* goes along)."""
-    state = solve(Model(sector(kind), Sheet(E=SHEET.E * factor, t=SHEET.t)).fold("crease", **FOLDS[how]))
+    state = solve(
+        Model(sector(kind), Sheet(E=SHEET.E * factor, t=SHEET.t), formulation="bars-and-hinges").fold(
+            "crease", **FOLDS[how]
+        )
+    )
     assert_same_energies(base_state(kind, how), state, factor=factor)
     assert_same_shape(state.points, base_state(kind, how).points)
 
@@ -180,7 +184,11 @@ def test_similar_sheets() -> None:
     base, s = base_state("staggered", "held"), 3.0
     pattern = meshes.annulus_sector(100.0 * s, 10.0 * s, math.pi / 4)
     state = solve(
-        Model(meshes.structured(pattern, along=8), Sheet(E=SHEET.E, t=SHEET.t * s)).fold("crease", to=2.0)
+        Model(
+            meshes.structured(pattern, along=8),
+            Sheet(E=SHEET.E, t=SHEET.t * s),
+            formulation="bars-and-hinges",
+        ).fold("crease", to=2.0)
     )
     assert_same_energies(base, state, factor=s**3)
 
@@ -233,7 +241,9 @@ def test_left_and_right_with_loads_and_supports() -> None:
             return [float(x) for x in np.array(v) * s]
 
         supported = (
-            Model(mesh, SHEET).support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+            Model(mesh, SHEET, formulation="bars-and-hinges")
+            .support("corner:inner-start", "xyz")
+            .support("corner:outer-start", "yz")
         )
         supported = supported.support("corner:outer-end", [vector(1.0, 0.3, 2.0)])
         return supported.step(

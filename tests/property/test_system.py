@@ -38,12 +38,20 @@ def two_creases() -> meshes.SheetMesh:
 
 
 def clamped(mesh: meshes.SheetMesh) -> Model:
-    return Model(mesh, SHEET).support("edge:start", "xyz").support("corner:inner-end", "z")
+    return (
+        Model(mesh, SHEET, formulation="bars-and-hinges")
+        .support("edge:start", "xyz")
+        .support("corner:inner-end", "z")
+    )
 
 
 def held_at_corners(mesh: meshes.SheetMesh) -> Model:
     """Three corners take the six rigid motions (App. B); the creases can fold."""
-    model = Model(mesh, SHEET).support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+    model = (
+        Model(mesh, SHEET, formulation="bars-and-hinges")
+        .support("corner:inner-start", "xyz")
+        .support("corner:outer-start", "yz")
+    )
     return model.support("corner:inner-end", "z")
 
 
@@ -65,21 +73,27 @@ def given_stiffness(model: Model) -> Model:
 def kinds() -> dict[str, Model]:
     mesh, pair = sector(), two_creases()
     oblique = (
-        Model(mesh, SHEET)
+        Model(mesh, SHEET, formulation="bars-and-hinges")
         .support("corner:inner-start", [[1.0, 2.0, 0.5], [0.0, 1.0, -1.0], [1.0, 0.0, 0.0]])
         .support("edge:outer", [[0.2, 0.1, 1.0]])
         .support("corner:outer-end", [[1.0, -1.0, 0.3], [1.0, 1.0, 0.0]])
     )
     return {
-        "free, spring crease": Model(mesh, SHEET).fold("crease", rest=2.3, Lstar=8.0),
-        "free, prescribed crease": Model(mesh, SHEET).fold("crease", to=2.3),
-        "free, moment": Model(mesh, SHEET).crease("crease", stiffness=0.4).moment("crease", 0.2),
-        "free, forces": Model(mesh, SHEET).step(Fold("crease", to=2.6), *balanced(mesh, 0.01)),
-        "free, all z held": Model(mesh, SHEET)
+        "free, spring crease": Model(mesh, SHEET, formulation="bars-and-hinges").fold(
+            "crease", rest=2.3, Lstar=8.0
+        ),
+        "free, prescribed crease": Model(mesh, SHEET, formulation="bars-and-hinges").fold("crease", to=2.3),
+        "free, moment": Model(mesh, SHEET, formulation="bars-and-hinges")
+        .crease("crease", stiffness=0.4)
+        .moment("crease", 0.2),
+        "free, forces": Model(mesh, SHEET, formulation="bars-and-hinges").step(
+            Fold("crease", to=2.6), *balanced(mesh, 0.01)
+        ),
+        "free, all z held": Model(mesh, SHEET, formulation="bars-and-hinges")
         .support("crease:crease", "z")
         .support("rigid-body")
         .fold("crease", rest=2.0, Lstar=20.0),
-        "point and rigid body": Model(mesh, SHEET)
+        "point and rigid body": Model(mesh, SHEET, formulation="bars-and-hinges")
         .support("corner:outer-end", "xyz")
         .support("rigid-body")
         .fold("crease", to=2.5),
@@ -105,9 +119,13 @@ def kinds() -> dict[str, Model]:
         )
         .step(Fold("crease-2", to=3.5), Moment("crease-1", -0.05), Force("edge:end", each=(0.0, 0.0, 0.002)))
         .displace("corner:outer-end", DIAGONAL, -0.2),
-        "green, free": given_stiffness(Model(mesh, SHEET)).fold("crease", rest=2.5, stiffness=1.0),
+        "green, free": given_stiffness(Model(mesh, SHEET, formulation="bars-and-hinges")).fold(
+            "crease", rest=2.5, stiffness=1.0
+        ),
         "green, oblique, displaced": given_stiffness(oblique).displace("corner:inner-end", DIAGONAL, 0.4),
-        "2 rows, alternating": Model(sector(4, rows=2, kind="alternating"), SHEET).fold("crease", to=2.5),
+        "2 rows, alternating": Model(
+            sector(4, rows=2, kind="alternating"), SHEET, formulation="bars-and-hinges"
+        ).fold("crease", to=2.5),
     }
 
 

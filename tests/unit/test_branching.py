@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Automatic, LoadControl, Model, Newton, Sheet, trace
+from bh.mechanics.consistent.formulation import ConstantStrain
 from bh.solvers.branching import Branch, onto_stable_branch
 from bh.solvers.increments import point
 from bh.solvers.outcome import Critical, Outcome
@@ -102,7 +103,7 @@ def test_load_control_goes_over() -> None:
     ring = Model(
         meshes.structured(meshes.full_annulus([60.0, 75.0], 15.0, ["mountain", "valley"]), along=24, rows=2),
         Sheet(E=4000.0, nu=0.3, t=0.2),
-        formulation="consistent",
+        formulation=ConstantStrain.name,
     ).fold("all", by=0.6, Lstar=25.0)
     path = trace(ring, strategy=Automatic(LoadControl(newton=Newton(globalised=5, transient=None))))
     assert path.outcome is Outcome.REACHED

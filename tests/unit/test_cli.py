@@ -33,6 +33,7 @@ t = 0.1
 along = 6
 """
 GOOD = SECTOR + '[[steps]]\nfold = { crease = "crease", to = 2.0 }\n'
+BARS = '[model]\nformulation = "bars-and-hinges"\n'
 # both steps are loads, whose increments are short: several states
 TWO_STEPS = (
     SECTOR
@@ -44,6 +45,7 @@ EARLY = (
     SECTOR
     + """
 [model]
+formulation = "bars-and-hinges"
 hinge_lock = false
 [creases.crease]
 stiffness = 0.1
@@ -430,7 +432,7 @@ def test_plain_progress_where_there_is_no_terminal(
 
 
 def test_poissons_ratio_that_is_not_used_is_told(here: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    (here / "nu.toml").write_text(GOOD.replace("t = 0.1", "t = 0.1\nnu = 0.3"))
+    (here / "nu.toml").write_text(GOOD.replace("t = 0.1", "t = 0.1\nnu = 0.3") + BARS)
     assert main(["run", "nu.toml"]) == 0
     assert "bars-and-hinges take Poisson's ratio as 0, not as nu = 0.3" in capsys.readouterr().out
     assert main(["run", "good.toml"]) == 0

@@ -52,7 +52,11 @@ def cantilever(along: int) -> Model:
     """A strip whose first column of cells is clamped (alternating right triangles)."""
     mesh = meshes.structured(meshes.strip(LENGTH, HEIGHT), along=along, kind="alternating")
     clamped = np.flatnonzero(mesh.points[:, 0] <= 1.001 * LENGTH / along)
-    return Model(mesh, Sheet(E=E, t=T)).support("edge:start", "xyz").support(clamped.tolist(), "z")
+    return (
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        .support("edge:start", "xyz")
+        .support(clamped.tolist(), "z")
+    )
 
 
 def tip_deflection(force: float) -> float:
@@ -127,7 +131,11 @@ def test_strip_in_tension(kind: Kind, along: int) -> None:
     """1/2 E H t u^2 / L on every mesh and aspect ratio (nu = 0)."""
     mesh = meshes.structured(meshes.strip(LENGTH, HEIGHT), along=along, kind=kind)
     u = 1e-4
-    model = Model(mesh, Sheet(E=E, t=T)).support("edge:start", "xyz").support("edge:end", "z")
+    model = (
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        .support("edge:start", "xyz")
+        .support("edge:end", "z")
+    )
     model = model.displace("edge:end", "x", u)
     exact = strip_theory.tension(E, LENGTH, HEIGHT, T, u)
     assert exact == pytest.approx(0.5 * E * HEIGHT * T * u**2 / LENGTH)
@@ -144,7 +152,11 @@ def test_strip_in_torsion(alpha: float) -> None:
 def twist_energy(alpha: float, kind: Kind) -> float:
     mesh = meshes.structured(meshes.strip(LENGTH, HEIGHT), along=round(alpha * LENGTH / HEIGHT), kind=kind)
     down, up = (Displace(f"corner:{side}-end", "z", by) for side, by in (("inner", -1e-4), ("outer", 1e-4)))
-    return linear_energy(Model(mesh, Sheet(E=E, t=T)).support("edge:start", "xyz").step(down, up))
+    return linear_energy(
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        .support("edge:start", "xyz")
+        .step(down, up)
+    )
 
 
 @pytest.mark.parametrize("alpha", [2.0, 4.0, 8.0])
@@ -198,7 +210,12 @@ def test_square_cell_folded_along_its_diagonal() -> None:
     """Two triangles, one hinge: imposed out-of-plane displacement turns it by w / h, energy 1/2 k (w / h)^2."""
     mesh = square_cell()
     w = 1e-5
-    model = Model(mesh, Sheet(E=E, t=T)).support([0, 1, 2], "xyz").support([3], "x").displace([3], "z", w)
+    model = (
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        .support([0, 1, 2], "xyz")
+        .support([3], "x")
+        .displace([3], "z", w)
+    )
     k = E * T**3 / 6.0 * 2.0 / 1.0
     assert linear_energy(model) == pytest.approx(0.5 * k * (w * math.sqrt(2.0)) ** 2, rel=1e-9)
 
@@ -206,7 +223,11 @@ def test_square_cell_folded_along_its_diagonal() -> None:
 def test_square_cell_is_dead_loaded() -> None:
     """The same hinge under a dead force: w = F h^2 / k, potential - F w / 2."""
     mesh = square_cell()
-    model = Model(mesh, Sheet(E=E, t=T)).support([0, 1, 2], "xyz").support([3], "xy")
+    model = (
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        .support([0, 1, 2], "xyz")
+        .support([3], "xy")
+    )
     force, k = 1e-6, E * T**3 / 3.0
     state = reached(model.force([3], each=(0.0, 0.0, force)))
     assert state.displacement("node:3")[0, 2] == pytest.approx(force * 0.5 / k, rel=1e-6)
@@ -221,7 +242,7 @@ D = SHEET.bending_stiffness(nu=0.0)
 
 def folded_strip(kind: Kind, rows: int, fold: str = "mountain") -> Model:
     mesh = meshes.structured(meshes.strip(30.0, 10.0, [4.0], fold), along=8, kind=kind, rows=rows)  # type: ignore[arg-type]
-    return Model(mesh, SHEET)
+    return Model(mesh, SHEET, formulation="bars-and-hinges")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -288,7 +309,10 @@ def folded_sector(
 ) -> bh.State:
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, angle), along=along, kind=kind)
     return reached(
-        Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body").fold("crease", to=dihedral)
+        Model(mesh, SHEET, formulation="bars-and-hinges")
+        .support("crease:crease", "z")
+        .support("rigid-body")
+        .fold("crease", to=dihedral)
     )
 
 
@@ -358,7 +382,9 @@ def test_convergence_in_the_aspect_ratio() -> None:
 def test_full_annulus_of_cones_does_not_exist() -> None:
     """A closed annulus cannot fold with its crease kept plane but by stretching: far above the cone."""
     mesh = meshes.structured(meshes.full_annulus(100.0, 10.0), along=48)
-    model = Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
+    model = (
+        Model(mesh, SHEET, formulation="bars-and-hinges").support("crease:crease", "z").support("rigid-body")
+    )
     path = trace(model.fold("crease", to=math.pi - 0.1))
     cone = cone_theory.bending_energy(angle=2.0 * math.pi, dihedral=math.pi - 0.1, **CONE)
     if path.outcome == "reached":
@@ -368,7 +394,11 @@ def test_full_annulus_of_cones_does_not_exist() -> None:
 def test_dead_loads_and_folds_superpose_when_small() -> None:
     """Linear response: the response to two loads is the sum of the responses."""
     mesh = meshes.structured(meshes.strip(LENGTH, HEIGHT), along=20, kind="alternating")
-    model = Model(mesh, Sheet(E=E, t=T)).support("edge:start", "xyz").support("node:1", "z")
+    model = (
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        .support("edge:start", "xyz")
+        .support("node:1", "z")
+    )
     a, b = Force("corner:inner-end", each=(0.0, 0.0, 1.0)), Force("corner:outer-end", each=(0.0, 1.0, -2.0))
 
     def response(*step: Fold | Force) -> np.ndarray:

@@ -396,7 +396,11 @@ def test_no_false_alarm_in_examples(file: Path) -> None:
 
 def test_no_false_alarm_in_deep_folds() -> None:
     mesh = meshes.structured(meshes.annulus_sector(200.0, 5.0, 0.5), aspect_ratio=6)
-    path = trace(Model(mesh, Sheet(E=4000.0, t=0.5)).fold("crease", to=math.radians(1.0)))
+    path = trace(
+        Model(mesh, Sheet(E=4000.0, t=0.5), formulation="bars-and-hinges").fold(
+            "crease", to=math.radians(1.0)
+        )
+    )
     assert path.outcome == "reached"
     assert not seen_once(path[-1].points, mesh.triangles, boundary_loops(mesh.topology))
     assert first_contact(path) is None
@@ -405,7 +409,9 @@ def test_no_false_alarm_in_deep_folds() -> None:
 def test_folded_sector_rolls_onto_itself() -> None:
     """A plane crease curls up by 1 / sin(phi / 2) when folded: its ends meet when it has turned by 2 pi, not before."""
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 4.6), aspect_ratio=6)
-    model = Model(mesh, SHEET).support("crease:crease", "z").support("rigid-body")
+    model = (
+        Model(mesh, SHEET, formulation="bars-and-hinges").support("crease:crease", "z").support("rigid-body")
+    )
     path = trace(
         model.fold("crease", to=math.pi / 2), strategy=bh.LoadControl(largest_rotation=math.radians(5.0))
     )
@@ -429,7 +435,7 @@ def test_folded_sector_rolls_onto_itself() -> None:
 def roll_of_panels(to: float) -> Model:
     """Four mountain creases; at fold angles beyond 2 pi / 5 the last panel runs into the first."""
     mesh = meshes.structured(meshes.strip(12.0, 50.0, [10.0, 20.0, 30.0, 40.0]), along=3)
-    return Model(mesh, SHEET).fold("all", by=to)
+    return Model(mesh, SHEET, formulation="bars-and-hinges").fold("all", by=to)
 
 
 def test_corrugation_folded_past_contact() -> None:

@@ -224,7 +224,11 @@ def test_newton_falls_back_on_it() -> None:
 def column(force: float) -> Model:
     """A strip of 40 x 8 x 0.2 mm, pinned at both ends and pressed along its length."""
     strip = meshes.structured(meshes.strip(40.0, 8.0), along=20)
-    model = Model(strip, Sheet(E=1000.0, t=0.2)).support("edge:start").support("edge:end", "yz")
+    model = (
+        Model(strip, Sheet(E=1000.0, t=0.2), formulation="bars-and-hinges")
+        .support("edge:start")
+        .support("edge:end", "yz")
+    )
     return model.force("edge:end", total=(-force, 0.0, 0.0))
 
 
@@ -256,7 +260,7 @@ def test_unstable_end_is_told() -> None:
 def test_a_thin_ring_of_bars_and_hinges_leaves_the_plane() -> None:
     """It stayed flat at 900 times the energy: modes as soft as a shift let Newton creep."""
     mesh = meshes.structured(meshes.full_annulus(100.0, 5.0), along=48)
-    path = trace(Model(mesh, Sheet(E=4000.0, t=0.02)).fold("crease", to=2.2))
+    path = trace(Model(mesh, Sheet(E=4000.0, t=0.02), formulation="bars-and-hinges").fold("crease", to=2.2))
     assert path.outcome == "reached"
     assert path.stable
     assert path[-1].energy.total == pytest.approx(0.003976, rel=0.01)
@@ -269,7 +273,7 @@ def two_panels() -> Model:
     mesh = meshes.SheetMesh(
         np.array(points), np.array([[0, 1, 2], [1, 0, 3]]), edge_sets={"crease:door": np.array([[0, 1]])}
     )
-    return Model(mesh, Sheet(E=4000.0, t=0.2)).support([0, 1, 2])
+    return Model(mesh, Sheet(E=4000.0, t=0.2), formulation="bars-and-hinges").support([0, 1, 2])
 
 
 def test_a_crease_without_stiffness_is_a_mechanism() -> None:

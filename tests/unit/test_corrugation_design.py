@@ -30,11 +30,12 @@ def folded(kind: str, formulation: str = "bars-and-hinges", along: int = 24, row
 
 
 def test_kept_sections_bend_as_a_beam() -> None:
-    """The straight one about y: 48 E I / L^3, less what the panels shear, with nu = 0.38 and what shallow cells add."""
+    """The straight one about y: 48 E I / L^3, less what the panels shear."""
     sheet = folded("straight", "consistent", 24, 3)
     beam = 48.0 * POLYESTER.E * top_down(sheet, 0.5 * math.pi) / 50.0**3
     kept = tangent_bending(sheet, [0.5 * math.pi]).stiffness[0]
-    assert 0.7 * beam < kept < beam
+    # 48 x 6 cells: 0.622 of it, and 0.663 with constant strains, which come down from 0.763 with 24 x 3
+    assert kept == pytest.approx(0.622 * beam, rel=0.1)
 
 
 def test_symmetric_patterns_are_symmetric() -> None:
@@ -67,7 +68,7 @@ def test_stiffness_against_patterns_of_loads() -> None:
         probe.against(np.zeros((2, 3, 3)))
 
 
-TASK = Task(along=12, directions=4)
+TASK = Task(along=12, rows=1, formulation="bars-and-hinges", directions=4)
 
 
 def test_designs_have_the_wanted_area() -> None:
@@ -110,7 +111,9 @@ def test_wanted_ratio() -> None:
 
 
 def test_what_cannot_be_says_so_in_one_line() -> None:
-    deep = Task(along=16, depth=80.0).simulate(Design(2.0, 1.0, 0.0, 5))
+    deep = Task(along=16, rows=1, formulation="bars-and-hinges", depth=80.0).simulate(
+        Design(2.0, 1.0, 0.0, 5)
+    )
     assert deep.bending is None
     assert deep.why
     assert "\n" not in deep.why

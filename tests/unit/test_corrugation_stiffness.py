@@ -19,7 +19,7 @@ from bh.formulations.observables import depth_of
 
 @cache
 def folded(kind: str) -> Folded:
-    return fold(kind, 6.0, along=24)
+    return fold(kind, 6.0, along=24, rows=1, formulation="bars-and-hinges")
 
 
 @pytest.mark.parametrize("kind", ["straight", "parabolic-edge", "elliptical-edge"])
@@ -146,9 +146,11 @@ def test_impossible_tests_are_one_line() -> None:
     with pytest.raises(ModelError, match="both supports"):
         three_point(folded("straight"), 0.0, Rig(span=300.0))
     with pytest.raises(ModelError, match=r"cannot be folded 60 mm deep|direction of the depth"):
-        fold("straight", 60.0, along=8)
+        fold("straight", 60.0, along=8, rows=1, formulation="bars-and-hinges")
     held = bh.trace(
-        bh.Model(folded("straight").mesh, POLYESTER).support([0, 1, 30, 31]).fold("all", by=0.1, Lstar=25.0)
+        bh.Model(folded("straight").mesh, POLYESTER, formulation="bars-and-hinges")
+        .support([0, 1, 30, 31])
+        .fold("all", by=0.1, Lstar=25.0)
     )
     with pytest.raises(ModelError, match="free sheet"):
         bh.corrugation.laid(held)

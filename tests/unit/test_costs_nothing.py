@@ -27,7 +27,9 @@ assert bh.trace(model).outcome == "reached"
 
 def pulled(creases: list[float]) -> bh.Model:
     mesh = meshes.structured(meshes.strip(40.0, 10.0, creases), along=6)
-    model = bh.Model(mesh, SHEET).support("edge:start").support("edge:end", "yz")
+    model = (
+        bh.Model(mesh, SHEET, formulation="bars-and-hinges").support("edge:start").support("edge:end", "yz")
+    )
     return model.displace("edge:end", "x", 0.01)
 
 

@@ -134,7 +134,7 @@ class TestFilesOfOtherPrograms:
     def test_as_drawn(self) -> None:
         """The opacity of the lines of this one says 90 degrees."""
         mesh = read_drawn(DATA / "fan.svg", fit=200.0)
-        path = bh.trace(bh.Model(mesh, SHEET, formulation="consistent").fold("all", by="drawn", Lstar=25.0))
+        path = bh.trace(bh.Model(mesh, SHEET, formulation="consistent").fold("all", by="drawn", Lstar=5.0))
         assert path.outcome == "reached"
         assert path[-1].fold_angle("mountain").mean() == pytest.approx(0.5 * math.pi, rel=0.05)
 

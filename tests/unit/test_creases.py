@@ -263,7 +263,9 @@ def test_the_same_crease_drawn_the_other_way() -> None:
 
 def test_a_full_annulus_is_closed() -> None:
     mesh = meshes.structured(meshes.full_annulus(50.0, 5.0), along=40)
-    path = bh.trace(bh.Model(mesh, bh.Sheet(E=4000.0, t=0.1)).fold("crease", to=2.9))
+    path = bh.trace(
+        bh.Model(mesh, bh.Sheet(E=4000.0, t=0.1), formulation="bars-and-hinges").fold("crease", to=2.9)
+    )
     profile = along(path[-1], "crease")
     assert len(profile.u) == 41
     assert not profile.curve.one_sided.any()
@@ -274,7 +276,9 @@ def test_a_full_annulus_is_closed() -> None:
 def test_bad_input() -> None:
     state = folded()
     short = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=4)
-    few = bh.trace(bh.Model(short, bh.Sheet(E=4000.0, t=0.1)).fold("crease", to=3.0))[-1]
+    few = bh.trace(
+        bh.Model(short, bh.Sheet(E=4000.0, t=0.1), formulation="bars-and-hinges").fold("crease", to=3.0)
+    )[-1]
     with pytest.raises(InputError, match="5 points give no derivative of order 3; give at least 7"):
         along(few, "crease")
     with pytest.raises(InputError, match="no crease 'nonsense'; its creases: crease"):

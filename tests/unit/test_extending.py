@@ -82,7 +82,11 @@ def test_pattern_and_support_in_a_scene(mine: ModuleType, tmp_path: FilePath) ->
 
 
 def test_support_holds_along_its_direction(mine: ModuleType) -> None:
-    held = bh.Model(SECTOR, SHEET).support(mine.Radial("edge:end")).support("edge:end", "z")
+    held = (
+        bh.Model(SECTOR, SHEET, formulation="bars-and-hinges")
+        .support(mine.Radial("edge:end"))
+        .support("edge:end", "z")
+    )
     held = held.support("edge:start", "xyz")
     state = bh.trace(held.fold("crease", rest=2.0, Lstar=25.0))[-1]
     nodes = SECTOR.nodes("edge:end")

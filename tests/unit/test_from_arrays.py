@@ -86,7 +86,11 @@ def test_published_energies(columns: int) -> None:
 def own_arrays() -> tuple[bh.Model, dict[str, Any]]:
     """A model of this project, and the same as arrays."""
     mesh = meshes.structured(meshes.annulus_sector(50.0, 8.0, 0.7), along=8)
-    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.2)).support("edge:start", "xyz").support("edge:end", "z")
+    model = (
+        bh.Model(mesh, bh.Sheet(E=4000.0, t=0.2), formulation="bars-and-hinges")
+        .support("edge:start", "xyz")
+        .support("edge:end", "z")
+    )
     model = model.fold("crease", rest=2.0, Lstar=10.0)
     system = formulation(model.formulation).system(model, load_steps(model)[0], None)
     assert isinstance(system, BarsAndHingesSystem)

@@ -12,6 +12,7 @@ import pytest
 import bh
 import meshes
 from bh.errors import InputError
+from bh.mechanics.consistent.formulation import ConstantStrain
 from bh.model.model import Model
 from bh.model.sheet import Sheet
 from fem.state import ShellState
@@ -21,7 +22,7 @@ PATTERN = meshes.annulus_sector(100.0, 10.0, math.pi / 4)
 GMSH = meshes.unstructured(PATTERN, size=6.0)
 
 
-CONSTANT = "consistent"
+CONSTANT = ConstantStrain.name
 
 
 def model(formulation: str, kind: str) -> Model:

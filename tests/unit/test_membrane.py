@@ -14,7 +14,7 @@ import meshes
 from bh import Displace, Model, Sheet, trace
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
-from bh.mechanics.consistent.formulation import Consistent, SmoothedStrain
+from bh.mechanics.consistent.formulation import Consistent, ConstantStrain
 from bh.mechanics.consistent.membrane import Membrane, constant_strain, smoothed_strain
 from bh.mechanics.consistent.membrane_kernels import edge_strains
 from bh.mechanics.consistent.system import ConsistentSystem
@@ -131,14 +131,14 @@ PANELS = panels()
 
 def hessian(mesh: meshes.SheetMesh, sheet: Sheet) -> Array:
     """Second derivatives of the energy of a free sheet, of positions and rotations, without any ground."""
-    model = Model(mesh, sheet, formulation=SmoothedStrain.name)
+    model = Model(mesh, sheet, formulation="consistent")
     creases = list(mesh.creases)
     model = (
         model.fold(creases[0], rest=math.pi, Lstar=5.0) if creases else model.force("node:0", each=(0.0,) * 3)
     )
-    system = SmoothedStrain().system(model, load_steps(model)[0], None)
+    system = Consistent().system(model, load_steps(model)[0], None)
     assert isinstance(system, ConsistentSystem)
-    design = SmoothedStrain().derivatives(system, np.zeros(system.size), 0.0)
+    design = Consistent().derivatives(system, np.zeros(system.size), 0.0)
     n, r = mesh.points.size, system.elements.rotations
     columns = []
     for unit in np.eye(n + r):
@@ -184,7 +184,7 @@ def test_spectrum_can_fail() -> None:
 def bent(mesh: meshes.SheetMesh, made: Consistent, length: float, height: float) -> float:
     """Energy of a strip whose ends are turned in its plane (pure bending) over that of a beam; nu = 0."""
     turn = 1e-4
-    model = Model(mesh, replace(SHEET, nu=0.0), formulation=SmoothedStrain.name).support("all", "z")
+    model = Model(mesh, replace(SHEET, nu=0.0), formulation="consistent").support("all", "z")
     model = model.support("edge:start", "x").support("corner:inner-start", "y")
     model = model.step(
         *(
@@ -202,15 +202,15 @@ def strip(rows: int, kind: Kind) -> meshes.SheetMesh:
 
 
 def test_strip_bent_in_its_plane() -> None:
-    smoothed = [bent(strip(rows, "staggered"), SmoothedStrain(), 10.0, 1.0) for rows in (1, 2, 4, 8)]
-    constant = [bent(strip(rows, "staggered"), Consistent(), 10.0, 1.0) for rows in (1, 2, 4, 8)]
+    smoothed = [bent(strip(rows, "staggered"), Consistent(), 10.0, 1.0) for rows in (1, 2, 4, 8)]
+    constant = [bent(strip(rows, "staggered"), ConstantStrain(), 10.0, 1.0) for rows in (1, 2, 4, 8)]
     assert smoothed == pytest.approx([1.115, 1.014, 1.002, 1.000], abs=0.0005)
     assert constant == pytest.approx([3.184, 1.546, 1.137, 1.034], abs=0.0005)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_in_plane_bending_converges_at_second_order_or_better(kind: Kind) -> None:
-    errors = [bent(strip(rows, kind), SmoothedStrain(), 10.0, 1.0) - 1.0 for rows in (2, 4, 8)]
+    errors = [bent(strip(rows, kind), Consistent(), 10.0, 1.0) - 1.0 for rows in (2, 4, 8)]
     assert all(rate > 1.9 for rate in plates.rates(errors))
     assert 0.0 < errors[-1] < 0.025
 
@@ -219,7 +219,7 @@ def test_in_plane_bending_on_gmsh_meshes() -> None:
     errors = []
     for size in (0.5, 0.25, 0.125):
         mesh = meshes.unstructured(meshes.strip(10.0, 1.0), size=size)
-        errors.append(abs(bent(mesh, SmoothedStrain(), 10.0, 1.0) - 1.0))
+        errors.append(abs(bent(mesh, Consistent(), 10.0, 1.0) - 1.0))
     assert errors[0] < 0.1
     assert errors[2] < 0.005
     assert errors[0] > errors[1] > errors[2]
@@ -229,7 +229,7 @@ def test_folded_energies_rise_from_below() -> None:
     """App. B (a): 0.05370 N mm is the limit of the quadratic shell."""
     totals = []
     for along, rows in ((16, 1), (32, 2), (32, 4), (64, 8)):
-        path = folded(sector(along, rows, "staggered"), "a", 0.38, SmoothedStrain.name)
+        path = folded(sector(along, rows, "staggered"), "a", 0.38, "consistent")
         assert path.outcome == "reached"
         totals.append(path[-1].energy.total)
     assert np.diff(totals).min() > 0.0
@@ -241,7 +241,7 @@ def test_folded_energies_rise_from_below() -> None:
 def test_energy_density_is_shared_by_area() -> None:
     """Of a uniform strain every triangle has its own; and the sum is the whole in any state."""
     mesh = distorted("alternating", 6)
-    model = Model(mesh, SHEET, formulation=SmoothedStrain.name).support("all", "z")
+    model = Model(mesh, SHEET, formulation="consistent").support("all", "z")
     rim = np.unique(mesh.topology.boundary).tolist()
     along = [Displace([n], "x", 0.01 * float(mesh.points[n, 0])) for n in rim]
     model = model.step(*along, *(Displace([n], "y", 0.0) for n in rim))
@@ -253,13 +253,11 @@ def test_energy_density_is_shared_by_area() -> None:
 def test_creases_take_their_own_side_in_every_step() -> None:
     """A crease that does not fold in a step is one all the same, so that energy goes on from step to step."""
     mesh = sector(8, 2, "staggered")
-    model = Model(mesh, SHEET, formulation=SmoothedStrain.name).force(
-        "corner:outer-end", each=(0.0, 0.0, 0.0)
-    )
+    model = Model(mesh, SHEET, formulation="consistent").force("corner:outer-end", each=(0.0, 0.0, 0.0))
     folding = model.fold("crease", to=3.0)
     cells = []
     for step in load_steps(folding):
-        system = formulation(SmoothedStrain.name).system(folding, step, None)
+        system = formulation("consistent").system(folding, step, None)
         assert isinstance(system, ConsistentSystem)
         cells.append(system.elements.stretching.membrane.edges.source)
     one, two = cells

@@ -40,7 +40,7 @@ from bh.solvers.newton import Solution
 SHEET = Sheet(E=4000.0, t=0.127)
 D = SHEET.bending_stiffness(nu=0.0)
 MESH = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), along=8)
-FREE = Model(MESH, SHEET)
+FREE = Model(MESH, SHEET, formulation="bars-and-hinges")
 CORNERS = (
     FREE.support("corner:inner-start", "xyz")
     .support("corner:outer-start", "yz")
@@ -51,7 +51,11 @@ CORNERS = (
 def column() -> Model:
     """A strip that is shortened beyond its buckling load: the path leaves an unstable state on the way."""
     strip = meshes.structured(meshes.strip(40.0, 8.0), along=20)
-    model = Model(strip, Sheet(E=1000.0, t=0.2)).support("edge:start", "xyz").support("edge:end", "yz")
+    model = (
+        Model(strip, Sheet(E=1000.0, t=0.2), formulation="bars-and-hinges")
+        .support("edge:start", "xyz")
+        .support("edge:end", "yz")
+    )
     return model.displace("edge:end", "x", -0.02)
 
 
@@ -359,7 +363,11 @@ def test_angle_that_supports_forbid(fix: str) -> None:
 def test_angle_that_bars_forbid() -> None:
     """A hinge whose wings and end lie on a line that is held cannot turn: its crease is half as long there."""
     mesh = meshes.structured(meshes.annulus_sector((40.0, 50.0), 8.0, 0.6), along=5)
-    model = Model(mesh, SHEET).support("edge:start", "xyz").support("corner:inner-end", "z")
+    model = (
+        Model(mesh, SHEET, formulation="bars-and-hinges")
+        .support("edge:start", "xyz")
+        .support("corner:inner-end", "z")
+    )
     strategy = LoadControl(smallest=0.02, newton=Newton(globalised=30))
     path = trace(model.fold("crease-2", to=3.6), strategy=strategy)
     assert path.outcome != "reached"
@@ -375,7 +383,9 @@ def shallow_arch(force: float) -> tuple[Model, int]:
     points[:, 2] = 2.0 * np.sin(math.pi * points[:, 0] / 40.0)
     middle = np.flatnonzero(np.isclose(points[:, 0], 20.0)).tolist()
     model = (
-        Model(replace(mesh, points=points), Sheet(E=1000.0, t=0.5)).support("edge:start").support("edge:end")
+        Model(replace(mesh, points=points), Sheet(E=1000.0, t=0.5), formulation="bars-and-hinges")
+        .support("edge:start")
+        .support("edge:end")
     )
     return model.support("all", "y").force(middle, total=(0.0, 0.0, -force)), middle[0]
 
@@ -514,7 +524,11 @@ def test_resumed_while_following_by_arc_length(
 ) -> None:
     """A column under a dead load far beyond buckling: killed at any point, it goes on in the same way."""
     strip = meshes.structured(meshes.strip(40.0, 8.0), along=20)
-    model = Model(strip, Sheet(E=1000.0, t=0.2)).support("edge:start").support("edge:end", "yz")
+    model = (
+        Model(strip, Sheet(E=1000.0, t=0.2), formulation="bars-and-hinges")
+        .support("edge:start")
+        .support("edge:end", "yz")
+    )
     model = model.force("edge:end", total=(-0.2, 0.0, 0.0))
     copier = Copier(tmp_path / "run.bh")
     path = trace(model, file=copier.file, progress=copier, strategy=strategy)
@@ -567,7 +581,10 @@ def test_resuming_another_model_is_refused(tmp_path: FilePath) -> None:
     file = tmp_path / "run.bh"
     reached(MODELS["held"], file=file)
     before = file.read_bytes()
-    for other in (FREE.fold("crease", to=1.3), Model(MESH, Sheet(E=4000.0, t=0.1)).fold("crease", to=1.2)):
+    for other in (
+        FREE.fold("crease", to=1.3),
+        Model(MESH, Sheet(E=4000.0, t=0.1), formulation="bars-and-hinges").fold("crease", to=1.2),
+    ):
         with pytest.raises(PathFileError, match="another model"):
             trace(other, file=file, resume=True)
     assert file.read_bytes() == before
@@ -662,7 +679,7 @@ def described() -> dict[str, Model]:
     )
     return {
         **MODELS,
-        "all kinds": Model(odd, Sheet(E=4000, t=0.1, nu=0.3))
+        "all kinds": Model(odd, Sheet(E=4000, t=0.1, nu=0.3), formulation="bars-and-hinges")
         .support([0, 1], [[1.0, 2.0, 0.0]])
         .support("edge:start", "yz")
         .support("rigid-body")
@@ -672,9 +689,9 @@ def described() -> dict[str, Model]:
             Force(np.array([3, 4]), total=np.array([1e-3, 0, 0])),  # type: ignore[arg-type]
         )
         .displace((5, 6), np.array([0.0, 0.0, 2.0]), 0.1),  # type: ignore[arg-type]
-        "full annulus": Model(meshes.structured(meshes.full_annulus(20.0, 5.0), along=12), SHEET).fold(
-            "all", by=0.1
-        ),
+        "full annulus": Model(
+            meshes.structured(meshes.full_annulus(20.0, 5.0), along=12), SHEET, formulation="bars-and-hinges"
+        ).fold("all", by=0.1),
     }
 
 
@@ -709,7 +726,7 @@ def test_fingerprint_sees_every_change() -> None:
 def test_numpy_corner_indices() -> None:
     corners = {name: np.int64(node) for name, node in MESH.corners.items()}
     mesh = replace(MESH, corners=corners)  # type: ignore[arg-type]
-    assert fingerprint(Model(mesh, SHEET)) == fingerprint(FREE)
+    assert fingerprint(Model(mesh, SHEET, formulation="bars-and-hinges")) == fingerprint(FREE)
 
 
 # --------------------------------------------------------------------------------------- states

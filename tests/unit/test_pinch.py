@@ -99,7 +99,7 @@ def test_an_earlier_pinch_stays() -> None:
 
 def test_fold_and_pinch_in_one_step_go_to_the_profile_of_the_fold() -> None:
     together = (Pinch("crease", to=CLOSED, length=20.0), Fold("crease", rest=RIGHT, Lstar=2.0))
-    (step,) = load_steps(Model(ONE, PLATE).step(*together))
+    (step,) = load_steps(Model(ONE, PLATE, formulation="bars-and-hinges").step(*together))
     mean, _ = parts(chain(ONE, "crease"), 0.5, 20.0, "cosine")
     inside = crease_hinges(ONE, "crease")[mean > 0]
     end = step.prescribed_angles(np.full(len(step.law), math.pi)).end
@@ -107,7 +107,11 @@ def test_fold_and_pinch_in_one_step_go_to_the_profile_of_the_fold() -> None:
 
 
 def test_all_goes_to_the_side_of_each_crease() -> None:
-    model = Model(TWO, PLATE).fold("all", by=RIGHT, Lstar=2.0).pinch("all", by=math.pi - CLOSED, length=20.0)
+    model = (
+        Model(TWO, PLATE, formulation="bars-and-hinges")
+        .fold("all", by=RIGHT, Lstar=2.0)
+        .pinch("all", by=math.pi - CLOSED, length=20.0)
+    )
     path = trace(model)
     assert path.outcome == "reached"
     assert path[-1].dihedral("crease-1").min() == pytest.approx(CLOSED)
@@ -187,7 +191,7 @@ def test_couples_of_a_pinch_follow_its_profile() -> None:
     at = crease_hinges(ONE, "crease")
     assert step.moment.end[at] == pytest.approx(30.0 * mean)
     assert (step.moment.start == 0.0).all()
-    two = Model(TWO, PLATE).fold("all", by=RIGHT, Lstar=2.0)
+    two = Model(TWO, PLATE, formulation="bars-and-hinges").fold("all", by=RIGHT, Lstar=2.0)
     _, step = load_steps(two.pinch("all", length=20.0, how="couple", couple=30.0))
     assert step.moment.end[crease_hinges(TWO, "crease-2")].min() == pytest.approx(-30.0)
 
@@ -296,12 +300,16 @@ def test_bad_pinches_are_told_in_one_line(how: dict[str, Any], words: list[str])
 
 def test_a_crease_that_is_not_folded_cannot_be_pinched() -> None:
     with pytest.raises(ModelError, match="fold it before"):
-        load_steps(Model(ONE, PLATE).pinch("crease"))
+        load_steps(Model(ONE, PLATE, formulation="bars-and-hinges").pinch("crease"))
 
 
 def test_rest_angles_need_a_spring() -> None:
     with pytest.raises(ModelError, match="imposed there"):
-        load_steps(Model(ONE, PLATE).fold("crease", to=RIGHT).pinch("crease", how="rest"))
+        load_steps(
+            Model(ONE, PLATE, formulation="bars-and-hinges")
+            .fold("crease", to=RIGHT)
+            .pinch("crease", how="rest")
+        )
 
 
 def test_pinches_that_contradict() -> None:
@@ -317,6 +325,10 @@ def test_a_crease_of_many_lines_has_no_way_along_it() -> None:
     sets = {**TWO.edge_sets}
     sets["crease:mountains"] = np.vstack((sets["crease:crease-1"], sets["crease:crease-2"]))
     mesh = replace(TWO, edge_sets=sets)
-    model = Model(mesh, PLATE).fold("mountains", rest=RIGHT, Lstar=2.0).pinch("mountains")
+    model = (
+        Model(mesh, PLATE, formulation="bars-and-hinges")
+        .fold("mountains", rest=RIGHT, Lstar=2.0)
+        .pinch("mountains")
+    )
     with pytest.raises(ModelError, match="not one line"):
         load_steps(model)

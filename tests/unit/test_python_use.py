@@ -60,10 +60,8 @@ def test_objects_show_what_they_hold_in_one_line() -> None:
         f"aspect ratio {MESH.aspect_ratio:.3g})"
     )
     triangles = f"{len(MESH.triangles)} triangles"
-    assert repr(model) == f"Model({triangles}, 1 crease, rigid-body support, 1 step, bars-and-hinges)"
-    assert (
-        repr(model.support("node:0")) == f"Model({triangles}, 1 crease, 1 support, 1 step, bars-and-hinges)"
-    )
+    assert repr(model) == f"Model({triangles}, 1 crease, rigid-body support, 1 step, consistent)"
+    assert repr(model.support("node:0")) == f"Model({triangles}, 1 crease, 1 support, 1 step, consistent)"
     path = bh.trace(model)
     assert repr(path) == f"Path(reached, {len(path)} states, {path.iterations} iterations, 1 of 1 step)"
     shown = repr(path[-1])

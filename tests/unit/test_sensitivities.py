@@ -299,7 +299,9 @@ def test_bad_input() -> None:
 
     def turning(q: Array) -> bh.Model:
         mesh = meshes.structured(meshes.annulus_sector(100.0, 8.0, 0.6), along=8)
-        model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.2)).support("corner:inner-start", "xyz")
+        model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.2), formulation="bars-and-hinges").support(
+            "corner:inner-start", "xyz"
+        )
         model = model.support("corner:outer-start", [[q[0], 1, 0], [0, 0, 1]]).support(
             "corner:inner-end", "z"
         )

@@ -220,7 +220,7 @@ def test_bad_edge_moments_are_refused() -> None:
 
 
 def test_states_of_bars_cannot_begin_a_step_of_the_shell() -> None:
-    bars = solve(Model(SECTOR, MYLAR).fold("crease", by=0.1))[-1]
+    bars = solve(Model(SECTOR, MYLAR, formulation="bars-and-hinges").fold("crease", by=0.1))[-1]
     model = sheet().fold("crease", by=0.2)
     with pytest.raises(ModelError, match="begins at a state of the shell"):
         Shell().system(model, load_steps(model)[0], bars)

@@ -37,7 +37,7 @@ def full(matrix: SparseMatrix) -> sp.csc_array:
 def sheet(kind: str, along: int = 24, rows: int = 6) -> bh.Model:
     mesh = meshes.structured(meshes.annulus_sector(100.0, 20.0, 1.5), along=along, rows=rows, kind=kind)  # type: ignore[arg-type]
     return (
-        bh.Model(mesh, bh.Sheet(E=4000.0, t=0.3))
+        bh.Model(mesh, bh.Sheet(E=4000.0, t=0.3), formulation="bars-and-hinges")
         .support("corner:inner-start", "xyz")
         .support("corner:outer-start", "yz")
         .support("edge:inner", "z")

@@ -258,7 +258,7 @@ def internal_forces(path: bh.Path) -> tuple[Array, Array]:
 @pytest.mark.parametrize("kind", ["staggered", "alternating"])
 def test_free_sheet_is_held_without_force(how: str, kind: str) -> None:
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), along=8, kind=kind)  # type: ignore[arg-type]
-    path = solve(Model(mesh, SHEET).fold("crease", **FOLDS[how]))
+    path = solve(Model(mesh, SHEET, formulation="bars-and-hinges").fold("crease", **FOLDS[how]))
     for state in path:
         assert np.abs(state.reactions).max() == 0.0
     system = path.system(0)
@@ -283,7 +283,7 @@ def test_free_sheet_is_held_without_force(how: str, kind: str) -> None:
 @pytest.mark.parametrize("how", FOLDS)
 def test_free_sheet_stores_what_determinate_supports_let_it_store(how: str) -> None:
     """Any 3-2-1 support, at any three nodes, has no force in it: same energy, same angles, no reactions."""
-    free = solve(Model(MESH, SHEET).fold("crease", **FOLDS[how]))
+    free = solve(Model(MESH, SHEET, formulation="bars-and-hinges").fold("crease", **FOLDS[how]))
     rng = np.random.default_rng(7)
     triples = [(0, len(MESH.points) - 1, 4)]
     while len(triples) < 4:
@@ -293,7 +293,9 @@ def test_free_sheet_stores_what_determinate_supports_let_it_store(how: str) -> N
             triples.append((a, b, c))
     for a, b, c in triples:
         held = solve(
-            replace(Model(MESH, SHEET), supports=three_two_one(MESH, a, b, c)).fold("crease", **FOLDS[how])
+            replace(
+                Model(MESH, SHEET, formulation="bars-and-hinges"), supports=three_two_one(MESH, a, b, c)
+            ).fold("crease", **FOLDS[how])
         )
         assert held[-1].energy.total == pytest.approx(free[-1].energy.total, rel=1e-9)
         assert held[-1].energy.stretching == pytest.approx(free[-1].energy.stretching, rel=1e-6)
@@ -303,13 +305,13 @@ def test_free_sheet_stores_what_determinate_supports_let_it_store(how: str) -> N
 
 def test_partial_supports_and_rigid_body() -> None:
     """A single node or a line that is held, the rest free: the same sheet, moved."""
-    free = solve(Model(MESH, SHEET).fold("crease", to=2.0))
+    free = solve(Model(MESH, SHEET, formulation="bars-and-hinges").fold("crease", to=2.0))
     for supports in (
         [("corner:inner-start", "xyz")],
         [("corner:inner-start", "xyz"), ("corner:inner-end", "y")],
         [("node:3", [[1.0, 2.0, 3.0]])],
     ):
-        model = Model(MESH, SHEET)
+        model = Model(MESH, SHEET, formulation="bars-and-hinges")
         for at, fix in supports:
             model = model.support(at, fix)
         held = solve(model.support("rigid-body").fold("crease", to=2.0))
@@ -322,7 +324,9 @@ def test_partial_supports_and_rigid_body() -> None:
 
 
 def test_rigid_body_beside_full_supports_does_nothing() -> None:
-    model = Model(MESH, SHEET).support("edge:inner", "xyz").fold("crease", to=2.5)
+    model = (
+        Model(MESH, SHEET, formulation="bars-and-hinges").support("edge:inner", "xyz").fold("crease", to=2.5)
+    )
     plain, both = solve(model), solve(model.support("rigid-body"))
     assert np.array_equal(plain[-1].points, both[-1].points) or np.allclose(
         plain[-1].points, both[-1].points, rtol=0, atol=1e-9
@@ -332,7 +336,7 @@ def test_rigid_body_beside_full_supports_does_nothing() -> None:
 
 def test_free_sheet_stays_where_it_is() -> None:
     """The least displacement: no mean motion and no mean rotation is added in a small fold."""
-    state = solve(Model(MESH, SHEET).fold("crease", to=math.pi - 1e-3))[-1]
+    state = solve(Model(MESH, SHEET, formulation="bars-and-hinges").fold("crease", to=math.pi - 1e-3))[-1]
     Z = np.linalg.qr(rigid_motions(MESH.points))[0]
     u = (state.points - MESH.points).ravel()
     assert np.abs(Z.T @ u).max() < 1e-3 * np.linalg.norm(u)
@@ -348,19 +352,23 @@ def test_free_sheet_stays_where_it_is() -> None:
 )  # fmt: skip
 def test_loads_out_of_balance_are_refused(force: Force) -> None:
     with pytest.raises(ModelError, match="not in equilibrium"):
-        trace(Model(MESH, SHEET).step(force))
+        trace(Model(MESH, SHEET, formulation="bars-and-hinges").step(force))
 
 
 def test_a_couple_on_a_free_sheet_is_refused() -> None:
     """Forces that sum to nothing, but turn the sheet."""
     a, b = Force("corner:inner-start", each=(0, 0, 1e-3)), Force("corner:inner-end", each=(0, 0, -1e-3))
     with pytest.raises(ModelError, match="not in equilibrium"):
-        trace(Model(MESH, SHEET).step(a, b))
+        trace(Model(MESH, SHEET, formulation="bars-and-hinges").step(a, b))
 
 
 def test_loads_that_the_partial_supports_can_carry_are_taken() -> None:
     """A force against a support is in equilibrium with it; along a free motion it is not."""
-    model = Model(MESH, SHEET).support("corner:inner-start", "xyz").support("rigid-body")
+    model = (
+        Model(MESH, SHEET, formulation="bars-and-hinges")
+        .support("corner:inner-start", "xyz")
+        .support("rigid-body")
+    )
     a = Force("corner:inner-start", each=(0.0, 0.0, 1.0))
     path = solve(model.step(a))
     assert path[-1].reaction("corner:inner-start") == pytest.approx([0, 0, -1.0])
@@ -373,10 +381,18 @@ def test_balanced_pair_on_a_free_sheet() -> None:
     a, b = MESH.corners["corner:inner-start"], MESH.corners["corner:inner-end"]
     pull = 0.01 * (MESH.points[b] - MESH.points[a]) / np.linalg.norm(MESH.points[b] - MESH.points[a])
     step = (Fold("crease", to=2.0), Force([a], each=tuple(-pull)), Force([b], each=tuple(pull)))
-    free = solve(Model(MESH, SHEET).step(*step))
-    held = solve(replace(Model(MESH, SHEET), supports=three_two_one(MESH, a, b, 4)).step(*step))
+    free = solve(Model(MESH, SHEET, formulation="bars-and-hinges").step(*step))
+    held = solve(
+        replace(
+            Model(MESH, SHEET, formulation="bars-and-hinges"), supports=three_two_one(MESH, a, b, 4)
+        ).step(*step)
+    )
     assert free[-1].energy.total == pytest.approx(held[-1].energy.total, rel=1e-7)
-    assert free[-1].energy.total > 1.001 * solve(Model(MESH, SHEET).fold("crease", to=2.0))[-1].energy.total
+    assert (
+        free[-1].energy.total
+        > 1.001
+        * solve(Model(MESH, SHEET, formulation="bars-and-hinges").fold("crease", to=2.0))[-1].energy.total
+    )
 
 
 @pytest.mark.xfail(
@@ -388,7 +404,7 @@ def test_dead_pull_may_turn_a_free_sheet() -> None:
     """Two opposite dead forces on a triangle: in balance in the flat sheet; in tension there is a stable state."""
     triangle = SheetMesh(np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]]))
     pull = (Force([0], each=(0.0, -0.1, 0.0)), Force([2], each=(0.0, 0.1, 0.0)))
-    path = trace(Model(triangle, SHEET).step(*pull))
+    path = trace(Model(triangle, SHEET, formulation="bars-and-hinges").step(*pull))
     assert path.outcome == "reached"
     bar = np.diff(path[-1].points[[0, 2]], axis=0)[0]
     assert np.cross(bar, [0.0, 0.1, 0.0]) == pytest.approx([0, 0, 0], abs=1e-9)
@@ -400,7 +416,7 @@ def test_loads_that_lose_their_balance_do_not_end_as_reached() -> None:
     pull = 0.1 * (MESH.points[b] - MESH.points[a]) / np.linalg.norm(MESH.points[b] - MESH.points[a])
     strategy = bh.LoadControl(smallest=0.02, newton=bh.Newton(globalised=20))
     path = trace(
-        Model(MESH, SHEET).step(
+        Model(MESH, SHEET, formulation="bars-and-hinges").step(
             Fold("crease", to=2.0), Force([a], each=tuple(-pull)), Force([b], each=tuple(pull))
         ),
         strategy=strategy,
@@ -424,9 +440,15 @@ def test_oblique_supports_are_rotated_axis_supports() -> None:
 
     axes = np.eye(3)
     rotated = replace(MESH, points=MESH.points @ Q.T)
-    plain = Model(MESH, SHEET).support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+    plain = (
+        Model(MESH, SHEET, formulation="bars-and-hinges")
+        .support("corner:inner-start", "xyz")
+        .support("corner:outer-start", "yz")
+    )
     plain = plain.support("corner:inner-end", "z")
-    oblique = Model(rotated, SHEET).support("corner:inner-start", [turned(v) for v in axes])
+    oblique = Model(rotated, SHEET, formulation="bars-and-hinges").support(
+        "corner:inner-start", [turned(v) for v in axes]
+    )
     oblique = oblique.support("corner:outer-start", [turned(v) for v in axes[1:]])
     oblique = oblique.support("corner:inner-end", [turned(axes[2])])
     up, force = (0.0, 0.0, 1.0), (1e-3, 0.0, 2e-3)

@@ -116,7 +116,7 @@ def test_a_sheet_that_leaves_the_symmetry() -> None:
 
 def test_full_ring_and_a_given_normal() -> None:
     mesh = meshes.structured(meshes.full_annulus(100.0, 10.0), along=16)
-    model = bh.Model(mesh, SHEET).fold("crease", to=math.pi - 0.02)
+    model = bh.Model(mesh, SHEET, formulation="bars-and-hinges").fold("crease", to=math.pi - 0.02)
     compare(model, "x", free=True)
     compare(sector().fold("crease", to=2.5), "y", free=True)
     half = bh.trace(sector().fold("crease", to=2.5), symmetry=(-1.0, 1.0, 0.0))
@@ -192,7 +192,11 @@ def test_stability_is_that_of_the_whole() -> None:
     """A compressed strip that is held in the middle buckles to two opposite waves: nothing that a half can see."""
     mesh = meshes.structured(meshes.strip(60.0, 6.0), along=32, kind="alternating")
     middle = np.flatnonzero(np.abs(mesh.points[:, 0] - 30.0) < 1e-9).tolist()
-    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.5)).support("edge:start", "yz").support("edge:end", "yz")
+    model = (
+        bh.Model(mesh, bh.Sheet(E=4000.0, t=0.5), formulation="bars-and-hinges")
+        .support("edge:start", "yz")
+        .support("edge:end", "yz")
+    )
     model = model.support(middle, "z")
 
     def squeezed(by: float) -> bh.Path:

@@ -105,7 +105,7 @@ def test_the_next_step_goes_on_from_there(tmp_path: FilePath) -> None:
 
 def test_held_angles_and_loads_go_on_from_there() -> None:
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=16)
-    model = Model(mesh, Sheet(E=4000.0, t=0.127)).fold(
+    model = Model(mesh, Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges").fold(
         "crease", to=1.6, until=Until("fold_angle", 0.7, "crease")
     )
     path = trace(model.fold("crease", to=1.6))
@@ -113,11 +113,13 @@ def test_held_angles_and_loads_go_on_from_there() -> None:
     first = max(i for i, r in enumerate(path.records) if r.step == 0)
     assert path[first].dihedral("crease") == pytest.approx(math.pi - 0.7, abs=1e-4)
     assert path[-1].dihedral("crease") == pytest.approx(1.6, abs=1e-9)
-    direct = trace(Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=1.6))
+    direct = trace(
+        Model(mesh, Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges").fold("crease", to=1.6)
+    )
     assert path[-1].energy.total == pytest.approx(direct[-1].energy.total, rel=1e-8)
     strip = meshes.structured(meshes.strip(50.0, 5.0), along=20)
     beam = (
-        Model(strip, Sheet(E=4000.0, t=0.127))
+        Model(strip, Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges")
         .support("edge:start")
         .support((strip.nodes("edge:start") + 1).tolist())
     )
@@ -138,11 +140,15 @@ def test_bad_targets_are_one_line() -> None:
         (lambda: corrugation().step(until=bh.depth(1.0)), "at least one actuation"),
         (lambda: corrugation().step(bh.depth(1.0)), "give it by name"),  # type: ignore[arg-type]
         (lambda: corrugation().step("fold"), "takes actuations, not a str"),  # type: ignore[arg-type]
-        (lambda: Model(corrugation().mesh, SHEET, steps=((bh.Fold("a", to=1.0),),)), "give bh.Step"),  # type: ignore
+        (lambda: Model(corrugation().mesh, SHEET, steps=((bh.Fold("a", to=1.0),),)), "give bh.Step"),  # type: ignore[arg-type]
     ):
         with pytest.raises(ModelError, match=message):
             make()
-    flat = Model(meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=4), SHEET)
+    flat = Model(
+        meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=4),
+        SHEET,
+        formulation="bars-and-hinges",
+    )
     with pytest.raises(ModelError, match="the sheet has no valley"):
         trace(flat.fold("crease", to=2.0, until=bh.depth(1.0)))
 

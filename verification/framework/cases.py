@@ -44,6 +44,7 @@ STUDIES = (
     Study("appendix_b", "B"),
     Study("consistent", "solver"),
     Study("convergence", "solver"),
+    Study("one_row", "solver"),
     Study("fig3_6", "3"),
     Study("fig3_8", "3", long=True),
     Study("fig3_10", "3", long=True),

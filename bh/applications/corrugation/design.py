@@ -100,8 +100,8 @@ class Task:
     Lstar: float = LSTAR
     span: float = 50.0
     along: int = 28
-    rows: int = 1
-    formulation: str = "bars-and-hinges"
+    rows: int = 2
+    formulation: str = "consistent"
     directions: int = 12
 
     def __post_init__(self) -> None:

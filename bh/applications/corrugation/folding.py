@@ -31,8 +31,8 @@ def fold(
     sheet: Sheet = POLYESTER,
     Lstar: float = LSTAR,
     along: int = 36,
-    rows: int = 1,
-    formulation: str = "bars-and-hinges",
+    rows: int = 2,
+    formulation: str = "consistent",
     strategy: Strategy | None = None,
 ) -> Folded:
     """Fold all creases as drawn, by one rest angle that grows until the corrugation is `depth_mm` deep.

@@ -14,7 +14,7 @@ from bh.materials import Constant, LinearElastic, Material
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.bending import Bending
 from bh.mechanics.consistent.kernels import OWN, TURN
-from bh.mechanics.consistent.membrane import Measure, constant_strain
+from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.patches import (
     Patches,
     bending_matrices,
@@ -92,7 +92,7 @@ def consistent_elements(
     prescribed_start: Array,
     moment_start: Array,
     plane: Mirror | None = None,
-    measure: Measure = constant_strain,
+    measure: Measure = smoothed_strain,
     material: Material = LINEAR,
 ) -> ConsistentElements:
     """Element arrays of a model in one step.

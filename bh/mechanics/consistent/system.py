@@ -15,7 +15,7 @@ from bh.loading.load_step import LoadStep
 from bh.materials import Material
 from bh.mechanics.consistent import kernels, setup
 from bh.mechanics.consistent.elements import LINEAR, consistent_elements, lock_stiffness
-from bh.mechanics.consistent.membrane import Measure, constant_strain
+from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.sparsity import rotation_pattern
 from bh.mechanics.shared import penetration as closings
 from bh.mechanics.shared.base_system import SupportedSheet
@@ -82,7 +82,7 @@ class ConsistentSystem(SupportedSheet):
         load_step: LoadStep,
         start: State | None,
         plane: Mirror | None = None,
-        measure: Measure = constant_strain,
+        measure: Measure = smoothed_strain,
         material: Material = LINEAR,
     ) -> None:
         """Elements, unknowns and supports of the step.

@@ -30,7 +30,11 @@ def model(actuation: str, along: int = 64) -> Model:
     edges for (a), at the four corners for (d). The straight edge lies on the x axis.
     """
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), along=along)
-    sheet = Model(mesh, SHEET).support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+    sheet = (
+        Model(mesh, SHEET, formulation="bars-and-hinges")
+        .support("corner:inner-start", "xyz")
+        .support("corner:outer-start", "yz")
+    )
     if actuation == "a":
         sheet = sheet.support("edge:inner", "z").support("edge:outer", "z")
     else:

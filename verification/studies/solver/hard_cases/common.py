@@ -28,5 +28,7 @@ def annulus(along: int = 48, t: float = 0.127, kind: Any = "staggered", **sector
     """A free creased sector: radius 100, width 10 each side, 45 degrees unless said otherwise."""
     size: dict[str, Any] = {"radius": 100.0, "width": 10.0, "angle": math.pi / 4, **sector}
     return Model(
-        meshes.structured(meshes.annulus_sector(**size), along=along, kind=kind), Sheet(E=4000.0, t=t)
+        meshes.structured(meshes.annulus_sector(**size), along=along, kind=kind),
+        Sheet(E=4000.0, t=t),
+        formulation="bars-and-hinges",
     )

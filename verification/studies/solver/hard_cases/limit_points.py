@@ -77,7 +77,11 @@ def euler_buckling(result: CaseResult) -> None:
     exact = math.pi**2 * E * width * t**3 / 12.0 / length**2
     for alpha in (2.0, 4.0, 8.0, 16.0):
         mesh = meshes.structured(meshes.strip(length, width), aspect_ratio=alpha)
-        model = Model(mesh, Sheet(E=E, t=t)).support("edge:start", "xz").support("edge:end", "z")
+        model = (
+            Model(mesh, Sheet(E=E, t=t), formulation="bars-and-hinges")
+            .support("edge:start", "xz")
+            .support("edge:end", "z")
+        )
         model = model.support("corner:inner-start", "y").support("corner:inner-end", "y")
         squeeze = 3.0 * exact * length / (E * width * t)
         model = model.displace("edge:end", "x", -squeeze)

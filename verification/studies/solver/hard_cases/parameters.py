@@ -73,7 +73,9 @@ def supported(alpha: float) -> Model:
     It is statically determinate and holds no angle exactly, so that its tangent is one plain matrix.
     """
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), aspect_ratio=alpha)
-    model = Model(mesh, Sheet(E=4000.0, t=0.127)).support("corner:inner-start", "xyz")
+    model = Model(mesh, Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges").support(
+        "corner:inner-start", "xyz"
+    )
     model = model.support("corner:outer-start", "yz").support("corner:inner-end", "z")
     return model.fold("crease", rest=math.pi / 2, Lstar=10.0)
 
@@ -97,7 +99,11 @@ def slenderness(result: CaseResult) -> None:
     """Aspect ratio alpha from 0.5 to 30: iterations do not grow, though the condition number does."""
     for alpha in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0):
         mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), aspect_ratio=alpha)
-        path = trace(Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=math.pi / 2))
+        path = trace(
+            Model(mesh, Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges").fold(
+                "crease", to=math.pi / 2
+            )
+        )
         result.check(
             "slender cells: iterations from flat to 90 degrees",
             path.iterations,

@@ -45,7 +45,9 @@ def pinched_crease(kappa_0: float, length: float = LENGTH, t: float = 0.5, along
     mesh = replace(
         mesh, edge_sets={**mesh.edge_sets, "crease:pinch": zone}, folds={**mesh.folds, "pinch": "mountain"}
     )
-    model = Model(mesh, Sheet(E=4000.0, t=t)).fold("crease", rest=0.5 * math.pi, Lstar=2.0)
+    model = Model(mesh, Sheet(E=4000.0, t=t), formulation="bars-and-hinges").fold(
+        "crease", rest=0.5 * math.pi, Lstar=2.0
+    )
     return model.fold("pinch", to=PINCHED)
 
 
