@@ -125,7 +125,9 @@ def fold_file(
             shutil.rmtree(place, ignore_errors=True)
             continue
         tried.append((offer, scene, path, place))
-        if path.reached:  # an accuracy that is not met in the time is still said, which coarser meshes have none to say
+        if (
+            path.reached
+        ):  # an accuracy that is not met in the time is still said, which coarser meshes have none to say
             break
         notes.append(f"{offer.mesh}: {why}")
     if not tried:
