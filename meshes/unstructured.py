@@ -189,7 +189,8 @@ def _chains(
             _node(points, joints, at, near) if value in fixed else _new(points, at)
             for value, at in zip(u, curve.point(np.array(u)), strict=True)
         ]
-        chains[name] = np.column_stack((nodes[:-1], nodes[1:]))
+        # a crease shorter than two nodes can be apart has no edge
+        chains[name] = np.array([nodes[:-1], nodes[1:]], dtype=np.int64).T
     return np.array(points), chains
 
 

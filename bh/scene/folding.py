@@ -20,6 +20,7 @@ from bh.errors import InputError
 from meshes import CreasePattern, MeshError, SheetMesh
 from meshes.cells import RuledCells
 from meshes.choices import choices, cut, panel_width
+from meshes.planar import CORNER
 
 PERCENT = 80.0  # of the way, where neither the user nor the file says how far
 FULLY = math.radians(170.0)  # drawn angles beyond that mean folded flat: then 80 % of them, too
@@ -178,8 +179,8 @@ def _bent(mesh: SheetMesh) -> bool:
         if name in ("mountain", "valley", "flat") or len(pairs) < 4:
             continue
         steps = mesh.points[pairs[:, 1], :2] - mesh.points[pairs[:, 0], :2]
-        heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-        if np.ptp(heading) > STRAIGHT:
+        turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
+        if turns[turns <= CORNER].sum() > STRAIGHT:
             return True
     return False
 

@@ -110,6 +110,12 @@ class TestOneCommand:
         for offer in offers:
             assert parse_scene(offer.text, tmp_path).model.mesh.folds["m1"] == "mountain"
 
+    def test_a_corner_is_no_curve(self, tmp_path: Path) -> None:
+        """Straight lines that meet at an angle, in pieces: the faces of the drawing do."""
+        knee = '<path d="M0 10 L10 20 L20 30 L30 40 L40 30 L50 20 L60 10 L70 0" stroke="red" fill="none"/>'
+        (only,) = proposals(svg(tmp_path, RIM + knee))
+        assert 'kind = "drawn"' in only.text
+
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [
