@@ -115,7 +115,12 @@ class Connectors:
         return out
 
     def power(self, beta: Array, lam: float) -> float:
-        """Derivative of both energies by lambda at fixed beta, N mm."""
+        """Derivative of both energies by lambda at fixed beta, N mm.
+
+        Args:
+            beta: (c, r) turns of the connectors, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
         return float(np.vdot(self.gradient_rate(), beta)) + float(
             np.einsum("c,ci,cij,cj->", self.stiffness, self.rest.rate, self.mass, self.rest.at(lam))
         )

@@ -234,7 +234,13 @@ class Model:
         return self.step(Force(at, **how))
 
     def displace(self, at: str | Sequence[int], direction: str | Sequence[float], by: float) -> Model:
-        """Add a step with prescribed displacements; see `bh.Displace`."""
+        """Add a step with prescribed displacements; see `bh.Displace`.
+
+        Args:
+            at: name of a place, or node indices.
+            direction: x, y or z, or a vector (3,) of any length.
+            by: displacement along it at the end of the step, mm from the stress-free position.
+        """
         return self.step(Displace(at, direction, by))
 
 

@@ -23,7 +23,7 @@ ERRORS = {"DesignError", "FileFormatError", "IndefiniteError", "InputError", "Me
 MANY = re.compile(r"Array|\b(?:NDArray|Ints|Bools|tuple|list|dict)\b")
 SHAPE = re.compile(r"\((?:\.\.\.|[\w*+ ]+)(?:, ?[\w*+. -]+)*,?\)")
 Method = tuple[ast.ClassDef | None, ast.FunctionDef]
-Asked = set[tuple[str, int]]  # methods of protocols, and how many parameters they have
+Asked = set[tuple[str, ...]]  # methods of protocols, each name followed by its parameters
 
 
 def sources() -> dict[str, ast.Module]:
@@ -54,7 +54,7 @@ def asked(trees: Iterable[ast.Module]) -> Asked:
     """What the protocols ask for."""
     classes = [node for tree in trees for node in ast.walk(tree) if is_protocol(node)]
     return {
-        (node.name, len(parameters(node)))
+        (node.name, *parameters(node))
         for one in classes
         if isinstance(one, ast.ClassDef)
         for node in one.body
@@ -66,7 +66,7 @@ def left_out(of: ast.ClassDef | None, node: ast.FunctionDef, protocols: Asked) -
     marks = [ast.unparse(mark) for mark in node.decorator_list]
     if any(re.search(r"njit|property|overload|\.setter|\.command", mark) for mark in marks):
         return True
-    return of is not None and not is_protocol(of) and (node.name, len(parameters(node))) in protocols
+    return of is not None and not is_protocol(of) and (node.name, *parameters(node)) in protocols
 
 
 def section(doc: str, title: str) -> str:

@@ -176,7 +176,12 @@ class RigidContact:
         )
 
     def power(self, x: Array, lam: float) -> float:
-        """Rate of energy with lambda at fixed x, N mm: work of the moving indenters on the sheet."""
+        """Rate of energy with lambda at fixed x, N mm: work of the moving indenters on the sheet.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
         return float(
             sum(
                 force @ indenter.by
@@ -185,7 +190,12 @@ class RigidContact:
         )
 
     def control_stiffness(self, x: Array, lam: float) -> float:
-        """Second derivative of the energy by lambda at fixed x, N mm."""
+        """Second derivative of the energy by lambda at fixed x, N mm.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
         ahead = 1e-6
         return (self.power(x, lam + ahead) - self.power(x, lam - ahead)) / (2.0 * ahead)
 

@@ -71,7 +71,12 @@ class Displacements:
         return self.number, groups
 
     def positions(self, u: Array, lam: float) -> Array:
-        """(n, 3) node positions, mm, for unknowns u (k,)."""
+        """(n, 3) node positions, mm, for unknowns u (k,).
+
+        Args:
+            u: (k,) displacements, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
         local.ravel()[self.free] = u
         return self.reference + self.to_global(local)

@@ -69,7 +69,12 @@ class MirroredDisplacements(Displacements):
         )
 
     def positions(self, u: Array, lam: float) -> Array:
-        """(n, 3) positions of all nodes, images too, mm, for unknowns u (k,)."""
+        """(n, 3) positions of all nodes, images too, mm, for unknowns u (k,).
+
+        Args:
+            u: (k,) displacements of the half, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
         local.ravel()[self.free] = u
         local.ravel()[self._images] = u[self._of]
