@@ -52,6 +52,18 @@ def test_no_line_of_the_changelog_stands_twice() -> None:
     assert [tail for tail in tails if tails.count(tail) > 1] == []
 
 
+def test_no_marks_of_a_merge() -> None:
+    """Text that a merge has left unresolved is in no file."""
+    kinds = {".md", ".py", ".toml", ".yml", ".lock", ".cff", ".json"}
+    folders = ("bh", "docs", "examples", "fem", "meshes", "reports", "tests", "verification")
+    files = [p for p in ROOT.iterdir() if p.is_file()] + [p for f in folders for p in (ROOT / f).rglob("*")]
+    marks = tuple(7 * mark + " " for mark in "<>")
+    for file in files:
+        if file.suffix in kinds and file.is_file():
+            lines = file.read_text(encoding="utf-8").splitlines()
+            assert not [line for line in lines if line.startswith(marks)], file
+
+
 def test_decisions_are_numbered_dated_and_in_the_index() -> None:
     text = text_of("docs/decisions.md")
     index, _, body = text.partition("\n## ")
