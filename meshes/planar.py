@@ -54,6 +54,7 @@ class Graph:
         lines: of every edge the number of its line.
         joined: how many ends were moved.
         gap: the distance that did it, mm.
+        remarks: lines of both folds that lie over each other, and which of them was taken; one line each.
     """
 
     points: Array
@@ -62,6 +63,7 @@ class Graph:
     lines: tuple[int, ...]
     joined: int
     gap: float
+    remarks: tuple[str, ...] = ()
 
     def select(self, kinds: Sequence[str]) -> Ints:
         """Numbers of the edges of some kinds, rising.
@@ -101,8 +103,7 @@ def heal(lines: Sequence[DrawnLine], gap: float) -> Graph:
         gap: what misses by up to so much is joined, mm.
 
     Raises:
-        PatternError: mountain and valley lie over each other, or lines do not come apart within the
-            tolerance.
+        PatternError: lines do not come apart within the tolerance.
     """
     web = _Web(lines, gap)
     web.attach(range(len(web.nodes)))
@@ -131,6 +132,7 @@ class _Web:
         self.shapes = np.array([shapely.LineString(line.points) for line in self.lines], dtype=object)
         self.nodes: list[tuple[float, float]] = []
         self.moved = 0
+        self.conflicts: dict[tuple[int, int], str] = {}
         self._join_ends()
 
     def _join_ends(self) -> None:
@@ -284,6 +286,7 @@ class _Web:
             lines=tuple(number for _, number in found.values()),
             joined=self.moved,
             gap=self.gap,
+            remarks=tuple(self.conflicts.values()),
         )
 
     def _put(
@@ -294,17 +297,20 @@ class _Web:
         number: int,
         points: list[tuple[float, float]],
     ) -> None:
-        """Remember an edge; of two lines that lie over each other the more telling one stays."""
+        """Remember an edge; of two lines over each other the more telling one stays, of two folds the upper one."""
         if pair not in found:
             found[pair] = kind, number
             return
         before, other = found[pair]
         if before != kind and before in FOLDED and kind in FOLDED:
             x, y = np.mean([points[pair[0]], points[pair[1]]], axis=0)
-            raise PatternError(
-                f"{self.lines[other].name} ({before}) and {self.lines[number].name} ({kind}) lie over each other "
-                f"at ({x:.6g}, {y:.6g}); remove one of them"
+            self.conflicts.setdefault(
+                (other, number),
+                f"{self.lines[other].name} ({before}) and {self.lines[number].name} ({kind}) lie over each other at "
+                f"({x:.6g}, {y:.6g}): taken as {kind}, which is drawn later; remove one of them if that is not meant",
             )
+            found[pair] = kind, number
+            return
         if RANK.index(kind) < RANK.index(before):
             found[pair] = kind, number
 

@@ -41,12 +41,14 @@ class Region:
         rings: nodes round the outside, counter-clockwise, then round every hole.
         inside: numbers of the edges inside the sheet.
         remarks: what was taken for granted, one line each.
+        stubs: numbers of the edges that stick out of the sheet a little, and were cut off.
     """
 
     polygon: Any
     rings: list[list[int]]
     inside: Ints
     remarks: list[str]
+    stubs: Ints
 
 
 def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
@@ -142,9 +144,9 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
     if lost:  # what is drawn on pieces that fell out goes with them
         gone = shapely.union_all([shapely.Polygon(graph.points[face[0]]) for face in lost])
         inside = inside[~shapely.contains_xy(gone, graph.points[graph.edges[inside]].mean(axis=1))]
-    inside = _check_inside(graph, lines, polygon, inside)
-    remarks = fallen + _rim_remarks(graph, lines, rim, inside) + _remarks(graph, lines, inside)
-    return Region(polygon, _rings(graph, rim), inside, remarks)
+    inside, stubs, told = _check_inside(graph, lines, polygon, inside)
+    remarks = fallen + told + _rim_remarks(graph, lines, rim, inside) + _remarks(graph, lines, inside)
+    return Region(polygon, _rings(graph, rim), inside, remarks, stubs)
 
 
 def _without_holes(graph: Graph, around: list[list[int]]) -> list[bool]:
@@ -212,15 +214,23 @@ def _check_ends(graph: Graph, lines: Sequence[DrawnLine], segments: Any, kinds: 
             )
 
 
-def _check_inside(graph: Graph, lines: Sequence[DrawnLine], polygon: Any, inside: Ints) -> Ints:
-    """The edges that lie in the sheet; creases outside of it are refused, lines within holes too."""
+def _check_inside(
+    graph: Graph, lines: Sequence[DrawnLine], polygon: Any, inside: Ints
+) -> tuple[Ints, Ints, list[str]]:
+    """The edges in the sheet, loose ends that stick out a little, and a remark on these; others are refused."""
     import shapely
 
     middle = graph.points[graph.edges[inside]].mean(axis=1)
     shapely.prepare(polygon)
     within = shapely.contains_xy(polygon, middle)
+    degree = np.bincount(graph.edges.ravel(), minlength=len(graph.points))
+    stubs, longest = [], 0.0
     for e in inside[~within].tolist():
         out = max(float(polygon.distance(shapely.Point(point))) for point in graph.points[graph.edges[e]])
+        if out <= NEARLY * graph.gap and degree[graph.edges[e]].min() == 1:
+            stubs.append(e)
+            longest = max(longest, out)
+            continue
         mend = (
             f", or cut off what stands out by gap = {1.05 * out:.2g}" if out < 0.05 * polygon.length else ""
         )
@@ -228,7 +238,13 @@ def _check_inside(graph: Graph, lines: Sequence[DrawnLine], polygon: Any, inside
             f"{_name(graph, lines, e)} ({graph.kinds[e]}) leaves the sheet at {_middle(graph, e)}; "
             f"end it at the outline{mend}"
         )
-    return inside
+    told = []
+    if stubs:
+        told.append(
+            f"{len(stubs)} lines stick out of the sheet by up to {longest:.2g} mm (first "
+            f"{_name(graph, lines, stubs[0])} at {_middle(graph, stubs[0])}): cut off at the outline"
+        )
+    return inside[within], np.array(stubs, dtype=np.int64), told
 
 
 def _rim_remarks(graph: Graph, lines: Sequence[DrawnLine], rim: Ints, inside: Ints) -> list[str]:

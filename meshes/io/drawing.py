@@ -111,7 +111,7 @@ def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> S
 
     graph, lines, remarks = read_graph(path, **options)
     region = region_of(graph, lines)
-    rim = np.setdiff1d(np.arange(len(graph.edges)), region.inside)
+    rim = np.setdiff1d(np.arange(len(graph.edges)), [*region.inside.tolist(), *region.stubs.tolist()])
     letters = ["F" if kind == "boundary" else LETTERS[kind] for kind in graph.kinds]
     for e in rim.tolist():
         letters[e] = "B"
@@ -122,7 +122,9 @@ def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> S
     ]
     known = any(not math.isnan(line.angle) for line in lines)
     points = np.column_stack((graph.points, np.zeros(len(graph.points))))
-    edges = [(int(a), int(b)) for a, b in graph.edges.tolist()]
+    kept = np.setdiff1d(np.arange(len(graph.edges)), region.stubs).tolist()
+    edges = [(int(a), int(b)) for a, b in graph.edges[kept].tolist()]
+    letters, angles = [letters[e] for e in kept], [angles[e] for e in kept]
     mesh = sheet_of_frame(Frame(points, edges, letters, angles if known else None, []))
     return replace(mesh, kind="drawn", remarks=(*remarks, *region.remarks, *mesh.remarks))
 
@@ -202,7 +204,8 @@ def read_graph(
     if outline == "hull":
         drawn.append(_hull(drawn))
         remarks.append("the outline is the convex hull of what is drawn")
-    return heal(drawn, gap), drawn, [*remarks, *rules.remarks, *joined]
+    graph = heal(drawn, gap)
+    return graph, drawn, [*remarks, *rules.remarks, *joined, *graph.remarks]
 
 
 def _check(lengths: Mapping[str, float | None], outline: str) -> None:

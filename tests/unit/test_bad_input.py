@@ -239,11 +239,11 @@ def test_fold_file_is_refused(tmp_path: Path, content: Any, words: Any) -> None:
 FILE_CASES = [
     ("missing", 'file = "other.fold"', "", ["pattern.file", "other.fold", "cannot be read"]),
     ("folder", 'file = "sub.fold"', "", ["pattern.file", "sub.fold", "folder"]),
-    ("other format", 'file = "sheet.stl"', "", ["pattern.file", "sheet.stl", ".svg, .dxf or .fold"]),
+    ("other format", 'file = "sheet.stl"', "", ["pattern.file", "sheet.stl", ".svg", ".dxf", ".opx, .fold"]),
     ("no name", 'file = ""', "", ['pattern.file = ""']),
     ("frame", 'file = "sheet.fold"\nframe = 3', "", ["no frame 3"]),
     ("odd frame", 'file = "sheet.fold"\nframe = -1', "", ["pattern.frame = -1"]),
-    ("meshed already", 'file = "sheet.fold"', BASE["mesh"], ["mesh", "remove [mesh]"]),
+    ("no rails", 'file = "sheet.fold"', BASE["mesh"], ["mesh.kind", 'use kind = "gmsh" with size']),
     ("null character", 'file = "a\\u0000.fold"', "", ["pattern.file"]),
     ("crease", 'file = "sheet.fold"', "", ["no crease 'crease'", "mountain"]),
 ]

@@ -228,10 +228,22 @@ class TestHealing:
         again = line(40, 0, 60, 60) + line(60, 60, 40, 0) + line(45, 15, 55, 45)
         pattern = read_pattern(svg(tmp_path, SQUARE + again))
         assert [c.curve.length for c in pattern.creases] == pytest.approx([math.hypot(20, 60)])
-        message = refused(tmp_path, SQUARE + line(40, 0, 60, 60) + line(60, 60, 40, 0, 'stroke="blue"'))
-        assert "mountain" in message
-        assert "valley" in message
-        assert "lie over each other" in message
+        upper = read_pattern(
+            svg(tmp_path, SQUARE + line(40, 0, 60, 60) + line(60, 60, 40, 0, 'stroke="blue"'))
+        )
+        assert [c.fold for c in upper.creases] == ["valley"]  # what is drawn later is what one sees
+        (remark,) = [text for text in upper.remarks if "lie over each other" in text]
+        assert "(mountain)" in remark
+        assert "(valley)" in remark
+
+    def test_what_sticks_out_a_little_is_cut_off(self, tmp_path: Path) -> None:
+        file = svg(tmp_path, SQUARE + line(40, -0.5, 40, 60))  # ten times the gap
+        pattern = read_pattern(file)
+        assert [c.curve.length for c in pattern.creases] == pytest.approx([60.0])
+        assert any("stick out of the sheet by up to 0.5 mm" in text for text in pattern.remarks)
+        mesh = read_drawn(file)
+        assert mesh.areas.sum() == pytest.approx(6000.0)
+        assert mesh.folds["m1"] == "mountain"
 
     def test_a_curve_drawn_twice(self, tmp_path: Path) -> None:
         curve = '<path d="M40,0 C60,20 60,40 40,60" stroke="red"/>'
