@@ -21,6 +21,8 @@ from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
 
+OF_GIVEN_STIFFNESS: str = "bars-and-hinges"  # no other formulation has elements to which it could be given
+
 
 @dataclass(frozen=True, repr=False)
 class Model:
@@ -132,7 +134,7 @@ class Model:
         model = cls(
             mesh,
             Sheet(E=float(np.mean(k_bar)), t=1.0),
-            formulation="bars-and-hinges",
+            formulation=OF_GIVEN_STIFFNESS,
             stiffness=ElementStiffness(k_bar, k_hinge, green),
         )
         if len(creased):
