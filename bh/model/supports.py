@@ -292,7 +292,8 @@ def free_motions(points: Array, constraints: Constraints) -> Array:
 
 def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints) -> None:
     """Nothing of the sheet is free, unless the rest is to be taken out; each piece of a parted sheet counts alone."""
-    count = int(mesh.pieces.max()) + 1
+    bodies = _bodies(mesh)
+    count = int(bodies.max()) + 1
     if constraints.rigid_body and count > 1:
         raise ModelError(
             f"cuts part the sheet into {count} pieces, and nothing holds them to each other: hold each of them by "
@@ -301,11 +302,26 @@ def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints) -> None:
     if constraints.rigid_body:
         return
     for number in range(count):
-        triangles = mesh.triangles[mesh.pieces == number]
+        triangles = mesh.triangles[bodies == number]
         nodes = np.arange(len(mesh.points)) if count == 1 else np.unique(triangles)
         x, y, _ = mesh.points[nodes].mean(axis=0)
         where = f" of the piece at ({x:.4g}, {y:.4g})" if count > 1 else ""
         _check_piece(mesh, _restricted(constraints, nodes), nodes, where)
+
+
+def _bodies(mesh: SheetMesh) -> Ints:
+    """(t,) number of the body of each triangle: pieces that share a node, as those of a truss do, are one."""
+    piece = mesh.pieces
+    count = int(piece.max()) + 1
+    if count == 1:
+        return piece
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = np.repeat(piece, 3), count + mesh.triangles.ravel()
+    graph = coo_array((np.ones(len(pairs[0])), pairs), shape=(count + len(mesh.points),) * 2)
+    labels = connected_components(graph, directed=False)[1][:count]
+    return np.asarray(np.unique(labels, return_inverse=True)[1][piece], dtype=np.int64)
 
 
 def _restricted(constraints: Constraints, nodes: Ints) -> Constraints:

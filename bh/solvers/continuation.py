@@ -21,7 +21,6 @@ from bh.solvers.system import System
 
 Array = NDArray[np.float64]
 LOOK = 2  # cuts of an increment before a bifurcation is looked for
-SHORT = 80  # iterations of globalised Newton before that
 AtBifurcation = Literal["stable", "primary", "stop"]
 
 
@@ -186,8 +185,7 @@ class LoadControl:
         iterations, note, branch = found.iterations, "", NO_BRANCH
         downhill = look and not brisk and not found.converged
         if downhill:
-            short = min(SHORT, newton.globalised)
-            primary = found = replace(newton, full=0, globalised=short, transient=None).solve(system, q, lam)
+            primary = found = replace(newton, full=0, transient=None).solve(system, q, lam)
             iterations += found.iterations
         # with one state only the increments are still large, and cutting them costs less than looking
         if look and (not found.converged if downhill else _lost(found) and len(points) > 1):
@@ -196,7 +194,7 @@ class LoadControl:
             if branch.points:
                 return _Trial(here, found, primary, "", "", iterations, branch)
         if downhill and not found.converged:
-            primary = found = replace(newton, full=0).solve(system, found.q, lam)
+            primary = found = replace(newton, full=0, globalised=1).solve(system, found.q, lam)
             iterations += found.iterations
         if not found.converged:  # it may hold anything; nothing is asked of it
             return _Trial(here, found, primary, found.reason, "", iterations, branch)

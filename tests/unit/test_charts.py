@@ -24,7 +24,8 @@ from tests.unit.test_plotting import needs_opengl
 def path() -> bh.Path:
     """A sector held at one end, folded softly, then pushed at the tip of its crease."""
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.6), along=8)
-    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127)).support("edge:start", "xyz").support("edge:end", "z")
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges")
+    model = model.support("edge:start", "xyz").support("edge:end", "z")
     tip = int(mesh.nodes("crease:crease")[-1])
     return bh.trace(model.fold("crease", rest=2.2, Lstar=25.0).step(Displace([tip], "x", -3.0)))
 

@@ -78,7 +78,7 @@ def test_a_formulation_is_refused_before_anything_is_solved(monkeypatch: pytest.
 def test_a_system_without_a_member_is_refused_before_its_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr("bh.mechanics.shared.base_system.SupportedSheet.loads")
     with pytest.raises(ModelError, match="BarsAndHingesSystem without loads, which is no system"):
-        bh.trace(bh.Model(MESH, SHEET).fold("crease", to=3.0))
+        bh.trace(bh.Model(MESH, SHEET, formulation="bars-and-hinges").fold("crease", to=3.0))
 
 
 def test_what_a_system_has_to_offer() -> None:
@@ -119,8 +119,9 @@ def test_remarks_are_each_formulations_own() -> None:
         name: [remark.code for remark in bh.remarks(bh.Model(slender, SHEET, formulation=name))]
         for name in names()
     }
-    assert said["bars-and-hinges"] == ["aspect-ratio", "diagonals"]
-    assert said["consistent"] == said["shell"] == []
+    assert said["bars-and-hinges"] == ["crease", "aspect-ratio", "diagonals"]
+    assert said["consistent"] == ["rows"]
+    assert said["shell"] == []
 
 
 def test_the_protocols_are_in_one_file() -> None:

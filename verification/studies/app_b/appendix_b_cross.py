@@ -57,7 +57,7 @@ def run(context: Context) -> CaseResult:
         question="How far are energies, crease, fold angles and loads from those of the shell, and at what cost?",
         source="source App. B, Fig. B.4; the shell on the same sheet is the reference",
     )
-    along, rows = (32, 4) if context.quick else (64, 8)
+    along, rows = (48, 6) if context.quick else (64, 8)
     for formulation in ("shell", "consistent", "bars-and-hinges"):
         solve("b", 4, 1, formulation)  # kernels are loaded before anything is timed
     for actuation in ACTUATIONS:
