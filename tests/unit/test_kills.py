@@ -79,10 +79,17 @@ def until(done: Callable[[], bool], seconds: float) -> bool:
 
 def started(words: list[str], ready: Callable[[], bool], **options: Any) -> subprocess.Popen[str]:
     """A program in a session of its own, as soon as it is ready."""
-    program = subprocess.Popen(words, start_new_session=True, stderr=subprocess.PIPE, text=True, **options)
+    program = subprocess.Popen(
+        words, start_new_session=True, stderr=subprocess.PIPE, text=True, preexec_fn=heeding, **options
+    )
     assert until(lambda: ready() or program.poll() is not None, 60.0), "it never began"
     assert program.poll() is None, program.stderr.read() if program.stderr else ""
     return program
+
+
+def heeding() -> None:
+    """Interrupts count in a child, also where the tests run in the background of a shell, which ignores them there."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @linux
@@ -111,7 +118,9 @@ def test_an_interrupt_ends_verify(tmp_path: Path) -> None:
     """Workers are busy or only starting: exit code 130, one line, nobody left behind."""
     words = [sys.executable, "-m", "bh.commands.cli", "verify", "fig5_9", "fig5_10", "--jobs", "2"]
     words += ["--results", str(tmp_path / "results")]
-    program = subprocess.Popen(words, start_new_session=True, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    program = subprocess.Popen(
+        words, start_new_session=True, stderr=subprocess.PIPE, text=True, cwd=ROOT, preexec_fn=heeding
+    )
     try:
         assert until(lambda: len(members(program.pid)) >= 3, 60.0)
         time.sleep(0.3)
