@@ -140,9 +140,8 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
-    from bh.commands.run import UNFINISHED, extras, holds_states, solve
+    from bh.commands.run import UNFINISHED, holds_states, solve, write_extras
     from bh.commands.summary import summary
-    from bh.errors import InputError
     from bh.scene.load import load_scene
 
     loaded = load_scene(scene)
@@ -159,14 +158,7 @@ def run(
     if before and not quiet:
         say(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
     written = [folder / name for name in names]
-    for name, write in extras(path, loaded, folder, pictures, vtu).items():
-        try:
-            write()
-        except (InputError, ImportError, OSError) as error:
-            raise InputError(
-                f"the result is in '{folder}', but {name} could not be written: {error}"
-            ) from error
-        written.append(folder / name)
+    written += write_extras(path, loaded, folder, pictures, vtu)
     if not quiet:
         summary(path, loaded, written, contact)
     if path.reached and path.accuracy is not None and not path.accuracy.met:

@@ -13,7 +13,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bh.analysis.contact import first_contact
-from bh.commands.run import FINISHED, UNFINISHED, extras, make_folder, remove_extras, result, solve, take_back
+from bh.commands.run import (
+    FINISHED,
+    UNFINISHED,
+    make_folder,
+    remove_extras,
+    result,
+    solve,
+    take_back,
+    write_extras,
+)
 from bh.errors import InputError
 from bh.paths.path import Path as Trace
 from bh.runtime.progress import ProgressMeter, meter, stage
@@ -180,12 +189,5 @@ def _kept(
     with replacing(folder / FINISHED[1]) as draft:
         draft.write_text(json.dumps(text, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     written = [target, *(folder / name for name in FINISHED)]
-    for name, write in extras(path, scene, folder, False, False).items():
-        try:
-            write()
-        except (InputError, ImportError, OSError) as error:
-            raise InputError(
-                f"the result is in '{folder}', but {name} could not be written: {error}"
-            ) from error
-        written.append(folder / name)
+    written += write_extras(path, scene, folder)
     return Folded(path, scene, offer, tuple(written), notes, time.process_time() - began)

@@ -353,6 +353,36 @@ def remove_extras(folder: Path, mark: str) -> None:
             (folder / f"path{mark}").rmdir()
 
 
+def write_extras(
+    path: Trace, scene: Scene, folder: Path, pictures: bool = False, vtu: bool = False
+) -> list[Path]:
+    """Write what is wished for beside the result, and return the files.
+
+    Args:
+        path: solved, as far as it goes.
+        scene: whose outputs are written.
+        folder: for the files.
+        pictures: also draw the folded sheet.
+        vtu: also write all states for ParaView.
+
+    Returns:
+        the files.
+
+    Raises:
+        InputError: one of them cannot be written; the result is.
+    """
+    written = []
+    for name, write in extras(path, scene, folder, pictures, vtu).items():
+        try:
+            write()
+        except (InputError, ImportError, OSError) as error:
+            raise InputError(
+                f"the result is in '{folder}', but {name} could not be written: {error}"
+            ) from error
+        written.append(folder / name)
+    return written
+
+
 def extras(
     path: Trace, scene: Scene, folder: Path, pictures: bool, vtu: bool
 ) -> dict[str, Callable[[], object]]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.hyperplane import correct
-from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, point
+from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, interpolate, point
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import count_negative, lowest_mode
 from bh.solvers.newton import Newton
@@ -186,7 +186,7 @@ def _onward(
     points, amplitudes, states, spent = [origin, first.point], [0.0, amplitude], [first], 0
     while len(states) < STATES and points[-1].lam < (1.0 + FAR) * origin.lam:
         target = GROWTH * amplitudes[-1]
-        q, lam, forces = _extrapolated(points[-3:], amplitudes[-3:], target)
+        q, lam, forces = interpolate(points[-3:], amplitudes[-3:], target)
         there, used = _corrected(system, q, lam, forces, mode, tolerance)
         spent += used
         if there is None or there.point.negative != 0 or not points[-1].lam < there.point.lam < 1.0:
@@ -207,13 +207,3 @@ def _corrected(
     negative = count_negative(system.tangent(found.q, found.lam, found.evaluation.forces).matrix)
     there = point(system, found.q, found.lam, evaluation=found.evaluation, negative=negative)
     return State(there, found.evaluation.imbalance), found.iterations
-
-
-def _extrapolated(points: list[Point], at: list[float], target: float) -> tuple[Array, float, Array]:
-    """Unknowns, lambda and element forces of the polynomial through states at the amplitudes `at`."""
-    weights = [
-        float(np.prod([(target - b) / (a - b) for j, b in enumerate(at) if j != i])) for i, a in enumerate(at)
-    ]
-    q = np.asarray(weights) @ np.array([p.q for p in points])
-    forces = np.tensordot(weights, np.array([p.forces for p in points]), axes=1)
-    return q, float(np.dot(weights, [p.lam for p in points])), forces

@@ -136,6 +136,29 @@ def power_rate(system: System, here: Point) -> float:
     return system.control_stiffness(here.q, here.lam) - float(rate @ factor.solve(rate))
 
 
+def interpolate(points: Sequence[Point], at: Sequence[float], target: float) -> tuple[Array, float, Array]:
+    """The state at `target` by the polynomial through states at other values of a parameter.
+
+    Args:
+        points: states, up to three.
+        at: the parameter of each, such as lambda or an amplitude.
+        target: its value asked for.
+
+    Returns:
+        (n,) unknowns, lambda and (f,) element forces, N or N mm.
+    """
+    q, lam, forces = np.zeros_like(points[-1].q), 0.0, np.zeros_like(points[-1].forces)
+    for i, item in enumerate(points):
+        weight = 1.0
+        for j, other in enumerate(at):
+            if j != i:
+                weight *= (target - other) / (at[i] - other)
+        q += weight * item.q
+        lam += weight * item.lam
+        forces += weight * item.forces
+    return q, lam, forces
+
+
 def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:
     """Unknowns and element forces at `lam` by the polynomial through up to three points (constant, line, parabola).
 
@@ -146,14 +169,7 @@ def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:
     Returns:
         (n,) unknowns and (f,) element forces, N or N mm.
     """
-    q, forces = np.zeros_like(points[-1].q), np.zeros_like(points[-1].forces)
-    for i, item in enumerate(points):
-        weight = 1.0
-        for j, other in enumerate(points):
-            if j != i:
-                weight *= (lam - other.lam) / (item.lam - other.lam)
-        q += weight * item.q
-        forces += weight * item.forces
+    q, _, forces = interpolate(points, [item.lam for item in points], lam)
     return q, forces
 
 
