@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bh.formulations.registry import remarks
     from bh.formulations.remarks import Remark
     from bh.formulations.state import Energy, State
-    from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
+    from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
     from bh.model.model import Model
     from bh.model.pinch import Pinch
     from bh.model.refinement import Goal, Refinement
@@ -43,7 +43,7 @@ _NAMES = {
     "bh.formulations.registry": "remarks",
     "bh.formulations.remarks": "Remark",
     "bh.formulations.state": "Energy State",
-    "bh.model.actuations": "Displace Fold Force Indenter Moment Tether",
+    "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
     "bh.model.refinement": "Goal Refinement",
@@ -107,6 +107,7 @@ __all__ = [
     "Path",
     "PathFileError",
     "Pinch",
+    "Pull",
     "Refinement",
     "Remark",
     "RigidBody",

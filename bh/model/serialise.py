@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import PathFileError
-from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
+from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
 from bh.model.model import Model
 from bh.model.pinch import Pinch
 from bh.model.plugins import consent, from_file
@@ -33,7 +33,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "displace": Displace,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
-STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether}
+STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether, "pull": Pull}
 FORMAT = 2  # raised with every change of the description
 
 
