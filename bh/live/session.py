@@ -110,6 +110,7 @@ class Session:
         self._builder = LoadStepBuilder(self.model)
         self._gone: tuple[int, ...] = ()
         self._past: list[Controls] = []
+        self._undone: list[Controls] = []
         self._iterations = 0
         self._stable: bool | None = True
         self._under = self._begin(Way(self._wanted, self._wanted), None)
@@ -120,6 +121,11 @@ class Session:
     def mesh(self) -> SheetMesh:
         """Of the sheet."""
         return self.model.mesh
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self._under.system.size
 
     @property
     def wanted(self) -> Controls:
@@ -181,8 +187,30 @@ class Session:
             self._past.pop()
         if not self._past:
             return False
-        self._wanted = self._past.pop()
+        undone = [*self._undone, self._wanted]
+        self._ask(self._past.pop())
+        self._undone = undone
         return True
+
+    def redo(self) -> bool:
+        """Take the last `undo` back; False if there is none, or something else was asked for since."""
+        if not self._undone:
+            return False
+        left, wanted = self._undone[:-1], self._undone[-1]
+        self._ask(wanted)
+        self._undone = left
+        return True
+
+    def ask(self, wanted: Controls) -> None:
+        """Ask for all controls at once, such as those of another session of the same sheet.
+
+        Raises:
+            ModelError: a crease or node is not there.
+        """
+        for name, angle in wanted.folds.items():
+            self.fold(name, angle)
+        for node, grip in wanted.grips.items():
+            self.pull(node, grip.to, grip.stiffness)
 
     # ------------------------------------------------------------------------------- what it answers
 
@@ -245,7 +273,7 @@ class Session:
 
     def _ask(self, wanted: Controls) -> None:
         if wanted != self._wanted:
-            self._wanted = wanted
+            self._wanted, self._undone = wanted, []
             self._under.march.stuck = ""
 
     def _busy(self) -> bool:

@@ -31,9 +31,10 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "moment": Moment,
     "force": Force,
     "displace": Displace,
+    "pull": Pull,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
-STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether, "pull": Pull}
+STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether}
 FORMAT = 2  # raised with every change of the description
 
 

@@ -1,0 +1,8 @@
+"""A window in which a sheet is folded, pulled and read while it is handled: `bh studio`, `bh.studio.open_window`.
+
+The physics is `bh.live`; the server speaks to a browser on the same machine and to nobody else.
+"""
+
+from bh.studio.server import open_window
+
+__all__ = ["open_window"]
