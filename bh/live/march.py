@@ -97,7 +97,8 @@ class March:
                 )
                 if not reason:
                     self.snapped = bool(note) or (free and bool(self._off(here, there)))
-                    self.points = [there] if self.snapped else [*self.points[-2:], there]
+                    before = [] if self.snapped else [at for at in self.points[-2:] if at.lam != lam]
+                    self.points = [*before, there]
                     self._increment = min(self.settings.limits(self.system)[1], 2.0 * size if not cuts else size)
                     return
             if free:

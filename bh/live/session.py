@@ -29,7 +29,7 @@ from meshes import SheetMesh
 from meshes.mesh import count
 
 Array = NDArray[np.float64]
-GRIP = 2e-3  # stiffness of a grip, in parts of E t
+GRIP = 200.0  # stiffness of a grip in parts of D / L^2, of a panel as large as the sheet: it gives way, yet leads
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ class Session:
         if len(to) != 3 or not all(math.isfinite(x) for x in to):
             raise ModelError(f"node {node} cannot be pulled to {to}; give three numbers of mm")
         old = self._wanted.grips.get(node)
-        given = stiffness or (old.stiffness if old else GRIP * self.model.sheet.E * self.model.sheet.t)
+        given = stiffness or (old.stiffness if old else self._soft)
         x, y, z = (float(c) for c in to)
         self._ask(Controls(self._wanted.folds, {**self._wanted.grips, node: Grip((x, y, z), given)}))
 
@@ -215,10 +215,10 @@ class Session:
     # ------------------------------------------------------------------------------- what it answers
 
     def update(self, budget: float = 0.03) -> Frame:
-        """The newest equilibrium after at most about `budget` of work: it is left after the iteration in hand.
+        """The newest equilibrium after about `budget` of work: it is left after the iteration in hand, the first at least.
 
         Args:
-            budget: s of wall time.
+            budget: s of wall time; 0 for no work.
 
         Returns:
             a frame; `at_rest` says whether it is that of what is wanted.
@@ -228,9 +228,11 @@ class Session:
         with one_blas_thread():
             self._aim()
             march = self._under.march
-            while time.perf_counter() - began < budget and self._busy():
+            going = budget > 0.0  # one iteration at least, however little time there is
+            while going and self._busy():
                 march = self._under.march
                 snapped = snapped or march.snapped
+                going = time.perf_counter() - began < budget
             snapped = snapped or march.snapped
             march.snapped = False
             frame = self._frame(snapped, time.perf_counter() - began)
@@ -270,6 +272,12 @@ class Session:
     def _spring(self, crease: str) -> dict[str, float | None]:
         law = self.model.creases.get(crease)
         return {} if law is None else {"Lstar": law.Lstar, "stiffness": law.stiffness}
+
+    @property
+    def _soft(self) -> float:
+        """Stiffness of a grip that suits the sheet, N/mm."""
+        size = float(np.ptp(self.mesh.points, axis=0).max())
+        return GRIP * self.model.sheet.bending_stiffness(nu=0.0) / size**2
 
     def _ask(self, wanted: Controls) -> None:
         if wanted != self._wanted:

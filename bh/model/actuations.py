@@ -327,6 +327,7 @@ class Pull(Body):
         for key, value in (("to", self.to), ("start", self.start)):
             if value is not None:
                 _vector(f"pull at node {self.node}: {key}", value)
+                object.__setattr__(self, key, tuple(float(x) for x in value))  # lists, as files hold them
         if not (math.isfinite(self.stiffness) and self.stiffness > 0.0):
             raise ModelError(
                 f"pull at node {self.node}: stiffness = {self.stiffness} cannot be; give a positive number of N/mm"
