@@ -53,7 +53,11 @@ class Controls:
         object.__setattr__(self, "grips", MappingProxyType(dict(self.grips)))
 
     def vector(self) -> Array:
-        """Its numbers in one array: angles, rad, then points, mm."""
+        """Its numbers in one array.
+
+        Returns:
+            (folds + 3 grips,) angles, rad, then points, mm.
+        """
         points = [x for grip in self.grips.values() for x in grip.to]
         return np.array([*self.folds.values(), *points])
 
@@ -88,6 +92,10 @@ class Way:
 
         A unit of lambda is `UNIT` rad of the crease that turns most, or what is left of its range; a pull ends where
         it is wanted.
+
+        Args:
+            start: what the sheet is in equilibrium with.
+            wanted: of the same creases and nodes.
         """
         change = wanted.vector() - start.vector()
         folds = len(start.folds)
@@ -131,12 +139,23 @@ class Way:
         """
         items: list[Actuation] = []
         for crease, angle in self.end.folds.items():
-            law = laws.get(crease)
-            spring = {} if law is None else {"Lstar": law.Lstar, "stiffness": law.stiffness}
-            items.append(Fold(crease, by=angle, **spring))
+            items.append(fold_of(crease, angle, laws.get(crease)))
         items += [Force([node], each=(0.0, 0.0, 0.0)) for node in gone]
         items += [
             Pull(node, grip.to, grip.stiffness, self.start.grips[node].to)
             for node, grip in self.end.grips.items()
         ]
         return tuple(items)
+
+
+def fold_of(crease: str, angle: float, law: CreaseLaw | None) -> Fold:
+    """The fold of a crease to an angle: imposed, or the rest angle of its spring.
+
+    Args:
+        crease: its name.
+        angle: rad, positive the way that it is drawn.
+        law: of its spring; None where it has none.
+    """
+    if law is None:
+        return Fold(crease, by=angle)
+    return Fold(crease, by=angle, Lstar=law.Lstar, stiffness=law.stiffness)

@@ -87,9 +87,7 @@ class March:
                 found, note = yield from self._downhill(found, lam)
                 reason = "" if note else "no stable state was found nearby"
             if not reason:
-                there = point(
-                    self.system, found.q, lam, evaluation=found.evaluation, negative=found.negative
-                )
+                there = point(self.system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
                 reason = (
                     self.system.penetration(here.q, here.lam, there.q, lam)
                     if note or free
@@ -99,7 +97,9 @@ class March:
                     self.snapped = bool(note) or (free and bool(self._off(here, there)))
                     before = [] if self.snapped else [at for at in self.points[-2:] if at.lam != lam]
                     self.points = [*before, there]
-                    self._increment = min(self.settings.limits(self.system)[1], 2.0 * size if not cuts else size)
+                    self._increment = min(
+                        self.settings.limits(self.system)[1], 2.0 * size if not cuts else size
+                    )
                     return
             if free:
                 self.stuck = reason
@@ -131,5 +131,3 @@ class March:
             if found.converged and found.stable and found.evaluation.energy < best.evaluation.energy:
                 best = found
         return best, "" if best is saddle else "snapped"
-
-

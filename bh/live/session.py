@@ -14,14 +14,13 @@ from bh.errors import ModelError
 from bh.formulations.protocols import SheetSystem
 from bh.formulations.registry import formulation
 from bh.formulations.state import State
-from bh.live.controls import CLOSED, Controls, Grip, Vector, Way
+from bh.live.controls import CLOSED, Controls, Grip, Vector, Way, fold_of
 from bh.live.march import March
 from bh.loading.builder import LoadStepBuilder
 from bh.loading.load_step import LoadStep, StepEnd
-from bh.model.actuations import Fold, Force, Pull
+from bh.model.actuations import Force, Pull
 from bh.model.model import Model
 from bh.model.step import Actuation, Step
-from bh.model.supports import Support
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.continuation import LoadControl
 from bh.solvers.increments import point
@@ -44,6 +43,7 @@ class Frame:
         note: why it cannot go on to what is wanted, or an empty string.
         iterations: of Newton's method in all so far.
         seconds: that the update took.
+        fading: what has pulled until now still does, a part of it.
     """
 
     state: State
@@ -54,11 +54,12 @@ class Frame:
     note: str
     iterations: int
     seconds: float
+    fading: bool = False
 
     @property
     def at_rest(self) -> bool:
         """Whether this is the equilibrium of what is wanted."""
-        return self.controls == self.wanted
+        return self.controls == self.wanted and not self.fading
 
     @property
     def points(self) -> Array:
@@ -66,10 +67,15 @@ class Frame:
         return self.state.points
 
     def fold_angles(self) -> dict[str, float]:
-        """Mean fold angle of every crease that is handled, rad, positive the way that it is drawn."""
+        """Mean fold angle of every crease that is handled.
+
+        Returns:
+            rad by name, positive the way that the crease is drawn.
+        """
         mesh = self.state.mesh
         return {
-            name: float(self.state.fold_angle(name).mean()) * (-1.0 if mesh.folds.get(name) == "valley" else 1.0)
+            name: float(self.state.fold_angle(name).mean())
+            * (-1.0 if mesh.folds.get(name) == "valley" else 1.0)
             for name in self.controls.folds
         }
 
@@ -168,7 +174,9 @@ class Session:
             ModelError: no such node, or no point.
         """
         if not 0 <= node < len(self.mesh.points):
-            raise ModelError(f"there is no node {node} to pull; choose one of 0 to {len(self.mesh.points) - 1}")
+            raise ModelError(
+                f"there is no node {node} to pull; choose one of 0 to {len(self.mesh.points) - 1}"
+            )
         if len(to) != 3 or not all(math.isfinite(x) for x in to):
             raise ModelError(f"node {node} cannot be pulled to {to}; give three numbers of mm")
         old = self._wanted.grips.get(node)
@@ -215,10 +223,10 @@ class Session:
     # ------------------------------------------------------------------------------- what it answers
 
     def update(self, budget: float = 0.03) -> Frame:
-        """The newest equilibrium after about `budget` of work: it is left after the iteration in hand, the first at least.
+        """The newest equilibrium after about `budget` of work, which ends behind the iteration in hand.
 
         Args:
-            budget: s of wall time; 0 for no work.
+            budget: s of wall time, one iteration at least; 0 for no work.
 
         Returns:
             a frame; `at_rest` says whether it is that of what is wanted.
@@ -258,9 +266,8 @@ class Session:
         Returns:
             a model for `bh.trace`; where the sheet has snapped on its way here it may end on another branch.
         """
-        folds = tuple(
-            Fold(name, by=angle, **self._spring(name)) for name, angle in self._wanted.folds.items()
-        )
+        laws = self.model.creases
+        folds = tuple(fold_of(name, angle, laws.get(name)) for name, angle in self._wanted.folds.items())
         pulls: tuple[Actuation, ...] = tuple(
             Pull(node, grip.to, grip.stiffness) for node, grip in self._wanted.grips.items()
         )
@@ -268,10 +275,6 @@ class Session:
         return replace(self.model, steps=tuple(steps))
 
     # ------------------------------------------------------------------------------- its own
-
-    def _spring(self, crease: str) -> dict[str, float | None]:
-        law = self.model.creases.get(crease)
-        return {} if law is None else {"Lstar": law.Lstar, "stiffness": law.stiffness}
 
     @property
     def _soft(self) -> float:
@@ -288,7 +291,7 @@ class Session:
         """One iteration more; False where there is nothing left to do."""
         if self._under.march.advance():
             return True
-        if self._under.march.stuck or self._now() == self._wanted:
+        if self._under.march.stuck or (self._now() == self._wanted and not self._fading()):
             return False
         self._aim()
         return self._under.march.advance()
@@ -298,11 +301,11 @@ class Session:
         under = self._under
         if under.march.stuck:
             return
-        lam = under.way.find(self._wanted)
-        if lam is not None and not self._fading():
+        if self._fading():
+            if under.way.end == self._wanted:
+                return  # to its end, where nothing pulls any more
+        elif (lam := under.way.find(self._wanted)) is not None:
             under.march.target = lam
-            return
-        if lam is not None and under.march.target == lam:
             return
         now = self._now()
         self._iterations += under.march.iterations
@@ -317,7 +320,8 @@ class Session:
                 x, y, z = state.points[node].tolist()
                 start = Controls(start.folds, {**start.grips, node: Grip((x, y, z), grip.stiffness)})
         kept = {node: start.grips[node] for node in self._wanted.grips}
-        way = Way.toward(Controls(start.folds, kept), self._wanted)
+        start = Controls(start.folds, kept)
+        way = Way(start, self._wanted) if self._gone else Way.toward(start, self._wanted)
         self._under = self._begin(way, state)
 
     def _fading(self) -> bool:
@@ -332,7 +336,8 @@ class Session:
         if gone:
             keep = Step(tuple(Force([node], each=forces[node]) for node in gone))
             self._builder.build(keep)
-        self._gone = tuple(dict.fromkeys([*self._gone, *gone]))
+        still = [node for node in self._gone if self._fading()]  # what has faded out is forgotten
+        self._gone = tuple(dict.fromkeys([*still, *gone]))
 
     def _begin(self, way: Way, state: State | None) -> _Under:
         gone = tuple(node for node in self._gone if node not in way.end.grips)
@@ -371,7 +376,15 @@ class Session:
         state, now = self._state(), self._now()
         iterations = self._iterations + self._under.march.iterations
         return Frame(
-            state, now, self._wanted, self._forces(now, state), snapped, self._under.march.stuck, iterations, seconds
+            state,
+            now,
+            self._wanted,
+            self._forces(now, state),
+            snapped,
+            self._under.march.stuck,
+            iterations,
+            seconds,
+            self._fading(),
         )
 
     def __repr__(self) -> str:

@@ -235,7 +235,8 @@ class PullTable(Table):
     to: Vector = Field(description=VECTOR + " in mm, the point that the node is pulled to by a spring")
     stiffness: Positive = Field(description="the stiffness of the spring in N/mm, a positive number")
     start: Vector | None = Field(
-        None, description=VECTOR + " in mm, the point where the step begins; where the node is then unless given"
+        None,
+        description=VECTOR + " in mm, the point where the step begins; where the node is then unless given",
     )
 
 

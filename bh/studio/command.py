@@ -44,5 +44,7 @@ def _sheet(file: str | None, material: str) -> LiveSheet | None:
         with Path(file).open("rb") as stream:
             data = stream.read(LONGEST + 1)
     except OSError as error:
-        raise InputError(f"'{file}' cannot be read ({error.strerror}); give a drawing, or one of {', '.join(LIBRARY)}") from error
+        raise InputError(
+            f"'{file}' cannot be read ({error.strerror}); give a drawing, or one of {', '.join(LIBRARY)}"
+        ) from error
     return of_file(file, data, material)

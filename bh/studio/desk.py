@@ -43,7 +43,12 @@ class Desk:
     # ------------------------------------------------------------------------------- what is asked
 
     def put(self, sheet: LiveSheet, controls: Controls | None = None) -> None:
-        """Put a sheet on the desk, flat or as it was."""
+        """Put a sheet on the desk.
+
+        Args:
+            sheet: to be handled.
+            controls: as it was handled before; None for flat.
+        """
         model = sheet.model if sheet.model.supports else held(sheet.model)
         self.sheet = replace(sheet, model=model)
         self.session = Session(model)
@@ -52,7 +57,7 @@ class Desk:
         self.frame = self.session.update(0.0)
         self._shown = ()
 
-    def take(self, message: asked.Asked) -> list[Json]:  # noqa: C901, PLR0912 - one branch a message
+    def take(self, message: asked.Asked) -> list[Json]:
         """Do what a window asks.
 
         Args:
@@ -64,45 +69,50 @@ class Desk:
         Raises:
             InputError: it cannot be done; the desk is as before.
         """
-        session = self.session
+        if self._laid(message):
+            return [self.describe()]
         match message:
-            case asked.Open(name=name, data=data):
-                self.put(of_file(name, data, self.material))
-                return [self.describe()]
-            case asked.Pattern(name=name):
-                self.put(of_library(name, self.material))
-                return [self.describe()]
             case asked.Fold(crease=crease, angle=angle):
-                session.fold(crease, angle)
+                self.session.fold(crease, angle)
             case asked.Percent(value=value):
-                for crease in session.creases:
-                    session.fold(crease, 0.01 * value * self.sheet.full[crease])
+                for crease in self.session.creases:
+                    self.session.fold(crease, 0.01 * value * self.sheet.full[crease])
             case asked.Pull(node=node, to=to):
-                session.pull(node, to)
+                self.session.pull(node, to)
             case asked.LetGo(node=node):
-                session.let_go(node)
-            case asked.Hold(node=node, on=on):
-                self._hold(node, on)
-                return [self.describe()]
-            case asked.Material():
-                self._change(message)
-                return [self.describe()]
-            case asked.Plain(do="undo"):
-                if not session.undo():
-                    return [_line("there is nothing to undo")]
-            case asked.Plain(do="redo"):
-                if not session.redo():
-                    return [_line("there is nothing to redo")]
-            case asked.Plain(do="flatten"):
-                session.ask(Controls(dict.fromkeys(session.creases, 0.0)))
-                session.let_go()
-            case asked.Plain(do="check"):
-                return [self._check()]
+                self.session.let_go(node)
+            case asked.Plain(do=what):
+                return self._plain(what)
             case asked.Colour(by=by):
                 self._colour, self._shown = by, ()
             case asked.Export(what=what):
-                name, data = export(what, self.sheet, session, session.rest(20.0))
+                name, data = export(what, self.sheet, self.session, self.session.rest(20.0))
                 return [{"kind": "file", "name": name, "data": base64.b64encode(data).decode()}]
+        return []
+
+    def _laid(self, message: asked.Asked) -> bool:
+        """Whether a message puts another sheet on the desk, or the same one held or made otherwise."""
+        match message:
+            case asked.Open(name=name, data=data):
+                self.put(of_file(name, data, self.material))
+            case asked.Pattern(name=name):
+                self.put(of_library(name, self.material))
+            case asked.Hold(node=node, on=on):
+                self._hold(node, on)
+            case asked.Material():
+                self._change(message)
+            case _:
+                return False
+        return True
+
+    def _plain(self, what: str) -> list[Json]:
+        if what == "check":
+            return [self._check()]
+        if what == "flatten":
+            self.session.ask(Controls(dict.fromkeys(self.session.creases, 0.0)))
+            self.session.let_go()
+        elif not (self.session.undo() if what == "undo" else self.session.redo()):
+            return [_line(f"there is nothing to {what}")]
         return []
 
     def _hold(self, node: int, on: bool) -> None:

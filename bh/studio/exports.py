@@ -17,7 +17,13 @@ from bh.model.supports import Support
 from bh.paths.export import FLAT, FOLDED, write_flat, write_state
 from bh.studio.sheets import LiveSheet, quoted
 
-FORMATS = ("scene", "python", "result", *(f"folded{suffix}" for suffix in FOLDED), *(f"flat{suffix}" for suffix in FLAT))
+FORMATS = (
+    "scene",
+    "python",
+    "result",
+    *(f"folded{each}" for each in FOLDED),
+    *(f"flat{each}" for each in FLAT),
+)
 
 
 def export(what: str, sheet: LiveSheet, session: Session, frame: Frame) -> tuple[str, bytes]:
@@ -72,14 +78,18 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
         InputError: the sheet was given as a model, which no scene describes.
     """
     if not sheet.tables:
-        raise InputError("this sheet was given as a model of Python, which no scene describes; take the Python lines")
+        raise InputError(
+            "this sheet was given as a model of Python, which no scene describes; take the Python lines"
+        )
     model = session.scene()
     lines = [f"# {sheet.name} as it stood in bh studio; run it by `bh run`. mm, N, rad.", "", sheet.tables]
     lines += ["[sheet]", f"E = {model.sheet.E!r}", f"nu = {model.sheet.nu!r}", f"t = {model.sheet.t!r}", ""]
     for support in model.supports:
         assert isinstance(support, Support)
         at = support.at if isinstance(support.at, str) else list(support.at)
-        fix = support.fix if isinstance(support.fix, str) else [list(map(float, axis)) for axis in support.fix]
+        fix = (
+            support.fix if isinstance(support.fix, str) else [list(map(float, axis)) for axis in support.fix]
+        )
         lines += ["[[supports]]", f"at = {json.dumps(at)}", f"fix = {json.dumps(fix)}", ""]
     for name, law in model.creases.items():
         value = f"Lstar = {law.Lstar!r}" if law.Lstar is not None else f"stiffness = {law.stiffness!r}"
@@ -116,7 +126,8 @@ def python_text(sheet: LiveSheet, session: Session) -> str:
         else "model = ...  # the model that was given to the window\n"
     )
     pulls = "".join(
-        f"session.pull({node}, {grip.to!r}, {grip.stiffness!r})\n" for node, grip in session.wanted.grips.items()
+        f"session.pull({node}, {grip.to!r}, {grip.stiffness!r})\n"
+        for node, grip in session.wanted.grips.items()
     )
     return (
         f'"""{sheet.name} as it stood in bh studio."""\n\nimport bh\nfrom bh.live import Session\n\n{begin}'
@@ -126,10 +137,13 @@ def python_text(sheet: LiveSheet, session: Session) -> str:
 
 
 def result(frame: Frame) -> dict[str, object]:
-    """Numbers of a frame as JSON holds them: N mm, rad, N, mm.
+    """Numbers of a frame as JSON holds them.
 
     Args:
         frame: the newest state.
+
+    Returns:
+        energies, N mm, fold angles, rad, forces, N, points, mm, and what is known of the state.
     """
     state = frame.state
     return {

@@ -6,6 +6,7 @@ import asyncio
 import json
 import secrets
 import webbrowser
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -25,7 +26,9 @@ HOST = "127.0.0.1"
 STATIC = Path(__file__).with_name("static")
 LONGEST_MESSAGE = LONGEST * 4 // 3 + 4096  # bytes of a file in base64, and its name
 WINDOWS = 8  # at once
-POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self' ws:"
+POLICY = (
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self' ws:"
+)
 HEADERS = {
     "Content-Security-Policy": POLICY,
     "X-Content-Type-Options": "nosniff",
@@ -77,7 +80,9 @@ class Studio:
         try:
             sockets = bind_sockets(port, address=HOST)
         except OSError as error:
-            raise InputError(f"port {port} cannot be used ({error.strerror}); leave --port out for a free one") from error
+            raise InputError(
+                f"port {port} cannot be used ({error.strerror}); leave --port out for a free one"
+            ) from error
         server = HTTPServer(self.application())
         server.add_sockets(sockets)
         return server, f"http://{HOST}:{sockets[0].getsockname()[1]}/?token={self.token}"
@@ -135,8 +140,13 @@ class Window(tornado.websocket.WebSocketHandler):
             raise tornado.web.HTTPError(503)
         await super().get(*args, **kwargs)
 
-    def open(self, *_: str, **__: str) -> None:
-        """Begin to work."""
+    def open(self, *args: str, **kwargs: str) -> None:  # noqa: ARG002 - Tornado's own arguments
+        """Begin to work.
+
+        Args:
+            args: of the address; there are none.
+            kwargs: none.
+        """
         self.studio.windows.add(self)
         self.drawn.set()
         self.work = asyncio.create_task(self._work())
@@ -165,7 +175,10 @@ class Window(tornado.websocket.WebSocketHandler):
         await self._say(desk.describe())
         while True:
             if not desk.busy or not self.queue.empty():
-                for message in self._newest(await self.queue.get()):
+                waiting = [await self.queue.get()]
+                while not self.queue.empty():
+                    waiting.append(self.queue.get_nowait())
+                for message in newest(waiting):
                     await self._do(desk, message)
             await self.drawn.wait()
             if desk.busy:
@@ -191,14 +204,6 @@ class Window(tornado.websocket.WebSocketHandler):
         for answer in answers:
             await self._say(answer)
 
-    def _newest(self, first: str | bytes) -> list[str | bytes]:
-        """All that waits, but of moves of the same slider or point only the last."""
-        waiting = [first]
-        while not self.queue.empty():
-            waiting.append(self.queue.get_nowait())
-        last = {_subject(message): number for number, message in enumerate(waiting)}
-        return [m for number, m in enumerate(waiting) if _subject(m) is None or last[_subject(m)] == number]
-
     async def _say(self, answer: dict[str, object]) -> None:
         await self.write_message(json.dumps(answer))
 
@@ -213,6 +218,19 @@ def allowed(request: tornado.httputil.HTTPServerRequest, token: str, wanted: str
     """
     host = request.host.rsplit(":", 1)[0]
     return host in (HOST, "localhost") and secrets.compare_digest(token.encode(), wanted.encode())
+
+
+def newest(waiting: Sequence[str | bytes]) -> list[str | bytes]:
+    """Messages that are worth doing: of moves of the same slider or point only the last.
+
+    Args:
+        waiting: in the order in which they came.
+
+    Returns:
+        the others left out, in the same order.
+    """
+    last = {_subject(message): number for number, message in enumerate(waiting)}
+    return [m for number, m in enumerate(waiting) if _subject(m) is None or last[_subject(m)] == number]
 
 
 def _subject(message: str | bytes) -> tuple[object, ...] | None:

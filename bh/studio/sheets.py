@@ -106,8 +106,8 @@ def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
                 continue
             if len(scene.model.mesh.triangles) > MOST_TRIANGLES:
                 failed = failed or InputError(
-                    f"'{plain}' has {len(scene.model.mesh.triangles)} triangles on the mesh of {offer.mesh}, the window "
-                    f"takes {MOST_TRIANGLES}; fold it by `bh fold`"
+                    f"'{plain}' has {len(scene.model.mesh.triangles)} triangles on the mesh of {offer.mesh}, "
+                    f"the window takes {MOST_TRIANGLES}; fold it by `bh fold`"
                 )
                 continue
             tables = _tables(offer.text)

@@ -351,5 +351,5 @@ $("play").onclick = () => {
 };
 
 connect(); resize(); draw();
-window.studio = { get rest() { return head?.rest ?? false; }, get head() { return head; }, get sheet() { return sheet; },
+window.studio = { get points() { return points; }, get rest() { return head?.rest ?? false; }, get head() { return head; }, get sheet() { return sheet; },
   place: (node) => { const v = new THREE.Vector3().fromArray(points, 3 * node).project(camera), b = renderer.domElement.getBoundingClientRect(); return [b.left + (v.x + 1) / 2 * b.width, b.top + (1 - v.y) / 2 * b.height]; } };
