@@ -69,6 +69,7 @@ _SUBMODULES = {
     "creases": "bh.analysis.creases",
     "interactive": "bh.plotting.interactive",
     "isometric": "bh.analysis.isometric",
+    "live": "bh.live",
     "node_sensitivities": "bh.analysis.node_sensitivities",
     "pinching": "bh.applications.pinching",
     "plotting": "bh.plotting",
@@ -77,6 +78,7 @@ _SUBMODULES = {
     "scan": "bh.applications.scan",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe",
+    "studio": "bh.studio",
     "sweep": "bh.sweep",
 }
 

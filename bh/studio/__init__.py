@@ -4,5 +4,6 @@ The physics is `bh.live`; the server speaks to a browser on the same machine and
 """
 
 from bh.studio.server import open_window
+from bh.studio.sheets import of_file, of_library, of_model
 
-__all__ = ["open_window"]
+__all__ = ["of_file", "of_library", "of_model", "open_window"]
