@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
 from bh.model.actuations import Displace, Fold, Force, Moment
+from bh.model.crease_law import CreaseLaw
 from bh.model.pinch import Pinch
-from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
+from bh.model.sheet import ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support
 from bh.model.until import Until
