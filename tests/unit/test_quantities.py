@@ -37,6 +37,7 @@ along = 8
 rows = 2
 [[supports]]
 at = "edge:start"
+clamp = true
 [[steps]]
 fold = {{ crease = "crease", by = {by}, Lstar = {Lstar} }}
 [[steps]]
