@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bh.errors import ModelError
 from bh.model.sheet import Sheet
+from meshes.quantities import take_units
 
 
 @dataclass(frozen=True)
@@ -20,12 +22,23 @@ class CreaseLaw:
     stiffness: float | None = None
     rest: float = math.pi
 
+    if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
+
+        def __init__(
+            self,
+            Lstar: float | str | None = None,
+            stiffness: float | str | None = None,
+            rest: float | str = math.pi,
+        ) -> None:
+            """See the class."""
+
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
 
         Raises:
             ModelError: one line that names the value and what to give.
         """
+        take_units(self, "crease", Lstar="length", stiffness="stiffness", rest="angle")
         if (self.Lstar is None) == (self.stiffness is None):
             raise ModelError("a crease needs either Lstar (mm) or stiffness (N mm / (mm rad))")
         value = self.Lstar if self.Lstar is not None else self.stiffness

@@ -218,7 +218,7 @@ class Model:
             until = Until("largest_fold", item.fold, of=on)
         return self.step(item, until=until)
 
-    def moment(self, crease: str, to: float) -> Model:
+    def moment(self, crease: str, to: float | str) -> Model:
         """Add a step with a couple a length on a crease; see `bh.Moment`.
 
         Args:
@@ -236,7 +236,7 @@ class Model:
         """
         return self.step(Force(at, **how))
 
-    def displace(self, at: str | Sequence[int], direction: str | Sequence[float], by: float) -> Model:
+    def displace(self, at: str | Sequence[int], direction: str | Sequence[float], by: float | str) -> Model:
         """Add a step with prescribed displacements; see `bh.Displace`.
 
         Args:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from numbers import Real
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from meshes.quantities import take_units
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,8 +19,8 @@ class Sheet:
     """A thin elastic sheet; its values are given by name: `Sheet(E=4000, nu=0.38, t=0.127)`.
 
     Attributes:
-        E: Young's modulus, MPa.
-        t: thickness, mm.
+        E: Young's modulus, MPa, or with a unit ("4GPa").
+        t: thickness, mm, or with a unit ("0.2mm").
         nu: Poisson's ratio in (-1, 0.5]; bars and hinges take 0, as the source does (3.3.2).
     """
 
@@ -26,12 +28,18 @@ class Sheet:
     t: float
     nu: float = 0.0
 
+    if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
+
+        def __init__(self, *, E: float | str, t: float | str, nu: float = 0.0) -> None:
+            """See the attributes."""
+
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
 
         Raises:
             ModelError: one line that names the value and what to give.
         """
+        take_units(self, "sheet", E="modulus", t="length")
         for name, unit in (("E", "MPa"), ("t", "mm")):
             value = getattr(self, name)
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
