@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.model.actuations import Fold, Force, Pull
-from bh.model.sheet import CreaseLaw
+from bh.model.crease_law import CreaseLaw
 from bh.model.step import Actuation
 
 Array = NDArray[np.float64]

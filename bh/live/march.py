@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.continuation import LoadControl, jump
-from bh.solvers.increments import Point, extrapolate, point
+from bh.solvers.load_control import LoadControl, jump
 from bh.solvers.modes import lowest_mode
 from bh.solvers.newton import Solution
+from bh.solvers.points import Point, extrapolate, point
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]

@@ -22,8 +22,8 @@ from bh.model.actuations import Force, Pull
 from bh.model.model import Model
 from bh.model.step import Actuation, Step
 from bh.runtime.threads import one_blas_thread
-from bh.solvers.continuation import LoadControl
-from bh.solvers.increments import point
+from bh.solvers.load_control import LoadControl
+from bh.solvers.points import point
 from meshes import SheetMesh
 from meshes.mesh import count
 

@@ -14,8 +14,9 @@ import numpy as np
 from bh.errors import InputError
 from bh.formulations.registry import remarks
 from bh.model.actuations import Fold
+from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model
-from bh.model.sheet import CreaseLaw, Sheet
+from bh.model.sheet import Sheet
 from bh.scene.folding import MATERIALS, PERCENT, Wish, proposals
 from bh.scene.load import Outputs, Scene, parse_scene
 from meshes import SheetMesh

@@ -91,7 +91,9 @@ class Visit:
 
     def rests(self, condition: str = "true") -> None:
         """Wait until the sheet is in equilibrium with what is asked, and a condition on `head` holds."""
-        self.page.wait_for_function(f"(() => {{ const head = studio.head; return head.rest && ({condition}); }})()")
+        self.page.wait_for_function(
+            f"(() => {{ const head = studio.head; return head.rest && ({condition}); }})()"
+        )
 
     def points(self) -> np.ndarray[Any, Any]:
         return np.array(self.page.evaluate("Array.from(studio.points)")).reshape(-1, 3)
@@ -115,7 +117,9 @@ def test_fold_pull_undo_export(window: Visit, tmp_path: Path) -> None:
     folded = window.points()
     node = int(np.argmax(folded[:, 0] + folded[:, 1]))
     x, y = page.evaluate(f"studio.place({node})")
-    inside = page.evaluate(f"studio.place({int(np.argmin(np.linalg.norm(folded - folded.mean(axis=0), axis=1)))})")
+    inside = page.evaluate(
+        f"studio.place({int(np.argmin(np.linalg.norm(folded - folded.mean(axis=0), axis=1)))})"
+    )
     x, y = x + 0.02 * (inside[0] - x), y + 0.02 * (inside[1] - y)  # just inside the rim
     page.mouse.move(x, y)
     page.mouse.down()
@@ -141,14 +145,18 @@ def test_fold_pull_undo_export(window: Visit, tmp_path: Path) -> None:
     np.testing.assert_allclose(path[-1].points, window.points(), atol=1e-3)
     assert window.told == []
     home = page.url.split("?")[0]
-    assert [url for url in window.asked if not url.startswith((home, "ws://127.0.0.1", "blob:", "data:"))] == []
+    assert [
+        url for url in window.asked if not url.startswith((home, "ws://127.0.0.1", "blob:", "data:"))
+    ] == []
 
 
 def test_what_cannot_be_opened_is_said_in_the_window(window: Visit, tmp_path: Path) -> None:
     bad = tmp_path / "bad.svg"
     bad.write_text("no drawing at all")
     window.page.set_input_files("#file", bad)
-    window.page.wait_for_function("!document.getElementById('message').hidden && /bad/.test(message.textContent)")
+    window.page.wait_for_function(
+        "!document.getElementById('message').hidden && /bad/.test(message.textContent)"
+    )
     assert window.page.evaluate("studio.sheet.name") == "arc"
 
 
