@@ -6,7 +6,7 @@ The package is a pytest plugin, too (`bh.testing.plugin`). Nothing heavy is load
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from bh.analysis.richardson import Convergence, Verdict
@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """A name of the table, loaded when it is first asked for."""
     if name not in _HOME:
         raise AttributeError(f"module 'bh.testing' has no attribute '{name}'")

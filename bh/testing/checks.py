@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from bh.analysis.richardson import Convergence, judged
 from bh.analysis.shapes import Distance, shape_distance
@@ -16,7 +15,17 @@ from bh.formulations.state import State
 from bh.model.model import Model
 from bh.paths.path import Path
 from bh.solvers.outcome import Outcome
-from bh.testing.levels import Level, Maker, Solvable, solved, solved_level, solved_levels, told, wanted
+from bh.testing.levels import (
+    L,
+    Level,
+    Maker,
+    Solvable,
+    solved,
+    solved_level,
+    solved_levels,
+    told,
+    wanted,
+)
 from bh.testing.levels import sizes as sizes_of
 from bh.testing.session import running
 from bh.testing.table import Asked, complaints, line, table
@@ -25,8 +34,8 @@ PARTS = ("total", "stretching", "bending", "folding")
 
 
 def assert_energy_converges(
-    of: Model | Maker,
-    levels: Sequence[Any] | None = None,
+    of: Model | Maker[L],
+    levels: Sequence[L] | None = None,
     *,
     part: str = "total",
     order: float | None = None,
@@ -74,8 +83,8 @@ def assert_energy_converges(
 
 
 def assert_converges(  # noqa: PLR0913 - as above
-    of: Model | Maker,
-    levels: Sequence[Any] | None = None,
+    of: Model | Maker[L],
+    levels: Sequence[L] | None = None,
     *,
     quantity: Callable[[State], float],
     name: str = "quantity",
@@ -86,7 +95,7 @@ def assert_converges(  # noqa: PLR0913 - as above
     frozen: float | None = None,
     frozen_within: float = 1e-3,
 ) -> Convergence:
-    """Any number that is read from the last state converges under refinement.
+    """A number that is read from the last state converges under refinement.
 
     Args:
         of: as for `assert_energy_converges`, like all that is not named here.
@@ -264,14 +273,14 @@ def assert_same_shape(one: Solvable, two: Solvable, within: float, *, in_place: 
     return found
 
 
-def _tell(quantity: str, text: str, passed: bool, **figures: Any) -> None:
+def _tell(quantity: str, text: str, passed: bool, **figures: object) -> None:
     """An entry for the summary, with the keys of the records of `bh verify`."""
     test = running()
     if test is None:
         return
     value, reference = figures.get("value"), figures.get("reference")
     error = None
-    if value is not None and reference is not None:
+    if isinstance(value, int | float) and isinstance(reference, int | float):
         error = abs(value - reference) / abs(reference) if reference else abs(value)
     record = {
         "case": test.name,

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TypeVar, cast
 
 from bh.errors import InputError, ModelError, PathFileError
 from bh.formulations.state import State
@@ -33,7 +33,8 @@ FEWEST = 3
 KEPT = 200  # files in the folder of solved levels; the oldest go
 OWN_CODE = re.compile(r'"(?:kind|observable)": "[^"]*:')  # "module:name"
 Solvable = Model | Path | State
-Maker = Callable[[Any], Solvable]
+L = TypeVar("L")  # whatever the user's function takes
+Maker = Callable[[L], Solvable]
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Level:
         cached: whether it was found solved.
     """
 
-    level: Any
+    level: object
     state: State
     triangles: int
     cells: Cells | None = None
@@ -59,7 +60,7 @@ class Level:
     cached: bool = False
 
 
-def wanted(levels: Sequence[Any] | None) -> tuple[Any, ...]:
+def wanted(levels: Sequence[L] | None) -> tuple[L, ...]:
     """The levels that are given, else those of the test's marker, else `LEVELS`.
 
     Args:
@@ -73,7 +74,7 @@ def wanted(levels: Sequence[Any] | None) -> tuple[Any, ...]:
     """
     test = running()
     marked = None if test is None else test.levels
-    found = tuple(levels) if levels is not None else (marked or LEVELS)
+    found = tuple(levels) if levels is not None else cast("tuple[L, ...]", marked or LEVELS)
     if len(found) < FEWEST:
         raise ModelError(f"levels = {found} are too few; an order needs three or more, such as (1, 2, 4)")
     if len(set(found)) < len(found):
@@ -81,7 +82,7 @@ def wanted(levels: Sequence[Any] | None) -> tuple[Any, ...]:
     return found
 
 
-def solved_levels(of: Model | Maker, levels: tuple[Any, ...]) -> list[Level]:
+def solved_levels(of: Model | Maker[L], levels: Sequence[L]) -> list[Level]:
     """Solve all levels, coarse to fine.
 
     Args:
@@ -95,7 +96,7 @@ def solved_levels(of: Model | Maker, levels: tuple[Any, ...]) -> list[Level]:
         ModelError: the levels do not refine, or the model cannot be refined by itself.
         AssertionError: a level does not reach the end of its steps.
     """
-    maker = _refining(of) if isinstance(of, Model) else of
+    maker: Maker[L] = _refining(of) if isinstance(of, Model) else of
     if not callable(maker):
         raise ModelError(
             f"{type(of).__name__} cannot be refined; give a model, or a function from a level to one"
@@ -112,7 +113,7 @@ def solved_levels(of: Model | Maker, levels: tuple[Any, ...]) -> list[Level]:
     return found
 
 
-def _refining(model: Model) -> Maker:
+def _refining(model: Model) -> Callable[[object], Model]:
     """The model by level: its own cells, `level` times as short."""
     pattern, cells = pattern_of(model), model.mesh.cells
     if cells is None:
@@ -121,7 +122,7 @@ def _refining(model: Model) -> Maker:
             "give a function from a level to a model"
         )
 
-    def make(level: Any) -> Model:
+    def make(level: object) -> Model:
         if not isinstance(level, int) or isinstance(level, bool) or level < 1:
             raise ModelError(
                 f"level {level!r} of a model cannot be; give whole numbers from 1: how often cells are cut"
@@ -132,7 +133,7 @@ def _refining(model: Model) -> Maker:
     return make
 
 
-def solved_level(made: Solvable, level: Any = None) -> Level:
+def solved_level(made: Solvable, level: object = None) -> Level:
     """The last state of a model that is solved now or was before, of a path, or as it is.
 
     Args:

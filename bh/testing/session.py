@@ -8,9 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
-Entry = dict[str, Any]  # plain data of one check, as JSON has it
+
+class Entry(TypedDict):
+    """What one check has found, as plain data: a record with the keys of those of `bh verify`, and it in words."""
+
+    record: dict[str, object]
+    line: str
 
 
 @dataclass(frozen=True)
@@ -25,7 +30,7 @@ class Running:
     """
 
     name: str
-    levels: tuple[Any, ...] | None
+    levels: tuple[object, ...] | None
     cache: Path | None
     tell: Callable[[Entry], None]
 
