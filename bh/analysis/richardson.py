@@ -33,7 +33,12 @@ SLOWEST = 0.8  # rates below are no convergence to speak of
 
 
 def limit(values: Sequence[float], ratio: float = 2.0) -> Limit:
-    """Limit of the last three values on meshes that are `ratio` times finer each (Richardson 1911; Roache 1994)."""
+    """Limit of the last three values on meshes that are `ratio` times finer each (Richardson 1911; Roache 1994).
+
+    Args:
+        values: coarse to fine.
+        ratio: of the sizes of neighbouring meshes.
+    """
     if len(values) < 3:
         change = abs(values[-1] - values[-2]) if len(values) == 2 else math.inf
         return Limit(values[-1], math.nan, change)

@@ -63,7 +63,12 @@ def _cache(config: pytest.Config) -> Path | None:
 
 
 def pytest_terminal_summary(terminalreporter: TerminalReporter, config: pytest.Config) -> None:
-    """A line a check, and the JSON file."""
+    """A line a check, and the JSON file.
+
+    Args:
+        terminalreporter: has the reports of all tests.
+        config: has the options.
+    """
     entries = _entries(terminalreporter)
     if entries:
         terminalreporter.write_sep("=", "checks of folded sheets")
