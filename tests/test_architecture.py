@@ -35,6 +35,7 @@ HEAVY = {
     "svgelements",
     "ezdxf",
     "trimesh",
+    "tornado",
 }
 FORBIDDEN_AT_IMPORT = {*HEAVY, "numpy", "numba", "scipy", "meshio", "pydantic", "typer", "rich"}
 
@@ -58,6 +59,8 @@ RULES: dict[str, tuple[str, ...]] = {
     "bh.analysis": (*DESCRIPTION, "bh.paths"),
     "bh.plotting": (*ANALYSIS, "bh.scene"),
     "bh.solving": ANALYSIS,
+    "bh.live": DESCRIPTION,
+    "bh.studio": (*USERS, "bh.live"),
     "bh.applications": (*ANALYSIS, "bh.plotting", "bh.solving"),
     "bh.sweep": USERS,
     "bh.commands": (*USERS, "bh.sweep"),
