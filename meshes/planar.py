@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 
 from meshes.curves import Array, arc_lengths
 from meshes.errors import PatternError
+from meshes.limits import check_limit
 from meshes.topology import Ints
 
 CORNER = 0.35  # rad; a line that turns by more at a vertex has a corner there
+CHUNK = 256  # segments whose crossings are counted at a time
 ROUNDS = 4  # of crossings that show when lines have been moved
 # what wins where lines are drawn over each other
 RANK = ("boundary", "cut", "mountain", "valley", "flat", "facet")
@@ -103,8 +105,9 @@ def heal(lines: Sequence[DrawnLine], gap: float) -> Graph:
         gap: what misses by up to so much is joined, mm.
 
     Raises:
-        PatternError: lines do not come apart within the tolerance.
+        PatternError: lines do not come apart within the tolerance, or cross too often.
     """
+    _check_crossings(lines)
     web = _Web(lines, gap)
     web.attach(range(len(web.nodes)))
     for _ in range(ROUNDS):
@@ -117,6 +120,19 @@ def heal(lines: Sequence[DrawnLine], gap: float) -> Graph:
         f"lines near ({x:.6g}, {y:.6g}) run together and cross within gap = {gap:.3g} mm; "
         "draw them once, or choose a smaller gap"
     )
+
+
+def _check_crossings(lines: Sequence[DrawnLine]) -> None:
+    """Refuse a scribble before its crossings are made nodes; it counts no further than the limit."""
+    import shapely
+
+    ends = np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in lines])
+    segments = shapely.linestrings(ends.reshape(-1, 2, 2))
+    tree = shapely.STRtree(segments)
+    found = 0.0
+    for first in range(0, len(segments), CHUNK):
+        found += 0.5 * len(tree.query(segments[first : first + CHUNK], predicate="crosses")[0])
+        check_limit("crossings", found, "this drawing", PatternError)
 
 
 class _Web:
