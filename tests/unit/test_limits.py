@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-import ezdxf
 import pytest
+from ezdxf.filemanagement import new
 
 import bh
 import meshes
@@ -124,16 +124,16 @@ def test_drawings_that_hold_too_much_are_refused_at_once(
 
 def test_arrays_and_splines_of_dxf_are_counted_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BH_LIMIT_ENTITIES", "2000")
-    array = ezdxf.new()
+    array = new()
     array.blocks.new("empty")
     many = {"row_count": 30_000, "column_count": 30_000, "row_spacing": 1, "column_spacing": 1}
     array.modelspace().add_blockref("empty", (0, 0), dxfattribs=many)
-    spline = ezdxf.new()
+    spline = new()
     spline.modelspace().add_open_spline([(i, i % 5) for i in range(3_000)])
-    crowd = ezdxf.new()
+    crowd = new()
     for i in range(3_000):
         crowd.modelspace().add_line((0, i), (1, i))
-    nested = ezdxf.new()
+    nested = new()
     nested.blocks.new("b0")  # with nothing in it: no line ever comes out
     for level in range(1, 40):
         block = nested.blocks.new(f"b{level}")
