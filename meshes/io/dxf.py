@@ -88,7 +88,7 @@ def read_dxf(path: str | os.PathLike[str]) -> Strokes:
     total = _written_out(drawing, drawing.modelspace(), (), {})
     check_limit("entities", total, "this drawing, its blocks written out,", FileFormatError)
     strokes: list[Stroke] = []
-    for entity, around in _entities(drawing, drawing.modelspace(), None):
+    for entity, around in _entities(drawing, drawing.modelspace(), None, ()):
         kind = entity.dxftype()
         if kind not in LINES:
             raise FileFormatError(
@@ -131,24 +131,9 @@ def _document(path: str | os.PathLike[str]) -> Any:
         raise FileFormatError(f"the DXF cannot be understood ({error}); save it as DXF again") from error
 
 
-def _written_out(drawing: Any, items: Any, inside: tuple[str, ...], known: dict[str, float]) -> float:
-    """How many entities these become once their blocks are written out; every block is counted once."""
-    total = 0.0
-    for entity in items:
-        total += 1.0
-        if entity.dxftype() != "INSERT":
-            continue
-        name = str(entity.dxf.name)
-        if name in inside or len(inside) >= DEEPEST:
-            raise FileFormatError(f"block '{name}' contains itself; remove the reference in it")
-        if name not in known:
-            block = drawing.blocks.get(name)
-            known[name] = 0.0 if block is None else _written_out(drawing, block, (*inside, name), known)
-        total += max(entity.mcount, 1) * (1.0 + known[name])
-    return total
-
-
-def _entities(drawing: Any, items: Any, around: Look | None) -> Iterator[tuple[Any, Look | None]]:
+def _entities(
+    drawing: Any, items: Any, around: Look | None, inside: tuple[str, ...]
+) -> Iterator[tuple[Any, Look | None]]:
     """What is drawn, blocks written out, each with what it takes from the reference around it."""
     for entity in items:
         kind = entity.dxftype()
@@ -157,11 +142,39 @@ def _entities(drawing: Any, items: Any, around: Look | None) -> Iterator[tuple[A
         if kind != "INSERT":
             yield entity, around
             continue
+        name = _deeper(entity, inside)
         look = Look(
             _layer_name(entity, around), _colour(drawing, entity, around), _dash(drawing, entity, around)
         )
         for copy in entity.multi_insert() if entity.mcount > 1 else (entity,):
-            yield from _entities(drawing, _contents(copy), look)
+            yield from _entities(drawing, _contents(copy), look, (*inside, name))
+
+
+def _written_out(drawing: Any, items: Any, inside: tuple[str, ...], sizes: dict[str, int]) -> int:
+    """Number of entities that blocks come to; each block is looked at once (`sizes`), and nothing is written out.
+
+    To find out by writing them out takes a minute for as many as are allowed.
+    """
+    total = 0
+    for entity in items:
+        kind = entity.dxftype()
+        if kind in SILENT or _off(drawing, entity):
+            continue
+        total += 1
+        if kind == "INSERT":
+            name = _deeper(entity, inside)
+            if name not in sizes:
+                sizes[name] = _written_out(drawing, entity.block() or (), (*inside, name), sizes)
+            total += max(entity.mcount, 1) * (1 + sizes[name])  # an array of nothing takes its time too
+    return total
+
+
+def _deeper(insert: Any, inside: tuple[str, ...]) -> str:
+    """The name of a block that is referred to within others."""
+    name = str(insert.dxf.name)
+    if name in inside or len(inside) >= DEEPEST:
+        raise FileFormatError(f"block '{name}' contains itself; remove the reference in it")
+    return name
 
 
 def _contents(insert: Any) -> Iterator[Any]:
