@@ -20,7 +20,7 @@ from meshes.limits import check_limit
 from meshes.topology import Ints
 
 CORNER = 0.35  # rad; a line that turns by more at a vertex has a corner there
-CHUNK = 256  # segments whose crossings are counted at a time
+CHUNK = 8  # segments whose crossings are counted at a time: the first ones of a scribble decide
 ROUNDS = 4  # of crossings that show when lines have been moved
 # what wins where lines are drawn over each other
 RANK = ("boundary", "cut", "mountain", "valley", "flat", "facet")
@@ -105,9 +105,8 @@ def heal(lines: Sequence[DrawnLine], gap: float) -> Graph:
         gap: what misses by up to so much is joined, mm.
 
     Raises:
-        PatternError: lines do not come apart within the tolerance, or cross too often.
+        PatternError: lines do not come apart within the tolerance.
     """
-    _check_crossings(lines)
     web = _Web(lines, gap)
     web.attach(range(len(web.nodes)))
     for _ in range(ROUNDS):
@@ -122,11 +121,17 @@ def heal(lines: Sequence[DrawnLine], gap: float) -> Graph:
     )
 
 
-def _check_crossings(lines: Sequence[DrawnLine]) -> None:
-    """Refuse a scribble before its crossings are made nodes; it counts no further than the limit."""
+def check_crossings(ends: Array) -> None:
+    """Refuse a scribble before anything is made of it; counts no further than the limit.
+
+    Args:
+        ends: (n, 4) of segments, x and y of the first and of the second point, in any unit.
+
+    Raises:
+        PatternError: more of them cross than may; segments that only touch do not.
+    """
     import shapely
 
-    ends = np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in lines])
     segments = shapely.linestrings(ends.reshape(-1, 2, 2))
     tree = shapely.STRtree(segments)
     found = 0.0

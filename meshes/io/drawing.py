@@ -20,7 +20,7 @@ from meshes.io.strokes import Rules, Stroke, Strokes
 from meshes.limits import check_limit
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
-from meshes.planar import RIM, DrawnLine, Graph, heal
+from meshes.planar import RIM, DrawnLine, Graph, check_crossings, heal
 from meshes.sheet import pattern_of, region_of
 
 OUTLINES = ("drawn", "hull")
@@ -202,6 +202,7 @@ def read_graph(
         first = drawn[int(np.argmax(lengths <= gap))].name
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
+    check_crossings(np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in drawn]))
     drawn, joined = join_dashes(drawn, gap)
     if outline == "hull":
         drawn.append(_hull(drawn))

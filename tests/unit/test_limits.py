@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from ezdxf.filemanagement import new
 
 import bh
 import meshes
 from meshes.errors import InputError
-from meshes.io import read_pattern
+from meshes.io import read_fold, read_pattern
 from meshes.limits import Limits, limits
 
 REST = """
@@ -180,3 +182,29 @@ def test_a_graded_mesh_has_as_many_triangles_as_expected() -> None:
     expected = _expected(pattern, curves, _sizes(curves, 5.0, near, 0.3))
     made = len(meshes.unstructured(pattern, size=5.0, near=near).triangles)
     assert 0.5 * made < expected < 2.0 * made
+
+
+def test_scribbles_are_refused_before_anything_is_made_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dashes are joined, and vertices looked for on edges, in times that grow with the square of their number."""
+
+    def never(*_: object) -> None:
+        raise AssertionError("the scribble was worked on")
+
+    monkeypatch.setattr("meshes.io.drawing.join_dashes", never)
+    random = np.random.default_rng(1)
+    ends = random.uniform(1.0, 99.0, (300, 4)).round(3)
+    drawing = tmp_path / "scribble.svg"
+    drawing.write_text(PAGE.format(lines(*map(tuple, ends.tolist()))), encoding="utf-8")
+    frame = tmp_path / "scribble.fold"
+    points = ends.reshape(-1, 2).tolist()
+    edges = [[2 * i, 2 * i + 1] for i in range(300)]
+    frame.write_text(
+        json.dumps({"vertices_coords": points, "edges_vertices": edges, "edges_assignment": ["V"] * 300}),
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match="crossings, more than 5,000"):
+        read_pattern(drawing)
+    with pytest.raises(InputError, match="crossings, more than 5,000"):
+        read_fold(frame)
