@@ -50,6 +50,7 @@ from bh.scene.tables import (
     UntilTable,
 )
 from bh.scene.wanted_accuracy import wanted_accuracy
+from meshes.limits import check_limit
 
 SECTIONS = (
     "pattern",
@@ -196,6 +197,8 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     sheet = read_table(SheetTable, data["sheet"], "sheet")
     how = read_table(ModelTable, data.get("model", {}), "model")
     name = _formulation(how.formulation)
+    steps = as_tables(data["steps"], "steps")
+    check_limit("steps", len(steps), "this scene", SceneError)
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
@@ -203,7 +206,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         mesh=mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
-        steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
+        steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(steps)),
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
         hinge_lock=how.hinge_lock,
