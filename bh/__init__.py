@@ -113,6 +113,7 @@ __all__ = [
     "Remark",
     "RigidBody",
     "SceneError",
+    "Settling",
     "Sheet",
     "SheetSystem",
     "State",

@@ -199,7 +199,7 @@ class LoadControl:
         if not found.converged:  # it may hold anything; nothing is asked of it
             return _Trial(here, found, primary, found.reason, "", iterations, branch)
         there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
-        objection = self._jump(system, here, there)
+        objection = self.jump(system, here, there)
         if not objection and not found.stable and self.at_bifurcation == "stable":
             found, note = leave_saddle(system, found, lam, self.newton)
             iterations += found.iterations
@@ -253,8 +253,14 @@ class LoadControl:
 
         return guess
 
-    def _jump(self, system: System, here: Point, there: Point) -> str:
-        """Why two states are not neighbours on one branch, or an empty string."""
+    def jump(self, system: System, here: Point, there: Point) -> str:
+        """Why two states are not neighbours on one branch, or an empty string.
+
+        Args:
+            system: whose states they are.
+            here: the state before.
+            there: the state after.
+        """
         turned = system.objection(here.q, here.lam, there.q, there.lam)
         if turned:
             return turned

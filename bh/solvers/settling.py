@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.continuation import LoadControl
 from bh.solvers.factor import Factor
 from bh.solvers.increments import Increment, Point, extrapolate, point
 from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted
@@ -102,9 +103,10 @@ class Settling:
         here = points[-1]
         quick = replace(self.newton, globalised=0, hasty=True)
         found = quick.solve(system, *_guess(points, lam))
-        near = found.converged and found.stable is True
-        if near and not system.objection(here.q, here.lam, found.q, lam):
-            return found, False
+        if found.converged and found.stable:
+            there = point(system, found.q, lam, evaluation=found.evaluation)
+            if not LoadControl().jump(system, here, there):
+                return found, False
         spent = found.iterations
         found = self.settle(system, here.q, lam)
         return replace(found, iterations=found.iterations + spent), True
