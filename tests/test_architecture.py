@@ -22,6 +22,7 @@ LONGEST_MODULE, LONGEST_FUNCTION = 450, 80
 MOST_ANY, MOST_SKIPS = 60, 60
 HEAVY = {
     "gmsh",
+    "pint",
     "pyvista",
     "matplotlib",
     "plotly",

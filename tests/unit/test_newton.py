@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bh.solvers.continuation import LoadControl
 from bh.solvers.factor import Descent
-from bh.solvers.increments import Increment, Point, extrapolate, point
 from bh.solvers.linear import linear_response
+from bh.solvers.load_control import LoadControl
 from bh.solvers.matrices import BandMatrix
 from bh.solvers.modes import factorise_shifted, lowest_mode
 from bh.solvers.newton import Newton, Solution, line_search, slow
+from bh.solvers.points import Increment, Point, extrapolate, point
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation, Tangent
 from bh.solvers.trace import Walk, walk

@@ -1,4 +1,4 @@
-"""Step strategies: how far to go in lambda, from which guess, and what to do when a step fails."""
+"""Load control: how far to go in lambda, from which guess, and what to do when an increment fails."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.branching import NO_BRANCH, Branch, onto_stable_branch
-from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point, power_rate
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import count_negative
 from bh.solvers.newton import INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point, power_rate
 from bh.solvers.stability import leave_saddle, locate
 from bh.solvers.system import System
 
