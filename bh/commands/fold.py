@@ -34,7 +34,7 @@ from bh.runtime.progress import ProgressMeter, meter, stage
 from bh.scene.folding import Proposal, Wish, proposals
 from bh.scene.load import Scene, parse_scene
 from bh.solvers.automatic import Automatic
-from bh.solvers.increments import Increment, Point
+from bh.solvers.points import Increment, Point
 from bh.solvers.system import Evaluation, System
 from bh.solvers.trace import Strategy
 from bh.solving.levels import folder_of, move

@@ -14,12 +14,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.continuation import LoadControl
 from bh.solvers.factor import Factor
-from bh.solvers.increments import Increment, Point, extrapolate, point
+from bh.solvers.load_control import LoadControl
 from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted
 from bh.solvers.newton import NEAR_SADDLE, Newton, Solution, roll_off
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import Increment, Point, extrapolate, point
 from bh.solvers.system import Evaluation, Hinged, System
 
 Array = NDArray[np.float64]

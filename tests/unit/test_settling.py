@@ -12,8 +12,8 @@ import bh
 from bh.mechanics.shared.hinge_lock import ZONE
 from bh.mechanics.shared.penetration import left_to_close
 from bh.scene.load import parse_scene
-from bh.solvers.increments import Increment, point
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import Increment, point
 from bh.solvers.settling import NOTE, Settling
 from bh.solvers.trace import Walk, walk
 from tests.unit.test_newton import Arch
