@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.factor import Factor
-from bh.solvers.load_control import LoadControl
+from bh.solvers.load_control import jump
 from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted
 from bh.solvers.newton import NEAR_SADDLE, Newton, Solution, roll_off
 from bh.solvers.outcome import Outcome
@@ -28,6 +28,7 @@ STILL = 1e-10  # relative fall of the energy in a step that no longer moves the 
 CALM = 1e-6  # imbalance of a state at rest whose energy has stopped falling, in steps as soft as rounding
 STUCK = 40  # such steps, after which a face has collapsed and what moves is rounding
 KEPT = 0.2  # of the way of a hinge to closed that a step leaves
+MISMATCH = 0.2  # of the energy gained in an increment and the work done, behind which there is a jump
 GROWTH = 1.6  # of an increment behind one that Newton's method took
 
 
@@ -105,7 +106,7 @@ class Settling:
         found = quick.solve(system, *_guess(points, lam))
         if found.converged and found.stable:
             there = point(system, found.q, lam, evaluation=found.evaluation)
-            if not LoadControl().jump(system, here, there):
+            if not jump(system, here, there, MISMATCH):
                 return found, False
         spent = found.iterations
         found = self.settle(system, here.q, lam)
