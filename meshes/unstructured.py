@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from meshes.cells import GmshCells
-from meshes.curves import Array, Curve, Polyline
+from meshes.curves import Array, Curve
 from meshes.cuts import open_cuts
 from meshes.errors import MeshError
 from meshes.limits import check_limit
+from meshes.meetings import breaks
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
-from meshes.planar import corners
 from meshes.quantities import Typed, number
 from meshes.topology import Ints
 
@@ -195,18 +195,19 @@ def _chains(
     A curve of `cuts` has two edges at least, without which it could not open.
     """
     ends = np.vstack([curve.point(np.array([0.0, 1.0])) for curve in curves.values()])
+    ends = np.unique(ends, axis=0)
     near = 1e-6 * float(np.ptp(ends, axis=0).max() + sizes.largest)
     points: list[Array] = []
     joints: Joints = {}
     chains: dict[str, Ints] = {}
     for name, curve in curves.items():
-        breaks = _breaks(curve, ends, near)
-        u = [breaks[0]]
-        for a, b in pairwise(breaks):
-            whole = len(breaks) == 2
+        cuts_at = breaks(curve, ends, near)
+        u = [cuts_at[0]]
+        for a, b in pairwise(cuts_at):
+            whole = len(cuts_at) == 2
             least = 3 if curve.closed and whole else 2 if name in cuts and whole else 1
             u += sizes.divide(curve, a, b, least=least)
-        fixed = set(breaks)
+        fixed = set(cuts_at)
         nodes = [
             _node(points, joints, at, near) if value in fixed else _new(points, at)
             for value, at in zip(u, curve.point(np.array(u)), strict=True)
@@ -214,38 +215,6 @@ def _chains(
         # a crease shorter than two nodes can be apart has no edge
         chains[name] = np.array([nodes[:-1], nodes[1:]], dtype=np.int64).T
     return np.array(points), chains
-
-
-def _breaks(curve: Curve, ends: Array, near: float) -> list[float]:
-    """Parameters where the curve begins, ends, has a corner, or another curve meets it."""
-    u = np.linspace(0.0, 1.0, 2049)
-    samples = curve.point(u)
-    found = [0.0, 1.0]
-    if isinstance(curve, Polyline):
-        steps = np.linalg.norm(np.diff(curve.vertices, axis=0), axis=1)
-        found += (np.cumsum(steps)[:-1][corners(curve.vertices)[1:-1]] / steps.sum()).tolist()
-    reach = 2.0 * curve.length / 2048.0
-    close = (ends > samples.min(axis=0) - reach).all(axis=1) & (ends < samples.max(axis=0) + reach).all(
-        axis=1
-    )
-    for end in np.unique(ends[close], axis=0):
-        distance = np.linalg.norm(samples - end, axis=1)
-        k = int(distance.argmin())
-        if distance[k] > reach:
-            continue
-        low, high = u[max(k - 1, 0)], u[min(k + 1, 2048)]
-        for _ in range(60):  # the distance has one minimum between neighbouring samples
-            third = (high - low) / 3.0
-            one, two = np.linalg.norm(curve.point(np.array([low + third, high - third])) - end, axis=1)
-            low, high = (low, high - third) if one < two else (low + third, high)
-        middle = 0.5 * (low + high)
-        if np.linalg.norm(curve.point(np.array([middle]))[0] - end) < near:
-            found.append(middle)
-    found.sort()
-    apart = 2.0 * near / curve.length
-    kept = [value for i, value in enumerate(found) if i == 0 or value - found[i - 1] > apart]
-    kept[-1] = 1.0  # itself, not a break found next to it
-    return kept
 
 
 Joints = dict[tuple[int, int], int]  # where curves may meet: the node in each square of a grid

@@ -50,6 +50,8 @@ from bh.scene.tables import (
     UntilTable,
 )
 from bh.scene.wanted_accuracy import wanted_accuracy
+from bh.solvers.settling import Settling
+from bh.solvers.trace import Strategy
 from meshes.limits import check_limit
 
 SECTIONS = (
@@ -95,6 +97,7 @@ class Scene:
         outputs: what a run is to write.
         accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
         symmetry: the plane of symmetry of a scene, or None: `bh.trace(..., symmetry=scene.symmetry)`.
+        strategy: of the increments, or None for the default: `bh.trace(..., strategy=scene.strategy)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -105,6 +108,7 @@ class Scene:
     source: Path | None = None
     accuracy: Goal | None = None
     symmetry: Plane | None = None
+    strategy: Strategy | None = None
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -217,6 +221,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         Outputs(**arguments(outputs)),
         accuracy=wanted_accuracy(data, model),
         symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None,
+        strategy=Settling() if how.strategy == "settling" else None,
     )
 
 

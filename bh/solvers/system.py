@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -212,3 +212,18 @@ def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, 
     ahead = 1e-3 * max(lam, 0.01)
     moved = q - ahead * factor.solve(system.control_rate(q, lam))
     return measure(moved, lam + ahead) - measure(q, lam) > 1e-6 * ahead
+
+
+@runtime_checkable
+class Hinged(Protocol):
+    """A system with hinges that close, and stiffen as they do."""
+
+    def left_to_close(self, q: Array, q_new: Array, lam: float) -> float:
+        """Least part of its way to closed that a hinge is left with, of those that are about to close; 1 for none.
+
+        Args:
+            q: (n,) unknowns of the state before.
+            q_new: (n,) unknowns of the state after.
+            lam: load parameter of the step, 0 to 1.
+        """
+        ...

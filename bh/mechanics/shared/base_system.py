@@ -103,6 +103,10 @@ class SupportedSheet:
         """Which panels passed through each other between two states, or an empty string."""
         return hinge_penetration.penetration(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
+    def left_to_close(self, q: Array, q_new: Array, lam: float) -> float:
+        """Least part of its way to closed that a hinge is left with, of those in the zone of the locks; 1 for none."""
+        return hinge_penetration.left_to_close(self.angles(q, lam), self.angles(q_new, lam))
+
     def contact(self, q: Array, lam: float) -> str:
         """Which panels have met at a hinge that is not prescribed, or an empty string.
 
