@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,6 +191,36 @@ class System(Protocol):
             motion: (n,) of any length.
         """
         ...
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """Ability of a system: something can stand in the way of a step, which then has to be shorter."""
+
+    def free_part(self, q: Array, dq: Array, lam: float) -> float:
+        """How much of the step dq (n,) from q nothing stands in, 0 to 1.
+
+        Args:
+            q: (n,) unknowns, with nothing in their way.
+            dq: (n,) step.
+            lam: load parameter of the step, 0 to 1.
+        """
+        ...
+
+
+def limited(system: System, q: Array, dq: Array, lam: float) -> Array:
+    """The step dq (n,) from q, or as much of it as leaves a tenth of the way to what stands in it.
+
+    Args:
+        system: any; only those that are `Limited` shorten steps.
+        q: (n,) unknowns.
+        dq: (n,) step.
+        lam: load parameter of the step, 0 to 1.
+    """
+    if not isinstance(system, Limited):
+        return dq
+    part = system.free_part(q, dq, lam)
+    return dq if part >= 1.0 else 0.9 * part * dq
 
 
 def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, float], float]) -> bool:
