@@ -273,9 +273,7 @@ class LoadControl:
         return ""
 
 
-def _as_far_as_clear(
-    system: System, here: Point, lam: float, q: Array, forces: Array
-) -> tuple[Array, Array]:
+def _as_far_as_clear(system: System, here: Point, lam: float, q: Array, forces: Array) -> tuple[Array, Array]:
     """A guess and its element forces, or as much of the way there from the last state as nothing stands in."""
     change = q - here.q
     step = limited(system, here.q, change, lam)

@@ -207,7 +207,7 @@ class BarsAndHingesSystem(SupportedSheet):
         x = self.positions(q, lam)
         touching = None if self.barrier is None else self.barrier.blocks(x)
         if touching is not None and not self.contact_blocks.known(touching[0]):
-            del self._pattern
+            vars(self).pop("_pattern", None)
         pattern = self._pattern
         data = np.zeros(pattern.size)
         linear = Linearised(np.empty((bars, 3)), np.empty((len(e.hinges), 12)), np.empty(len(e.hinges)))

@@ -71,7 +71,7 @@ class Consistent:
         """Derivatives of a system by its element data at unknowns q (size,).
 
         Raises:
-            ModelError: the material is not linear.
+            ModelError: the material is not linear, or panels are in contact.
         """
         if system.barrier is not None:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")

@@ -16,7 +16,11 @@ from meshes.topology import Ints
 
 
 def rotation_pattern(
-    mesh: SheetMesh, e: ConsistentElements, displacements: Displacements, ground: int | None, contact: Ints | None = None
+    mesh: SheetMesh,
+    e: ConsistentElements,
+    displacements: Displacements,
+    ground: int | None,
+    contact: Ints | None = None,
 ) -> Pattern:
     """Pattern of triangles, patches, spring creases, locks and the triangle `ground`, if there is one.
 

@@ -287,7 +287,7 @@ class ConsistentSystem(SupportedSheet):
         x = self.positions(q, lam)
         touching = None if self.barrier is None else self.barrier.blocks(x)
         if touching is not None and not self.contact_blocks.known(touching[0]):
-            del self._pattern
+            vars(self).pop("_pattern", None)
         pattern = self._pattern
         N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)

@@ -4,14 +4,13 @@ With d the distance of a node from a triangle, or of two edges, m the offset and
 
     b(d) = -kappa h ((d^2 - m^2) / (2 m h + h^2) - 1)^2 ln((d^2 - m^2) / (2 m h + h^2)),   m < d < m + h,
 
-is zero beyond, has two continuous derivatives, and grows without bound as the surfaces meet. It acts between all parts of the
-sheet that share no node, each with the area that belongs to it. The library `ipctk` finds the pairs, and gives
+is zero beyond, has two continuous derivatives, and grows without bound as the surfaces meet. It acts between all parts
+of the sheet that share no node, each with the area that belongs to it. The library `ipctk` finds the pairs, and gives
 gradients, Hessians and continuous collision detection.
 """
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import ipctk
@@ -28,8 +27,13 @@ from meshes import SheetMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
-OFFSET, REACH = 0.985, 0.02  # of the thickness: layers rest between 0.985 and 1.005 of it apart, under light loads at the end
-LOCAL = 4.0  # thicknesses along the flat sheet within which it does not meet itself: a hinge has no room for them
+OFFSET, REACH = (
+    0.985,
+    0.02,
+)  # of the thickness: layers rest between 0.985 and 1.005 of it apart, under light loads at the end
+LOCAL = (
+    4.0  # thicknesses along the flat sheet within which it does not meet itself: a hinge has no room for them
+)
 NAMED = 3  # pairs in a message
 ipctk.set_num_threads(1)  # sums in one order, so that the same input gives the same numbers
 
@@ -130,16 +134,43 @@ class SheetBarrier:
             )
         )
 
-    def meetings(self, x: Array, most: int = NAMED) -> list[str]:
-        """Edges and triangles that intersect at x, or lie within the offset, in words; the first `most` of them."""
-        found: list[str] = []
-        pairs = self._pairs(x)
+    def meetings(self, x: Array, most: int = NAMED) -> str:
+        """What intersects or lies within the offset at x, in words: the first `most` pairs, by their nodes.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            most: pairs to name.
+        """
+        found = [f"edge {self._words(e)} and triangle {self._words(t)}" for e, t in self._crossings(x)]
         limit = self.offset**2
-        for pair in pairs:
-            if limit > 0.0 and pair.compute_distance(pair.dof(x, self._mesh.edges, self._mesh.faces)) <= limit:
+        for k in range(len(self._pairs(x)) if limit > 0.0 else 0):
+            pair = self._pairs(x)[k]
+            place = pair.dof(x, self._mesh.edges, self._mesh.faces)
+            if pair.compute_distance(place) <= limit:
                 nodes = [n for n in pair.vertex_ids(self._mesh.edges, self._mesh.faces) if n >= 0]
-                found.append("nodes " + " ".join(map(str, nodes)))
-        return found[:most]
+                found.append(f"nodes {self._words(nodes)}")
+        more = f"; and {len(found) - most} more" if len(found) > most else ""
+        return "; ".join(found[:most]) + more
+
+    @staticmethod
+    def _words(nodes: Any) -> str:
+        return "-".join(str(int(node)) for node in nodes)
+
+    def _crossings(self, x: Array) -> list[tuple[Ints, Ints]]:
+        """Edges (2,) and triangles (3,) without a common node that intersect at x."""
+        near = ipctk.Candidates()
+        near.build(self._mesh, x, 0.0)
+        ends = {(int(c.edge0_id), int(c.edge1_id)) for c in near.ee_candidates}
+        edges = sorted({edge for pair in ends for edge in pair})
+        found = []
+        for edge in edges:
+            a, b = self.edges[edge]
+            for triangle in self.triangles:
+                if a in triangle or b in triangle:
+                    continue
+                if ipctk.is_edge_intersecting_triangle(x[a], x[b], *x[triangle]):
+                    found.append((self.edges[edge], triangle))
+        return found
 
     def _pairs(self, x: Array) -> Any:
         # the same state is asked for its energy, its Hessian and its distance one after the other

@@ -22,8 +22,8 @@ from bh.solvers.system import System, grows_ahead
 from meshes import SheetMesh
 
 if TYPE_CHECKING:
-    from bh.mechanics.contact.barrier import SheetBarrier
     from bh.loading.symmetry import Mirror
+    from bh.mechanics.contact.barrier import SheetBarrier
 
 Array = NDArray[np.float64]
 
@@ -79,8 +79,17 @@ class SupportedSheet:
     def _check_start(self, x: Array) -> None:
         """Raises `ModelError` where the step begins with a sheet that passes through itself."""
         if self.barrier is not None and not self.barrier.clear(x):
-            met = "; ".join(self.barrier.meetings(x))
-            raise ModelError(f"contact: the first state passes through itself ({met}); begin with panels apart")
+            met = self.barrier.meetings(x)
+            raise ModelError(f"contact: the first state meets itself ({met}); begin with panels apart")
+
+    def _passed(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Whether panels in contact would pass through each other on the straight way between two states."""
+        if self.barrier is None:
+            return ""
+        x, x_new = self.positions(q, lam), self.positions(q_new, lam_new)
+        if self.barrier.clear(x_new) and self.barrier.free_part(x, x_new) >= 1.0:
+            return ""
+        return "panels would pass through each other on the straight way there"
 
     def free_part(self, q: Array, dq: Array, lam: float) -> float:
         """How much of a step dq (size,) from q no panels stand in, 0 to 1; see `bh.solvers.system.Limited`."""
@@ -118,15 +127,15 @@ class SupportedSheet:
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Why an increment between two states is not to be trusted, or an empty string."""
-        if self.barrier is not None:
-            x, x_new = self.positions(q, lam), self.positions(q_new, lam_new)
-            if not self.barrier.clear(x_new) or self.barrier.free_part(x, x_new) < 1.0:
-                return "panels would pass through each other on the straight way there"
+        if passed := self._passed(q, lam, q_new, lam_new):
+            return passed
         asked = np.where(self.load_step.law == SHEET, 0.0, self.rotation * abs(lam_new - lam))
         return hinge_penetration.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new), asked)
 
     def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Which panels passed through each other between two states, or an empty string."""
+        if passed := self._passed(q, lam, q_new, lam_new):
+            return passed
         return hinge_penetration.penetration(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
 
     def contact(self, q: Array, lam: float) -> str:
