@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from bh.formulations.registry import remarks
     from bh.formulations.remarks import Remark
     from bh.formulations.state import Energy, State
-    from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
+    from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
+    from bh.model.crease_law import CreaseLaw
     from bh.model.model import Model
     from bh.model.pinch import Pinch
     from bh.model.refinement import Goal, Refinement
-    from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
+    from bh.model.sheet import ElementStiffness, Sheet
     from bh.model.step import Actuation, Body, Step, StepBuilder, Zone
     from bh.model.supports import Constraint, RigidBody, Support
     from bh.model.until import Until, depth
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from bh.scene.load import load_scene
     from bh.solvers.arc_length import ArcLength, DisplacementControl
     from bh.solvers.automatic import Automatic
-    from bh.solvers.continuation import LoadControl
+    from bh.solvers.load_control import LoadControl
     from bh.solvers.newton import Newton
     from bh.solvers.outcome import Outcome
     from bh.solving.trace import trace
@@ -43,11 +44,12 @@ _NAMES = {
     "bh.formulations.registry": "remarks",
     "bh.formulations.remarks": "Remark",
     "bh.formulations.state": "Energy State",
-    "bh.model.actuations": "Displace Fold Force Indenter Moment Tether",
+    "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
+    "bh.model.crease_law": "CreaseLaw",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
     "bh.model.refinement": "Goal Refinement",
-    "bh.model.sheet": "CreaseLaw ElementStiffness Sheet",
+    "bh.model.sheet": "ElementStiffness Sheet",
     "bh.model.step": "Actuation Body Step StepBuilder Zone",
     "bh.model.supports": "Constraint RigidBody Support",
     "bh.model.until": "Until depth",
@@ -57,7 +59,7 @@ _NAMES = {
     "bh.scene.load": "load_scene",
     "bh.solvers.arc_length": "ArcLength DisplacementControl",
     "bh.solvers.automatic": "Automatic",
-    "bh.solvers.continuation": "LoadControl",
+    "bh.solvers.load_control": "LoadControl",
     "bh.solvers.newton": "Newton",
     "bh.solvers.outcome": "Outcome",
     "bh.solving.trace": "trace",
@@ -69,6 +71,7 @@ _SUBMODULES = {
     "creases": "bh.analysis.creases",
     "interactive": "bh.plotting.interactive",
     "isometric": "bh.analysis.isometric",
+    "live": "bh.live",
     "node_sensitivities": "bh.analysis.node_sensitivities",
     "pinching": "bh.applications.pinching",
     "plotting": "bh.plotting",
@@ -77,6 +80,7 @@ _SUBMODULES = {
     "scan": "bh.applications.scan",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe",
+    "studio": "bh.studio",
     "sweep": "bh.sweep",
 }
 
@@ -107,6 +111,7 @@ __all__ = [
     "Path",
     "PathFileError",
     "Pinch",
+    "Pull",
     "Refinement",
     "Remark",
     "RigidBody",

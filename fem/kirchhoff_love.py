@@ -17,9 +17,9 @@ from bh.model.model import Model
 from bh.model.refinement import Refinement
 from bh.model.sheet import Sheet
 from bh.runtime.threads import one_blas_thread
-from bh.solvers.continuation import LoadControl
-from bh.solvers.increments import Increment, point
+from bh.solvers.load_control import LoadControl
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import Increment, point
 from bh.solvers.trace import Strategy, Walk, walk
 from fem.loads import EdgeMoments
 from fem.observables import observe

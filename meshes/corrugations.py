@@ -23,6 +23,7 @@ from meshes.curves import Array, Curve, Line, Polyline
 from meshes.errors import PatternError
 from meshes.library import alternating, between_rails
 from meshes.pattern import CreasePattern, FoldKind
+from meshes.quantities import Typed, number
 
 KINDS = ("straight", "parabolic-point", "parabolic-edge", "elliptical-point", "elliptical-edge")
 FAMILY = {  # exponent p, root q and spread s
@@ -50,7 +51,7 @@ class CorrugationTable:
 
 
 def corrugation_table(
-    kind: str, width: float = 100.0, height: float = 100.0, panels: int = 5
+    kind: str, width: Typed = 100.0, height: Typed = 100.0, panels: int = 5
 ) -> CorrugationTable:
     """Parameters of the five example patterns from W, H and n_s (Eq. 4.7-4.16).
 
@@ -89,8 +90,8 @@ def corrugation_table(
 
 def corrugation(
     kind: str,
-    width: float = 100.0,
-    height: float = 100.0,
+    width: Typed = 100.0,
+    height: Typed = 100.0,
     panels: int = 5,
     folds: FoldKind | Sequence[FoldKind] | None = None,
 ) -> CreasePattern:
@@ -123,8 +124,8 @@ def curved_corrugation(
     exponent: float = 2.0,
     root: float = 1.0,
     spread: float = 0.0,
-    width: float = 100.0,
-    height: float = 100.0,
+    width: Typed = 100.0,
+    height: Typed = 100.0,
     panels: int = 5,
     folds: FoldKind | Sequence[FoldKind] | None = None,
 ) -> CreasePattern:
@@ -168,7 +169,8 @@ def _pattern(rails: list[Curve], folds: FoldKind | Sequence[FoldKind] | None) ->
     return between_rails(rails, alternating(len(rails) - 2) if folds is None else folds)
 
 
-def _sizes(width: float, height: float, panels: int) -> tuple[float, float, int]:
+def _sizes(width: Typed, height: Typed, panels: int) -> tuple[float, float, int]:
+    width, height = number(width, "length"), number(height, "length")
     for name, value in (("width", width), ("height", height)):
         if isinstance(value, bool | str) or not (math.isfinite(value) and value > 0.0):
             raise PatternError(f"{name} = {value!r} cannot be; give a positive length in mm")

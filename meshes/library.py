@@ -10,13 +10,14 @@ import numpy as np
 from meshes.curves import Arc, Array, Curve, Line, Polyline, sample
 from meshes.errors import PatternError
 from meshes.pattern import Crease, CreasePattern, FoldKind
+from meshes.quantities import QuantityError, Typed, degrees_meant, number, numbers
 
 Folds = FoldKind | Sequence[FoldKind]
 CHORDS = 2048  # of a graph, so fine that nodes between its vertices are off by less than 1e-5 of the sheet
 
 
 def strip(
-    length: float, width: float, creases: Sequence[float] = (), folds: Folds = "mountain"
+    length: Typed, width: Typed, creases: Sequence[Typed] = (), folds: Folds = "mountain"
 ) -> CreasePattern:
     """A rectangle 0 <= x <= length, 0 <= y <= width, with straight creases along x at the heights `creases`.
 
@@ -34,7 +35,7 @@ def strip(
     """
     length = _positive("length", length)
     width = _positive("width", width)
-    heights = [float(y) for y in creases]
+    heights = [float(number(y, "length")) for y in creases]
     if any(not 0.0 < y < width for y in heights) or sorted(set(heights)) != heights:
         raise PatternError(
             f"strip creases {heights} leave the sheet or are not in order; give rising heights between 0 and {width:g}"
@@ -44,7 +45,7 @@ def strip(
 
 
 def annulus_sector(
-    radius: float | Sequence[float], width: float, angle: float, folds: Folds = "mountain"
+    radius: Typed | Sequence[Typed], width: Typed, angle: Typed, folds: Folds = "mountain"
 ) -> CreasePattern:
     """A sector of an annulus with one or more concentric creases.
 
@@ -61,13 +62,13 @@ def annulus_sector(
     """
     angle = _positive("angle", angle)
     if angle >= 2.0 * math.pi:
-        hint = "; angles are radians, not degrees" if 7.0 < angle <= 360.0 else ""
+        hint = degrees_meant(angle)
         raise PatternError(f"angle {angle:g} rad closes the sector; use full_annulus for a whole turn{hint}")
     radii = _radii(radius, width)
     return between_rails([Arc((0.0, 0.0), r, 0.0, angle) for r in radii], folds)
 
 
-def full_annulus(radius: float | Sequence[float], width: float, folds: Folds = "mountain") -> CreasePattern:
+def full_annulus(radius: Typed | Sequence[Typed], width: Typed, folds: Folds = "mountain") -> CreasePattern:
     """A whole annulus with concentric creases; arguments as for `annulus_sector`.
 
     Args:
@@ -82,10 +83,10 @@ def full_annulus(radius: float | Sequence[float], width: float, folds: Folds = "
 
 
 def two_arcs(
-    width: float = 100.0,
-    height: float = 100.0,
-    radii: Sequence[float] = (80.0, 250.0),
-    at: Sequence[float] = (35.0, 70.0),
+    width: Typed = 100.0,
+    height: Typed = 100.0,
+    radii: Sequence[Typed] = (80.0, 250.0),
+    at: Sequence[Typed] = (35.0, 70.0),
     folds: Folds = ("mountain", "valley"),
 ) -> CreasePattern:
     """A rectangle with circular creases across it that bulge the same way, upwards (source Fig. 3.7 c and 3.8 d).
@@ -103,11 +104,11 @@ def two_arcs(
         PatternError: an arc that does not reach across the sheet, or creases that leave it or cross.
     """
     width = _positive("width", width)
-    radii, at = [_positive("radius", r) for r in radii], [float(y) for y in at]
-    if len(radii) != len(at):
-        raise PatternError(f"{len(radii)} radii for {len(at)} arcs; give one radius an arc")
+    sizes, tops = [_positive("radius", r) for r in radii], [float(number(y, "length")) for y in at]
+    if len(sizes) != len(tops):
+        raise PatternError(f"{len(sizes)} radii for {len(tops)} arcs; give one radius an arc")
     arcs: list[Curve] = []
-    for r, y in zip(radii, at, strict=True):
+    for r, y in zip(sizes, tops, strict=True):
         if 2.0 * r < width:
             raise PatternError(
                 f"an arc of radius {r:g} mm cannot cross a sheet {width:g} mm wide; give at least half"
@@ -118,10 +119,10 @@ def two_arcs(
 
 
 def sine_tessellation(
-    width: float = 100.0,
-    height: float = 100.0,
+    width: Typed = 100.0,
+    height: Typed = 100.0,
     creases: int = 5,
-    amplitude: float = 4.0,
+    amplitude: Typed = 4.0,
     waves: float = 2.0,
     folds: Folds | None = None,
 ) -> CreasePattern:
@@ -151,10 +152,10 @@ def sine_tessellation(
 
 
 def parabolic_canopy(
-    width: float = 100.0,
-    height: float = 100.0,
+    width: Typed = 100.0,
+    height: Typed = 100.0,
     creases: int = 3,
-    sag: float = 15.0,
+    sag: Typed = 15.0,
     folds: Folds | None = None,
 ) -> CreasePattern:
     """A rectangle with one parabola repeated upwards, alternately mountain and valley (source Fig. 3.7 d).
@@ -182,7 +183,7 @@ def parabolic_canopy(
 
 
 def opposite_parabolas(
-    side: float = 100.0, gap: float = 30.0, sag: float = 20.0, folds: Folds = "mountain"
+    side: Typed = 100.0, gap: Typed = 30.0, sag: Typed = 20.0, folds: Folds = "mountain"
 ) -> CreasePattern:
     """A square with two parabolas across it whose tops face each other in the middle (source Fig. 3.7 e).
 
@@ -203,7 +204,7 @@ def opposite_parabolas(
     return _rectangle(side, side, [parabola(-1.0), parabola(1.0)], folds)
 
 
-def _rectangle(width: float, height: float, curves: Sequence[Curve], folds: Folds) -> CreasePattern:
+def _rectangle(width: float, height: Typed, curves: Sequence[Curve], folds: Folds) -> CreasePattern:
     """The sheet 0 <= x <= width, 0 <= y <= height with creases from x = 0 to x = width, from below."""
     height = _positive("height", height)
     rails = [Line((0.0, 0.0), (width, 0.0)), *curves, Line((0.0, height), (width, height))]
@@ -237,9 +238,12 @@ def _count(name: str, value: int) -> int:
     return int(value)
 
 
-def _radii(radius: float | Sequence[float], width: float) -> list[float]:
+def _radii(radius: Typed | Sequence[Typed], width: Typed) -> list[float]:
     try:
-        creases = [float(r) for r in np.atleast_1d(np.asarray(radius, dtype=float))]
+        given = numbers(radius, "length")
+        creases = [float(r) for r in np.atleast_1d(np.asarray(given, dtype=float))]
+    except QuantityError as error:
+        raise PatternError(f"radius = {error}") from error
     except (TypeError, ValueError) as error:
         raise PatternError(f"radius = {radius!r} is not a number; give radii in mm") from error
     for r in creases:
@@ -292,11 +296,11 @@ def between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
     return CreasePattern(rings=rings, creases=creases, rails=tuple(rails), edges=edges)
 
 
-def _positive(name: str, value: float) -> float:
+def _positive(name: str, value: Typed) -> float:
     try:
-        if isinstance(value, str):
-            raise TypeError
-        value = float(value)
+        value = float(number(value, "angle" if name == "angle" else "length"))
+    except QuantityError as error:
+        raise PatternError(f"{name} = {error}") from error
     except (TypeError, ValueError) as error:
         raise PatternError(f"{name} = {value!r} is not a number; give a positive length or angle") from error
     if not math.isfinite(value) or value <= 0.0:

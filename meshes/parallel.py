@@ -11,12 +11,13 @@ from meshes.curves import Arc, ArcChain, Curve, Line
 from meshes.errors import PatternError
 from meshes.library import Folds, between_rails
 from meshes.pattern import CreasePattern, FoldKind
+from meshes.quantities import Typed, number, numbers
 
 
 def parallel_creases(
-    curvature: float | Sequence[float],
-    length: float | Sequence[float],
-    spacing: float = 5.0,
+    curvature: Typed | Sequence[Typed],
+    length: Typed | Sequence[Typed],
+    spacing: Typed = 5.0,
     creases: int = 1,
     folds: Folds | None = None,
 ) -> CreasePattern:
@@ -39,8 +40,9 @@ def parallel_creases(
     Raises:
         PatternError: a curve is narrower than its offsets, or the sheet meets itself.
     """
-    curvatures = [float(k) for k in np.atleast_1d(np.asarray(curvature, dtype=float))]
-    lengths = [float(each) for each in np.atleast_1d(np.asarray(length, dtype=float))]
+    curvatures = [float(k) for k in np.atleast_1d(np.asarray(numbers(curvature, "curvature"), dtype=float))]
+    lengths = [float(each) for each in np.atleast_1d(np.asarray(numbers(length, "length"), dtype=float))]
+    spacing = number(spacing, "length")
     if len(lengths) != len(curvatures):
         raise PatternError(
             f"{len(curvatures)} curvatures for {len(lengths)} lengths; give one of each a piece"

@@ -23,6 +23,7 @@ from meshes.errors import MeshError
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.planar import corners
+from meshes.quantities import Typed, number
 from meshes.topology import Ints
 
 # of every face: its loops of nodes, and edges inside
@@ -81,8 +82,8 @@ class Sizes:
 def unstructured(
     pattern: CreasePattern,
     *,
-    size: float,
-    near: Mapping[str, float] | None = None,
+    size: Typed,
+    near: Mapping[str, Typed] | None = None,
     growth: float = 0.3,
     seed: int = 1,
 ) -> SheetMesh:
@@ -106,6 +107,8 @@ def unstructured(
         raise MeshError(
             f"a {type(pattern).__name__} cannot be meshed; give a pattern, such as meshes.strip(100, 10)"
         )
+    size = number(size, "length")
+    finer = {name: float(number(edge, "length")) for name, edge in (near or {}).items()}
     if not math.isfinite(size) or size <= 0.0:
         raise MeshError(f"size = {size} cannot be; use a positive edge length in mm")
     area = sheet_area(pattern)
@@ -119,7 +122,7 @@ def unstructured(
     curves |= {f"crease:{crease.name}": crease.curve for crease in pattern.creases}
     cuts = {f"edge:{name}": curve for name, curve in pattern.cuts}
     curves |= cuts
-    sizes = _sizes(curves, size, dict(near or {}), growth)
+    sizes = _sizes(curves, size, finer, growth)
     facets = {f"facet:{i}": curve for i, curve in enumerate(pattern.facets)}
     points, chains = _chains(curves | facets, sizes, cuts)
     segments = np.vstack(list(chains.values()))
@@ -137,7 +140,7 @@ def unstructured(
         curves=curves,
         kind="gmsh",
         remarks=pattern.remarks,
-        origin=Origin.of(pattern, GmshCells(size, dict(near or {}), growth, seed), points, triangles),
+        origin=Origin.of(pattern, GmshCells(size, finer, growth, seed), points, triangles),
     )
     return open_cuts(mesh, list(cuts))
 

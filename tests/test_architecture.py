@@ -22,6 +22,7 @@ LONGEST_MODULE, LONGEST_FUNCTION = 450, 80
 MOST_ANY, MOST_SKIPS = 60, 60
 HEAVY = {
     "gmsh",
+    "pint",
     "pyvista",
     "matplotlib",
     "plotly",
@@ -34,6 +35,7 @@ HEAVY = {
     "svgelements",
     "ezdxf",
     "trimesh",
+    "tornado",
 }
 
 # Whom a folder may import beside itself. A folder that is not here has no rule, and so fails.
@@ -56,6 +58,8 @@ RULES: dict[str, tuple[str, ...]] = {
     "bh.analysis": (*DESCRIPTION, "bh.paths"),
     "bh.plotting": (*ANALYSIS, "bh.scene"),
     "bh.solving": ANALYSIS,
+    "bh.live": DESCRIPTION,
+    "bh.studio": (*USERS, "bh.live"),
     "bh.applications": (*ANALYSIS, "bh.plotting", "bh.solving"),
     "bh.sweep": USERS,
     "bh.commands": (*USERS, "bh.sweep"),

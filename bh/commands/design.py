@@ -23,7 +23,7 @@ from bh.applications.inverse.surrogate import Surrogate, read, shipped
 from bh.errors import InputError
 from bh.paths.provenance import versions
 from bh.runtime.terminal import say
-from bh.scene.reading import Table, Vector, check_keys, inside, one_line, read_table, read_toml
+from bh.scene.reading import Scale, Spot, Table, check_keys, inside, one_line, read_table, read_toml
 from meshes import parallel_creases
 from meshes.curves import arc_lengths, interpolated
 from meshes.io import write_pattern
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 class TargetTable(Table):
     """What is asked for: exactly one of the three."""
 
-    point: Vector | None = Field(None, description="three coordinates [x, y, z] in mm")
+    point: Spot | None = Field(None, description="three coordinates [x, y, z] in mm")
     curve: str | None = Field(
         None, description=f"the name of a CSV file of points x, y in mm, or one of {', '.join(CURVES)}"
     )
@@ -60,7 +60,7 @@ class SearchTable(Table):
     segments: Annotated[int, Field(ge=1, le=8)] = Field(
         4, description="the largest number of segments, 1 to 8"
     )
-    tolerance: Annotated[float, Field(gt=0.0)] = Field(1.0, description="of a point, mm, a positive number")
+    tolerance: Scale = Field(1.0, description="of a point, mm, a positive number")
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
     data: str | None = Field(
         None, description="the name of a data set of `bh segments`, from the folder of this file"

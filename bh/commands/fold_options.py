@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bh.runtime.terminal import say
+from bh.scene.options import a_length, a_time, an_angle
 
 
 def fold(  # noqa: PLR0913 - the options of a command line
@@ -16,7 +17,8 @@ def fold(  # noqa: PLR0913 - the options of a command line
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Output folder; default FILE-folded.")
     ] = None,
     angle: Annotated[
-        str | None, typer.Option("--angle", metavar="60deg", help="Fold angle of every crease (deg or rad).")
+        float | None,
+        typer.Option("--angle", metavar="60deg", parser=an_angle, help="Fold angle of every crease."),
     ] = None,
     percent: Annotated[
         float | None,
@@ -25,8 +27,14 @@ def fold(  # noqa: PLR0913 - the options of a command line
     material: Annotated[
         str, typer.Option("--material", help="paper, card, board, pet, pp, aluminium or steel.")
     ] = "card",
-    fit: Annotated[float | None, typer.Option("--fit", help="Longer side of the sheet, mm.")] = None,
-    scale: Annotated[float | None, typer.Option("--scale", help="mm a unit of the drawing.")] = None,
+    fit: Annotated[
+        float | None,
+        typer.Option("--fit", metavar="200mm", parser=a_length, help="Longer side of the sheet."),
+    ] = None,
+    scale: Annotated[
+        float | None,
+        typer.Option("--scale", metavar="1mm", parser=a_length, help="What a unit of the drawing is."),
+    ] = None,
     frame: Annotated[
         str | None, typer.Option("--frame", help="Of a FOLD file: number (0 is the key frame) or title.")
     ] = None,
@@ -34,18 +42,21 @@ def fold(  # noqa: PLR0913 - the options of a command line
         list[str] | None,
         typer.Option("--write", metavar="glb", help="Also glb, stl, obj, ...; may be repeated."),
     ] = None,
-    seconds: Annotated[float, typer.Option("--seconds", help="Processor time to spend on it.")] = 60.0,
+    seconds: Annotated[
+        float,
+        typer.Option("--seconds", metavar="60s", parser=a_time, help="Processor time to spend on it."),
+    ] = 60.0,
     force: Annotated[bool, typer.Option("--force", help="Write over a scene that is there.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Fold a drawing: picture, result and the scene that did it."""
     from bh.commands.fold import fold_file
     from bh.commands.summary import summary
-    from bh.scene.folding import Wish, radians_of
+    from bh.scene.folding import Wish
 
     number = int(frame) if frame is not None and frame.isdigit() else frame
     wish = Wish(
-        None if angle is None else radians_of(angle),
+        angle,
         percent,
         material,
         fit,

@@ -20,7 +20,7 @@ from bh.formulations.protocols import (
     Refinable,
     SheetSystem,
 )
-from bh.formulations.remarks import Remark
+from bh.formulations.remarks import Remark, unlikely
 from bh.model.model import Model
 from bh.model.plugins import named
 from bh.solvers.system import System
@@ -173,4 +173,4 @@ def remarks(model: Model) -> tuple[Remark, ...]:
         ModelError: its formulation is not registered.
     """
     drawn = (Remark("drawing", text) for text in model.mesh.remarks)
-    return (*drawn, *formulation(model.formulation).remarks(model))
+    return (*drawn, *unlikely(model), *formulation(model.formulation).remarks(model))

@@ -5,11 +5,12 @@ Each formulation says its own (`Formulation.remarks`); `bh.formulations.registry
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from bh.model.actuations import Displace, Force
+from bh.model.actuations import Displace, Force, Indenter
 from bh.model.model import Model
 
 
@@ -17,7 +18,8 @@ from bh.model.model import Model
 class Remark:
     """One line of `text` for people, and its `code` for programs.
 
-    Codes are "crease", "creases", "ring", "aspect-ratio", "diagonals", "rows", "rulings", "loads", "pinch" and
+    Codes are "unlikely" (a number that cannot be meant),
+    "crease", "creases", "ring", "aspect-ratio", "diagonals", "rows", "rulings", "loads", "pinch" and
     "drawing" (what was read into a drawing); a formulation may have others.
     """
 
@@ -47,3 +49,52 @@ def folds(model: Model) -> bool:
 def loaded(model: Model) -> bool:
     """True if a step has forces or prescribed displacements."""
     return any(isinstance(item, Force | Displace) for step in model.steps for item in step.actuations)
+
+
+SOFT, STIFF = 50.0, 1.2e6  # MPa: below any paper, card or film; diamond
+THIN, THICK = 1e-3, 0.2  # mm; of the length of which the square is the sheet's area
+FAR = 3.0  # times the size of the sheet
+
+
+def unlikely(model: Model) -> tuple[Remark, ...]:
+    """Numbers that are likely to stand in another unit than is meant.
+
+    Args:
+        model: of any formulation.
+
+    Returns:
+        a remark each, with the way to write the unit.
+    """
+    E, t = model.sheet.E, model.sheet.t
+    found = []
+    if E < SOFT:
+        found.append(
+            f"E = {E:g} MPa is as soft as rubber, where paper and card have 2000 to 6000 MPa; if GPa are meant "
+            f'write E = "{E:g}GPa"'
+        )
+    if E > STIFF:
+        found.append(f'E = {E:g} MPa is stiffer than diamond; if Pa are meant write E = "{E:g}Pa"')
+    width = math.sqrt(float(model.mesh.areas.sum()))
+    if t > THICK * width:
+        found.append(
+            f"t = {t:g} mm is no thin sheet any more where the sheet is some {width:.3g} mm wide; thickness is in mm, "
+            'or has a unit: t = "0.2mm"'
+        )
+    if t < THIN:
+        found.append(
+            f't = {t:g} mm is thinner than any sheet; thickness is in mm: if metres are meant write t = "{t:g}m"'
+        )
+    for number, step in enumerate(model.steps):
+        for item in step.actuations:
+            if isinstance(item, Displace) and abs(item.by) > FAR * model.mesh.size:
+                times = abs(item.by) / model.mesh.size
+                found.append(
+                    f"step {number + 1}: a displacement of {item.by:g} mm is {times:.3g} times the size of the sheet; "
+                    "it is in mm, or has a unit"
+                )
+            if isinstance(item, Indenter) and max(abs(item.azimuth), abs(item.tilt)) > 2.0 * math.pi:
+                found.append(
+                    f"step {number + 1}: indenter '{item.name}' is turned by more than 2 pi; angles are radians, "
+                    'or have a unit: "60deg"'
+                )
+    return tuple(Remark("unlikely", text) for text in found)

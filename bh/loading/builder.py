@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep, Pinched, StepEnd, edge_hinges, hinge_name
+from bh.model.crease_law import CreaseLaw
 from bh.model.laws import PRESCRIBED, SPRING
 from bh.model.model import Model
 from bh.model.ramp import Ramp
-from bh.model.sheet import CreaseLaw, Sheet
+from bh.model.sheet import Sheet
 from bh.model.step import Body, Step, Zone
 from bh.model.supports import Prescribed, resolve
 from meshes import SheetMesh

@@ -7,8 +7,10 @@ load steps of it. The pinch has a module of its own, `bh.model.pinch`.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +18,11 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.model.step import Actuation, Body, StepBuilder
 from bh.model.supports import AXES, select
+from meshes.quantities import Typed, degrees_meant, take_units
 
 Array = NDArray[np.float64]
 Angles = float | Sequence[float]
+Given = Typed | Sequence[Typed]
 
 
 @dataclass(frozen=True)
@@ -45,12 +49,32 @@ class Fold(Actuation):
     stiffness: float | None = None
     part: float = 1.0
 
+    if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
+
+        def __init__(
+            self,
+            crease: str,
+            to: Given | None = None,
+            by: Given | None = None,
+            rest: Given | None = None,
+            Lstar: Typed | None = None,
+            stiffness: Typed | None = None,
+            part: float = 1.0,
+        ) -> None:
+            """See the attributes."""
+
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
 
         Raises:
             ModelError: one line that names the value and what to give.
         """
+        what = f"fold of crease '{self.crease}'"
+        take_units(self, what, to="angle", rest="angle", Lstar="length", stiffness="stiffness")
+        if not isinstance(self.by, str) or re.match(
+            r"\s*[-+.]?[0-9]", self.by
+        ):  # else "drawn", or a misspelt one
+            take_units(self, what, by="angle")
         if not 0.0 <= self.part <= 1.0 or (self.part != 1.0 and self.by != "drawn"):
             raise ModelError(
                 f"fold of crease '{self.crease}': part = {self.part} cannot be; give 0 to 1, with by = 'drawn'"
@@ -86,7 +110,7 @@ class Fold(Actuation):
             if not (np.isfinite(angles).all() and (angles >= low).all() and (angles <= high).all()):
                 raise ModelError(
                     f"fold of crease '{self.crease}': {key} = {value} rad is outside {low:.4g} to {high:.4g}"
-                    + ("; angles are radians, not degrees" if np.abs(angles).max(initial=0.0) > 7.0 else "")
+                    + degrees_meant(float(np.abs(angles).max(initial=0.0)))
                 )
 
     @property
@@ -140,12 +164,18 @@ class Moment(Actuation):
     crease: str
     to: float
 
+    if TYPE_CHECKING:
+
+        def __init__(self, crease: str, to: Typed) -> None:
+            """See the class."""
+
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
 
         Raises:
             ModelError: one line that names the value and what to give.
         """
+        take_units(self, f"moment on crease '{self.crease}'", to="couple")
         _finite(f"moment on crease '{self.crease}'", (self.to,))
 
     def apply(self, builder: StepBuilder) -> None:
@@ -162,6 +192,16 @@ class Force(Actuation):
     each: Sequence[float] | None = None
     total: Sequence[float] | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            at: str | Sequence[int],
+            each: Sequence[Typed] | None = None,
+            total: Sequence[Typed] | None = None,
+        ) -> None:
+            """See the class."""
+
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
 
@@ -172,6 +212,8 @@ class Force(Actuation):
             raise ModelError(
                 f"force at '{self.at}' needs either each or total, a vector of three numbers in N"
             )
+        if isinstance(self.each, list | tuple) or isinstance(self.total, list | tuple):
+            take_units(self, f"force at '{self.at}'", each="force", total="force")
         vector = self.each if self.each is not None else self.total
         assert vector is not None
         _vector(f"force at '{self.at}'", vector)
@@ -195,12 +237,18 @@ class Displace(Actuation):
     direction: str | Sequence[float]
     by: float
 
+    if TYPE_CHECKING:
+
+        def __init__(self, at: str | Sequence[int], direction: str | Sequence[float], by: Typed) -> None:
+            """See the class."""
+
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
 
         Raises:
             ModelError: one line that names the value and what to give.
         """
+        take_units(self, f"displacement at '{self.at}'", by="length")
         _finite(f"displacement at '{self.at}'", (self.by,))
         if isinstance(self.direction, str):
             if self.direction not in ("x", "y", "z"):
@@ -247,12 +295,32 @@ class Indenter(Body):
     stiffness: float = 50.0
     gap: float = 0.05
 
+    if TYPE_CHECKING:
+
+        def __init__(  # noqa: PLR0913 - the fields of the dataclass
+            self,
+            name: str,
+            at: tuple[Typed, Typed, Typed],
+            azimuth: Typed,
+            width: Typed,
+            height: Typed,
+            radius: Typed,
+            by: tuple[Typed, Typed, Typed] = (0.0, 0.0, 0.0),
+            tilt: Typed = 0.0,
+            stiffness: float = 50.0,
+            gap: Typed = 0.05,
+        ) -> None:
+            """See the attributes."""
+
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
 
         Raises:
             ModelError: one line that names the value and what to give.
         """
+        what = f"indenter '{self.name}'"
+        take_units(self, what, azimuth="angle", tilt="angle", at="length", by="length", gap="length")
+        take_units(self, what, width="length", height="length", radius="length")
         for key in ("at", "by"):
             _vector(f"indenter '{self.name}': {key}", getattr(self, key))
         _finite(f"indenter '{self.name}': azimuth or tilt", (self.azimuth, self.tilt))
@@ -298,6 +366,40 @@ class Tether(Body):
         _vector(f"tether at '{self.at}'", self.total)
         if min(self.total) < 0.0:
             raise ModelError(f"tether at '{self.at}': {self.total} cannot be; stiffness is not negative")
+
+
+@dataclass(frozen=True)
+class Pull(Body):
+    """A spring from a node to a point of space, which moves during the step: a hand that pulls.
+
+    Pulls take the place of the rigid-body support in their step.
+
+    Attributes:
+        node: that is pulled.
+        to: (3,) the point at the end of the step, mm.
+        stiffness: of the spring, N/mm, the same in all directions.
+        start: (3,) the point where the step begins, mm; None for where the node is then.
+    """
+
+    node: int
+    to: tuple[float, float, float]
+    stiffness: float
+    start: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
+        for key, value in (("to", self.to), ("start", self.start)):
+            if value is not None:
+                _vector(f"pull at node {self.node}: {key}", value)
+                object.__setattr__(self, key, tuple(float(x) for x in value))  # lists, as files hold them
+        if not (math.isfinite(self.stiffness) and self.stiffness > 0.0):
+            raise ModelError(
+                f"pull at node {self.node}: stiffness = {self.stiffness} cannot be; give a positive number of N/mm"
+            )
 
 
 def _finite(what: str, values: Sequence[float]) -> None:

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
 from bh.model.actuations import Displace, Fold, Force, Moment
+from bh.model.crease_law import CreaseLaw
 from bh.model.pinch import Pinch
-from bh.model.sheet import CreaseLaw, ElementStiffness, Sheet
+from bh.model.sheet import ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support
 from bh.model.until import Until
@@ -227,7 +228,7 @@ class Model:
             until = Until("largest_fold", item.fold, of=on)
         return self.step(item, until=until)
 
-    def moment(self, crease: str, to: float) -> Model:
+    def moment(self, crease: str, to: float | str) -> Model:
         """Add a step with a couple a length on a crease; see `bh.Moment`.
 
         Args:
@@ -245,7 +246,7 @@ class Model:
         """
         return self.step(Force(at, **how))
 
-    def displace(self, at: str | Sequence[int], direction: str | Sequence[float], by: float) -> Model:
+    def displace(self, at: str | Sequence[int], direction: str | Sequence[float], by: float | str) -> Model:
         """Add a step with prescribed displacements; see `bh.Displace`.
 
         Args:

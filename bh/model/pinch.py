@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.step import Actuation, StepBuilder, Zone
 from meshes import SheetMesh
 from meshes.curves import arc_lengths
+from meshes.quantities import degrees_meant, take_units
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
@@ -85,6 +86,22 @@ class Pinch(Actuation):
     how: Literal["imposed", "rest", "couple"] = "imposed"
     profile: Profile = "cosine"
     couple: float | None = None
+
+    if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
+
+        def __init__(
+            self,
+            crease: str,
+            at: float = 0.5,
+            to: float | str | None = None,
+            by: float | str | None = None,
+            length: float | str | None = None,
+            how: Literal["imposed", "rest", "couple"] = "imposed",
+            profile: Profile = "cosine",
+            couple: float | str | None = None,
+        ) -> None:
+            """See the attributes."""
+
     late: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -94,12 +111,13 @@ class Pinch(Actuation):
             ModelError: one line that names the value and what to give.
         """
         what = f"pinch of crease '{self.crease}'"
+        take_units(self, what, to="angle", by="angle", length="length", couple="couple")
         if self.to is not None and self.by is not None:
             raise ModelError(f"{what} has to and by; give one of them")
         for key, low, high in (("to", 0.0, 2.0 * math.pi), ("by", 0.0, math.pi)):
             value = getattr(self, key)
             if value is not None and not low < value < high:
-                hint = "; angles are radians, not degrees" if abs(value) > 7.0 else ""
+                hint = degrees_meant(value)
                 raise ModelError(
                     f"{what}: {key} = {value} rad closes it beyond what it can; stay inside ({low:g}, {high:.4g}){hint}"
                 )

@@ -1,15 +1,17 @@
-"""The sheet and its creases: what they are made of, as plain frozen values."""
+"""The sheet, and what its elements are given in its place, as plain frozen values."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from numbers import Real
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from meshes.quantities import take_units
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,8 +19,8 @@ class Sheet:
     """A thin elastic sheet; its values are given by name: `Sheet(E=4000, nu=0.38, t=0.127)`.
 
     Attributes:
-        E: Young's modulus, MPa.
-        t: thickness, mm.
+        E: Young's modulus, MPa, or with a unit ("4GPa").
+        t: thickness, mm, or with a unit ("0.2mm").
         nu: Poisson's ratio in (-1, 0.5]; bars and hinges take 0, as the source does (3.3.2).
     """
 
@@ -26,12 +28,18 @@ class Sheet:
     t: float
     nu: float = 0.0
 
+    if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
+
+        def __init__(self, *, E: float | str, t: float | str, nu: float = 0.0) -> None:
+            """See the attributes."""
+
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
 
         Raises:
             ModelError: one line that names the value and what to give.
         """
+        take_units(self, "sheet", E="modulus", t="length")
         for name, unit in (("E", "MPa"), ("t", "mm")):
             value = getattr(self, name)
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
@@ -43,41 +51,6 @@ class Sheet:
         """D = E t^3 / (12 (1 - nu^2)), N mm (Eq. B.2); `nu` overrides the sheet's."""
         nu = self.nu if nu is None else nu
         return self.E * self.t**3 / (12.0 * (1.0 - nu**2))
-
-
-@dataclass(frozen=True)
-class CreaseLaw:
-    """A spring crease: moment a length = stiffness (phi - rest), N mm / mm.
-
-    A `rest` angle that is not flat comes in during the first step, since the sheet begins flat.
-    """
-
-    Lstar: float | None = None
-    stiffness: float | None = None
-    rest: float = math.pi
-
-    def __post_init__(self) -> None:
-        """Refuse values that cannot be.
-
-        Raises:
-            ModelError: one line that names the value and what to give.
-        """
-        if (self.Lstar is None) == (self.stiffness is None):
-            raise ModelError("a crease needs either Lstar (mm) or stiffness (N mm / (mm rad))")
-        value = self.Lstar if self.Lstar is not None else self.stiffness
-        assert value is not None
-        low_ok = value > 0.0 if self.Lstar is not None else value >= 0.0
-        if not (math.isfinite(value) and low_ok):
-            raise ModelError(
-                f"crease stiffness {value} cannot be; give a positive Lstar, or a stiffness of 0 or more"
-            )
-
-    def per_length(self, sheet: Sheet) -> float:
-        """Stiffness a length of crease (Eq. 3.12 with nu = 0), N mm / (mm rad)."""
-        if self.stiffness is not None:
-            return self.stiffness
-        assert self.Lstar is not None
-        return sheet.bending_stiffness(nu=0.0) / self.Lstar
 
 
 @dataclass(frozen=True, eq=False)

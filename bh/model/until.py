@@ -14,10 +14,19 @@ from typing import TYPE_CHECKING, Final
 
 from bh.errors import ModelError
 from bh.runtime.consent import said
+from meshes.quantities import Kind, number, take_units
 
 _OF_CREASE: Final = ("fold_angle", "largest_fold", "dihedral", "moment")
 _OF_PLACE: Final = tuple(f"{what}_{axis}" for what in ("reaction", "displacement") for axis in "xyz")
 OBSERVABLES: Final = ("depth", "energy", "stretching", "bending", "folding", *_OF_CREASE, *_OF_PLACE)
+KINDS: Final[dict[str, Kind]] = {
+    "depth": "length",
+    **dict.fromkeys(("energy", "stretching", "bending", "folding"), "energy"),
+    **dict.fromkeys(("fold_angle", "largest_fold", "dihedral"), "angle"),
+    "moment": "couple",
+    **{f"reaction_{axis}": "force" for axis in "xyz"},
+    **{f"displacement_{axis}": "length" for axis in "xyz"},
+}
 NEEDS: Final = {
     **dict.fromkeys(_OF_CREASE, "the name of a crease"),
     **dict.fromkeys(_OF_PLACE, "a place such as edge:start"),
@@ -31,7 +40,7 @@ class Until:
     Attributes:
         observable: a name of `OBSERVABLES`, or "module:function" of a function of a `State` (or that function itself,
             if it can be imported).
-        value: wanted, in the observable's unit.
+        value: wanted, in the observable's unit, or with a unit ("90deg").
         of: the crease or place that it is of, where it needs one.
         tolerance: on the value, in parts of it (in its unit where the value is 0).
     """
@@ -46,7 +55,7 @@ class Until:
         def __init__(
             self,
             observable: str | Callable[..., float],
-            value: float,
+            value: float | str,
             of: str | None = None,
             tolerance: float = 1e-5,
         ) -> None:
@@ -72,6 +81,13 @@ class Until:
             )
         if ":" in self.observable:
             said(self.observable)
+        if isinstance(self.value, str):
+            kind = KINDS.get(self.observable)
+            if kind is None:
+                raise ModelError(
+                    f'until {self.observable} = "{self.value}": only numbers are compared with it; give one'
+                )
+            take_units(self, f"until {self.observable}", value=kind)
         if not math.isfinite(self.value):
             raise ModelError(f"until {self.observable} = {self.value} cannot be; give a finite number")
         if not (math.isfinite(self.tolerance) and self.tolerance > 0.0):
@@ -80,11 +96,11 @@ class Until:
             raise ModelError(f"until {self.observable} needs `of`, {NEEDS[self.observable]}")
 
 
-def depth(to: float, tolerance: float = 1e-5) -> Until:
+def depth(to: float | str, tolerance: float = 1e-5) -> Until:
     """Fold until a corrugation is `to` mm deep, highest mountain to lowest valley point.
 
     Args:
-        to: depth in mm; how it is measured says `bh.formulations.observables.depth_of`.
+        to: depth in mm, or with a unit; how it is measured says `bh.formulations.observables.depth_of`.
         tolerance: on it, in parts of it.
 
     Returns:
@@ -93,6 +109,7 @@ def depth(to: float, tolerance: float = 1e-5) -> Until:
     Raises:
         ModelError: the depth is no positive number.
     """
+    to = number(to, "length")
     if not (math.isfinite(to) and to > 0.0):
         raise ModelError(f"depth = {to} mm cannot be; give a positive length in mm")
     return Until("depth", to, tolerance=tolerance)

@@ -24,8 +24,8 @@ from bh.paths.provenance import provenance_of
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.runtime import viewer
-from bh.solvers.increments import ARC, CriticalPoint
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import ARC, CriticalPoint
 from bh.solvers.system import Limited
 from meshes.mesh import count
 

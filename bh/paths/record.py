@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.paths.storage import StateRow
-from bh.solvers.increments import LOAD, CriticalPoint, Mode
 from bh.solvers.outcome import Critical, Outcome
+from bh.solvers.points import LOAD, CriticalPoint, Mode
 
 if TYPE_CHECKING:
     from bh.formulations.symmetry_reduction import Half
@@ -34,7 +34,7 @@ class StepOutcome:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One accepted state in the solver's terms; see `bh.solvers.increments.Increment`.
+    """One accepted state in the solver's terms; see `bh.solvers.points.Increment`.
 
     `negative` counts the negative modes of the tangent, `mode` says how to go on from here, `jumped` that the state
     lies on another branch than the one before, `critical` holds the limit and bifurcation points passed before it.

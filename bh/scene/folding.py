@@ -7,7 +7,6 @@ bends, so that panels stay nearly flat. What is assumed is said in remarks, and 
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 from collections.abc import Mapping
@@ -119,22 +118,6 @@ def proposals(file: str | os.PathLike[str], wish: Wish | None = None) -> list[Pr
         options["fit"] = FIT
         found = _read(Path(file), options)
     return _proposed(Path(file), wish, found, options, assumed)
-
-
-def radians_of(text: str) -> float:
-    """An angle in rad of "60deg" or "1.05rad".
-
-    Args:
-        text: a number and its unit.
-
-    Raises:
-        InputError: it is no angle; one line.
-    """
-    for unit, size in (("deg", math.pi / 180.0), ("rad", 1.0)):
-        if text.strip().endswith(unit):
-            with contextlib.suppress(ValueError):
-                return size * float(text.strip().removesuffix(unit))
-    raise InputError(f"--angle {text} is no angle; give a number and its unit, such as 60deg or 1.05rad")
 
 
 def _check(wish: Wish) -> None:

@@ -15,11 +15,12 @@ from bh.formulations.registry import formulation, names
 from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
 from bh.model.actuations import Displace, Force
+from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model
 from bh.model.plugins import consent, made
 from bh.model.refinement import Goal
 from bh.model.serialise import ACTUATIONS as MAKERS
-from bh.model.sheet import CreaseLaw, Sheet
+from bh.model.sheet import Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support, directions, select
 from bh.model.until import Until

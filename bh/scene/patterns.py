@@ -13,15 +13,16 @@ from bh.scene.reading import (
     ALTERNATING,
     FOLDS,
     RADII,
-    SHORTEST,
-    TURN,
+    Curvature,
+    Distance,
     Few,
     Folds,
     Length,
-    Number,
     Panels,
     Positive,
     Power,
+    Scale,
+    SectorAngle,
     Table,
 )
 from meshes import CreasePattern
@@ -49,7 +50,9 @@ class StripPattern(PatternTable):
     kind: Literal["strip"]
     length: Length = Field(description="a positive length along x in mm")
     width: Length = Field(description="a positive width along y in mm")
-    creases: list[Number] = Field([], description="a list of rising heights y in mm between 0 and the width")
+    creases: list[Distance] = Field(
+        [], description="a list of rising heights y in mm between 0 and the width"
+    )
     fold: Folds = Field("mountain", description=FOLDS)
 
 
@@ -59,7 +62,7 @@ class AnnulusSectorPattern(PatternTable):
     kind: Literal["annulus_sector"]
     radius: Length | list[Length] = Field(description=RADII)
     width: Length = Field(description="a positive width each side of the creases in mm")
-    angle: Annotated[float, Field(ge=SHORTEST, lt=TURN)] = Field(
+    angle: SectorAngle = Field(
         description='a sector angle in rad inside (0, 2 pi); kind = "full_annulus" is the whole turn'
     )
     fold: Folds = Field("mountain", description=FOLDS)
@@ -78,7 +81,7 @@ class ParallelPattern(PatternTable):
     """Parallel creases described by the first of them."""
 
     kind: Literal["parallel_creases"]
-    curvature: Number | Annotated[list[Number], Field(min_length=1)] = Field(
+    curvature: Curvature | Annotated[list[Curvature], Field(min_length=1)] = Field(
         description="the curvature of the first crease in 1/mm, of any sign, or a list with one of them a piece"
     )
     length: Length | Annotated[list[Length], Field(min_length=1)] = Field(
@@ -131,7 +134,7 @@ class TwoArcsPattern(PatternTable):
     radii: list[Length] = Field(
         [80.0, 250.0], description="radii in mm, each at least half the width, from below"
     )
-    at: list[Number] = Field([35.0, 70.0], description="heights in mm of the tops of the arcs, rising")
+    at: list[Distance] = Field([35.0, 70.0], description="heights in mm of the tops of the arcs, rising")
     fold: Folds = Field(["mountain", "valley"], description=FOLDS)
 
 
@@ -154,7 +157,7 @@ class ParabolicCanopyPattern(PatternTable):
     width: Length = Field(100.0, description=ALONG)
     height: Length = Field(100.0, description=ACROSS)
     creases: Few = Field(3, description="a whole number of creases, from 1")
-    sag: Number = Field(15.0, description="how much lower the ends of a parabola are than its top, mm")
+    sag: Distance = Field(15.0, description="how much lower the ends of a parabola are than its top, mm")
     fold: Folds | None = Field(None, description=ALTERNATING)
 
 
@@ -174,9 +177,7 @@ class DrawingPattern(Table):
     file: Annotated[str, Field(min_length=1)] = Field(
         description="the name of an .svg, .dxf, .fold, .cp or .opx file, from the folder of the scene"
     )
-    scale: Positive | None = Field(
-        None, description="how many mm a unit of the drawing is, a positive number"
-    )
+    scale: Scale | None = Field(None, description="how many mm a unit of the drawing is, a positive number")
     fit: Length | None = Field(None, description="the longer side of the sheet in mm, in place of scale")
     tolerance: Length | None = Field(None, description="how far chords may stay off curves, in mm")
     gap: Length | None = Field(

@@ -11,23 +11,68 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from annotated_types import Interval
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from bh.errors import InputError, SceneError
 from bh.runtime.consent import outside_allowed
 from meshes.pattern import FoldKind
+from meshes.quantities import PATTERN, Kind, QuantityError, degrees_meant, number
 
 LONGEST, SHORTEST = 1e6, 1e-6  # mm; beyond, sampling a curve to a thousandth of a millimetre loses its sense
 LARGEST = 1e9  # of any number
 TURN = 2.0 * math.pi
 
-Length = Annotated[float, Field(ge=SHORTEST, le=LONGEST)]
-Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(ge=1e-12, le=LARGEST)]
-Stiffness = Annotated[float, Field(ge=0.0, le=LARGEST)]
-Dihedral = Annotated[float, Field(gt=0.0, lt=TURN)]
-Rest = Annotated[float, Field(ge=0.0, le=TURN)]
-FoldAngle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
+
+def spelled(kind: Kind, limits: Interval) -> BeforeValidator:
+    """What takes a text such as "60deg" in place of a number, and tells editors so.
+
+    Args:
+        kind: of the quantity.
+        limits: of the number, in the project's unit.
+    """
+    text = Annotated[str, Field(pattern=PATTERN)]
+    return BeforeValidator(
+        lambda value: number(value, kind),
+        json_schema_input_type=Annotated[float, limits] | text,
+    )
+
+
+_LENGTHS, _ANY, _POSITIVE = (
+    Interval(ge=SHORTEST, le=LONGEST),
+    Interval(ge=-LARGEST, le=LARGEST),
+    Interval(ge=1e-12, le=LARGEST),
+)
+_DIHEDRAL, _REST, _FOLD = (
+    Interval(gt=0.0, lt=TURN),
+    Interval(ge=0.0, le=TURN),
+    Interval(ge=-math.pi, le=math.pi),
+)
+_STIFF, _SECTOR, _PINCHED = (
+    Interval(ge=0.0, le=LARGEST),
+    Interval(ge=SHORTEST, lt=TURN),
+    Interval(gt=0.0, lt=math.pi),
+)
+
+Number = Annotated[float, _ANY]
+Positive = Annotated[float, _POSITIVE]
+Length = Annotated[float, _LENGTHS, spelled("length", _LENGTHS)]
+Distance = Annotated[float, _ANY, spelled("length", _ANY)]
+Scale = Annotated[float, _POSITIVE, spelled("length", _POSITIVE)]
+Curvature = Annotated[float, _ANY, spelled("curvature", _ANY)]
+Modulus = Annotated[float, _POSITIVE, spelled("modulus", _POSITIVE)]
+Stiffness = Annotated[float, _STIFF, spelled("stiffness", _STIFF)]
+Stiff = Annotated[float, _POSITIVE, spelled("stiffness", _POSITIVE)]
+Couple = Annotated[float, _ANY, spelled("couple", _ANY)]
+Closing = Annotated[float, _POSITIVE, spelled("couple", _POSITIVE)]
+Seconds = Annotated[float, _POSITIVE, spelled("time", _POSITIVE)]
+Dihedral = Annotated[float, _DIHEDRAL, spelled("angle", _DIHEDRAL)]
+Rest = Annotated[float, _REST, spelled("angle", _REST)]
+FoldAngle = Annotated[float, _FOLD, spelled("angle", _FOLD)]
+SectorAngle = Annotated[float, _SECTOR, spelled("angle", _SECTOR)]
+PinchAngle = Annotated[float, _PINCHED, spelled("angle", _PINCHED)]
+Spot = Annotated[list[Distance], Field(min_length=3, max_length=3)]
+Push = Annotated[list[Annotated[float, _ANY, spelled("force", _ANY)]], Field(min_length=3, max_length=3)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Few = Annotated[int, Field(ge=1, le=1000)]
 Node = Annotated[int, Field(ge=0, le=2**62)]
@@ -93,14 +138,19 @@ def read_table(kind: type[T], data: object, at: str) -> T:
     try:
         return kind.model_validate(table)
     except ValidationError as errors:
-        first = errors.errors(include_url=False)[0]
+        found = errors.errors(include_url=False)
+        first = found[0]
         if not first["loc"]:  # a rule of the whole table
             raise SceneError(f"{at}: {first['ctx']['error']}") from errors
         key = str(first["loc"][0])
+        for each in found:
+            told = each.get("ctx", {}).get("error")
+            if str(each["loc"][0]) == key and isinstance(told, QuantityError) and told.has_number:
+                raise SceneError(f"{at}.{key} = {told}") from errors
         allowed = str(kind.model_fields[key].description)
         if first["type"] == "missing":
             raise SceneError(f"{at}.{key} is missing; give {allowed}") from errors
-        hint = "; angles are radians, not degrees" if " rad" in allowed and _like_degrees(table[key]) else ""
+        hint = _degrees_hint(table[key]) if " rad" in allowed else ""
         raise SceneError(f"{at}.{key} = {shown(table[key])} cannot be; give {allowed}{hint}") from errors
 
 
@@ -212,9 +262,9 @@ def nearest(key: object, known: Iterable[str]) -> str:
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
-def _like_degrees(value: object) -> bool:
+def _degrees_hint(value: object) -> str:
     numbers = [v for v in (value if isinstance(value, list) else [value]) if isinstance(v, int | float)]
-    return any(7.0 < abs(v) <= 360.0 for v in numbers)
+    return next((hint for v in numbers if (hint := degrees_meant(v))), "")
 
 
 def shown(value: object) -> str:

@@ -19,14 +19,23 @@ from bh.scene.reading import (
     LSTAR,
     PLACE,
     VECTOR,
+    Closing,
     Count,
+    Couple,
     Dihedral,
+    Distance,
     FoldAngle,
     Length,
+    Modulus,
     Number,
+    PinchAngle,
     Place,
     Positive,
+    Push,
     Rest,
+    Scale,
+    Seconds,
+    Stiff,
     Stiffness,
     Table,
     Vector,
@@ -37,7 +46,7 @@ from meshes.cells import Kind
 class SheetTable(Table):
     """Material and thickness of the sheet."""
 
-    E: Positive = Field(
+    E: Modulus = Field(
         description="Young's modulus in MPa, a positive number up to 1e9 MPa (1 GPa is 1000 MPa)"
     )
     nu: Annotated[float, Field(gt=-1.0, le=0.5)] = Field(0.0, description="Poisson's ratio in (-1, 0.5]")
@@ -48,8 +57,8 @@ class GmshTable(Table):
     """An unstructured mesh that conforms to the creases."""
 
     kind: Literal["gmsh"] = Field(description='"gmsh"')
-    size: Annotated[float, Field(gt=0.0)] = Field(description="the length of an edge in mm, positive")
-    near: dict[str, Annotated[float, Field(gt=0.0)]] = Field(
+    size: Scale = Field(description="the length of an edge in mm, positive")
+    near: dict[str, Scale] = Field(
         {},
         description='shorter edges at some creases or sides in mm, such as { "crease:crease" = 1.0 }',
     )
@@ -118,7 +127,7 @@ class AccuracyTable(Table):
     most_triangles: Annotated[int, Field(ge=1, le=4_000_000)] = Field(
         MOST_TRIANGLES, description="a whole number of triangles; no finer mesh is solved"
     )
-    seconds: Positive | None = Field(
+    seconds: Seconds | None = Field(
         None, description="a time in s; no mesh is begun that is likely to take longer than is left of it"
     )
 
@@ -145,7 +154,7 @@ class SupportTable(Table):
 class CreaseTable(Table):
     """The law of a crease: its stiffness, and the angle where it is at rest."""
 
-    Lstar: Positive | None = Field(None, description=LSTAR)
+    Lstar: Scale | None = Field(None, description=LSTAR)
     stiffness: Stiffness | None = Field(None, description="a stiffness a length, N mm / (mm rad), 0 or more")
     rest: Rest = Field(math.pi, description="a rest dihedral angle in rad from 0 to 2 pi (flat is pi)")
 
@@ -170,8 +179,8 @@ class FoldTable(Table):
     rest: Rest | list[Rest] | None = Field(
         None, description="a rest dihedral angle in rad from 0 to 2 pi, flat is pi, or a list of one an edge"
     )
-    Lstar: Positive | None = Field(None, description=LSTAR)
-    stiffness: Positive | None = Field(None, description="a positive stiffness a length, N mm / (mm rad)")
+    Lstar: Scale | None = Field(None, description=LSTAR)
+    stiffness: Stiff | None = Field(None, description="a positive stiffness a length, N mm / (mm rad)")
     part: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
         1.0, description='a part of the drawn angles from 0 to 1, with by = "drawn"'
     )
@@ -187,7 +196,7 @@ class PinchTable(Table):
     to: Dihedral | None = Field(
         None, description="the dihedral angle in the middle in rad inside (0, 2 pi), flat is pi"
     )
-    by: Annotated[float, Field(gt=0.0, lt=math.pi)] | None = Field(
+    by: PinchAngle | None = Field(
         None,
         description="a fold angle in rad inside (0, pi), mountain or valley as drawn; pi - pi / 14 without to",
     )
@@ -199,7 +208,7 @@ class PinchTable(Table):
         description='"imposed", "rest" for the rest angles of the crease\'s spring, or "couple" for closing couples',
     )
     profile: Profile = Field("cosine", description='"cosine", or "grip" for the same angle all over the zone')
-    couple: Positive | None = Field(
+    couple: Closing | None = Field(
         None,
         description='with how = "couple" the largest couple a length in the middle, a positive number in N mm / mm',
     )
@@ -209,15 +218,15 @@ class MomentTable(Table):
     """Keys of `bh.Moment`."""
 
     crease: str = Field(description='the name of a crease, or "all"')
-    to: Number = Field(description="a couple a length in N mm / mm")
+    to: Couple = Field(description="a couple a length in N mm / mm")
 
 
 class ForceTable(Table):
     """Keys of `bh.Force`."""
 
     at: Place = Field(description=PLACE)
-    each: Vector | None = Field(None, description=VECTOR + " in N, on every node of the place")
-    total: Vector | None = Field(None, description=VECTOR + " in N, shared by the nodes of the place")
+    each: Push | None = Field(None, description=VECTOR + " in N, on every node of the place")
+    total: Push | None = Field(None, description=VECTOR + " in N, shared by the nodes of the place")
 
 
 class DisplaceTable(Table):
@@ -225,7 +234,19 @@ class DisplaceTable(Table):
 
     at: Place = Field(description=PLACE)
     direction: Literal["x", "y", "z"] | Vector = Field(description='"x", "y", "z" or a direction [x, y, z]')
-    by: Number = Field(description="a displacement in mm")
+    by: Distance = Field(description="a displacement in mm")
+
+
+class PullTable(Table):
+    """Keys of `bh.Pull`."""
+
+    node: Annotated[int, Field(ge=0)] = Field(description="the number of a node")
+    to: Vector = Field(description=VECTOR + " in mm, the point that the node is pulled to by a spring")
+    stiffness: Positive = Field(description="the stiffness of the spring in N/mm, a positive number")
+    start: Vector | None = Field(
+        None,
+        description=VECTOR + " in mm, the point where the step begins; where the node is then unless given",
+    )
 
 
 class UntilTable(Table):
@@ -233,8 +254,8 @@ class UntilTable(Table):
 
     depth: Length | None = Field(None, description="a depth of the corrugation in mm (docs/corrugations.md)")
     observable: str | None = Field(None, description="the name of an observable, or module:function")
-    value: Number | None = Field(
-        None, description="its value at the end of the step, a number in its own unit"
+    value: Number | str | None = Field(
+        None, description="its value at the end of the step, a number in its own unit, or with a unit"
     )
     of: str | None = Field(None, description="the crease or place that it is of")
     tolerance: Positive = Field(
@@ -251,10 +272,11 @@ class UntilTable(Table):
         return self
 
 
-ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable]] = {
+ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable | PullTable]] = {
     "fold": FoldTable,
     "pinch": PinchTable,
     "moment": MomentTable,
     "force": ForceTable,
     "displace": DisplaceTable,
+    "pull": PullTable,
 }

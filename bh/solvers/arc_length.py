@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.hyperplane import correct
-from bh.solvers.increments import ARC, DISPLACEMENT, CriticalPoint, Increment, Mode, Point, point
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import ARC, DISPLACEMENT, CriticalPoint, Increment, Mode, Point, point
 from bh.solvers.stability import locate
 from bh.solvers.system import Evaluation, System, Tangent
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from bh.solvers.arc_length import ArcLength
-from bh.solvers.continuation import AtBifurcation, LoadControl
-from bh.solvers.increments import ARC, LOAD, Increment, Point, point
+from bh.solvers.load_control import AtBifurcation, LoadControl
 from bh.solvers.newton import Solution
 from bh.solvers.outcome import Critical, Outcome
+from bh.solvers.points import ARC, LOAD, Increment, Point, point
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import System
 

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.hyperplane import correct
-from bh.solvers.increments import CriticalPoint, Increment, Point, extrapolate, interpolate, point
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import count_negative, lowest_mode
 from bh.solvers.newton import Newton
 from bh.solvers.outcome import Critical, Outcome
+from bh.solvers.points import CriticalPoint, Increment, Point, extrapolate, interpolate, point
 from bh.solvers.saddle import MultiplierMatrix
 from bh.solvers.system import System
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from bh.solvers.increments import Increment
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import lowest_mode
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import Increment
 from bh.solvers.system import System
 
 # stiffness of a motion, in parts of the typical one, that is rounding; next to a critical point it is merely small

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from bh.solvers.hyperplane import correct
-from bh.solvers.increments import Point, point
 from bh.solvers.modes import count_negative
+from bh.solvers.points import Point, point
 from bh.solvers.system import System
 
 MOST = 60

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.hyperplane import correct
-from bh.solvers.increments import CriticalPoint, Point, point
 from bh.solvers.modes import count_negative, lowest_mode, nearest_mode
 from bh.solvers.newton import Newton, Solution
 from bh.solvers.outcome import Critical
+from bh.solvers.points import CriticalPoint, Point, point
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ from typing import Protocol
 
 from bh.solvers.diagnosis import diagnose
 from bh.solvers.goal import locate_zero
-from bh.solvers.increments import Increment, Point
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import Increment, Point
 from bh.solvers.system import System
 
 

@@ -20,8 +20,8 @@ from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter, meter
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.automatic import Automatic
-from bh.solvers.increments import LOAD, Point, point
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import LOAD, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
 from meshes.mesh import count
 

@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bh.errors import InputError
 from bh.scene.reading import Table, as_table, check_keys, inside, one_line, read_table, read_toml
 from bh.sweep import SceneTask, scene
 from bh.sweep.dataset import Label
 from bh.sweep.points import Points, SweepError, Value, grid, read_csv
+from meshes.quantities import of_any_kind
 
-Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+Ends = Annotated[float, Field(ge=-1e9, le=1e9), BeforeValidator(of_any_kind)]
 SECTIONS = ("scene", "axes", "table", "measure")
 KEY = 'a key of the scene, such as "pattern.radius" or "steps[0].fold.to", or a list of keys'
 
@@ -25,8 +26,8 @@ class AxisTable(Table):
 
     key: str | list[str] = Field(description=KEY)
     values: list[float | int | str | bool] | None = Field(None, min_length=1, description="a list of values")
-    start: Number | None = Field(None, description="the first value")
-    stop: Number | None = Field(None, description="the last value")
+    start: Ends | None = Field(None, description="the first value")
+    stop: Ends | None = Field(None, description="the last value")
     count: Annotated[int, Field(ge=2, le=10_000_000)] | None = Field(
         None, description="a whole number from 2"
     )

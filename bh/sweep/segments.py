@@ -18,6 +18,7 @@ from bh.applications.inverse.segments import Domain, beyond, grid
 from bh.applications.inverse.simulate import SETTING, SegmentTask, Setting
 from bh.applications.inverse.surrogate import FORMAT, Surrogate
 from bh.runtime.terminal import say
+from bh.scene.options import a_length
 from bh.solvers.outcome import Outcome
 from bh.sweep import Label, Points, run, table
 from bh.sweep.pools import Pool
@@ -145,7 +146,9 @@ def build_intensities(
 
 def segments(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.nc", help="Data set.")],
-    zone: Annotated[float, typer.Option("--zone", help="Length of the pinched zone, mm.")] = SETTING.zone,
+    zone: Annotated[
+        float, typer.Option("--zone", metavar="40mm", parser=a_length, help="Length of the pinched zone.")
+    ] = SETTING.zone,
     workers: Annotated[int | None, typer.Option("--workers", "-w", min=0, help="Local processes.")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the points that are finished.")

@@ -18,7 +18,7 @@ from bh.model.serialise import fingerprint
 from bh.paths.path import Path
 from bh.paths.record import Record, StepOutcome
 from bh.runtime.threads import one_blas_thread
-from bh.solvers.continuation import LoadControl
+from bh.solvers.load_control import LoadControl
 from bh.solvers.outcome import Outcome
 from bh.solving.trace import trace
 

@@ -11,8 +11,8 @@ import pytest
 import bh
 import meshes
 from bh.model.model import Model
-from bh.solvers.continuation import LoadControl
-from bh.solvers.increments import Increment
+from bh.solvers.load_control import LoadControl
+from bh.solvers.points import Increment
 from fem.kirchhoff_love import follow
 from fem.state import ShellState
 from verification.studies.app_b import shell_folding as folding

@@ -12,8 +12,8 @@ import meshes
 from bh import Automatic, LoadControl, Model, Newton, Sheet, trace
 from bh.mechanics.consistent.formulation import ConstantStrain
 from bh.solvers.branching import Branch, onto_stable_branch
-from bh.solvers.increments import point
 from bh.solvers.outcome import Critical, Outcome
+from bh.solvers.points import point
 from tests.unit.test_newton import Column, Small
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ import meshes
 from bh import ArcLength, Automatic, DisplacementControl, LoadControl, Model, Newton, Sheet, trace
 from bh.solvers.arc_length import Displacement, Generalised
 from bh.solvers.automatic import behind_limit
-from bh.solvers.increments import ARC, DISPLACEMENT, LOAD, Increment, Mode, Point, fold_ahead, point
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import ARC, DISPLACEMENT, LOAD, Increment, Mode, Point, fold_ahead, point
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation

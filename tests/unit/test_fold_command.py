@@ -14,11 +14,12 @@ from bh.commands.cli import main
 from bh.commands.fold import TimeUpError, _Clock
 from bh.errors import InputError
 from bh.runtime.progress import Silent
-from bh.scene.folding import proposals, radians_of
+from bh.scene.folding import proposals
 from bh.scene.load import load_scene, parse_scene
 from meshes import unstructured
 from meshes.errors import FileFormatError
 from meshes.io import read_fold, read_pattern
+from meshes.quantities import spoken
 
 RIM = '<rect width="80" height="60" stroke="black" fill="none"/>'
 CREASE = '<line x1="40" y1="0" x2="40" y2="60" stroke="blue"/>'
@@ -120,7 +121,9 @@ class TestOneCommand:
         ("arguments", "words"),
         [
             (["--material", "jelly"], "'jelly' is not known; use one of paper"),
-            (["--angle", "60"], "--angle 60 is no angle"),
+            (["--angle", "60"], "angle of 3437.75 degrees cannot be; give 0 to 180, such as 60deg"),
+            (["--angle", "60 degs"], "'--angle': \"60 degs\" is no angle: write 60deg"),
+            (["--fit", "8inchs"], "'--fit': \"8inchs\" is no length: write 8in"),
             (["--angle", "200deg"], "200 degrees cannot be"),
             (["--percent", "0"], "0 percent cannot be"),
             (["--angle", "60deg", "--percent", "20"], "give one of them"),
@@ -144,8 +147,8 @@ class TestOneCommand:
             clock.update(0, 1, 0.5, 3, 1.0)
 
     def test_angles(self) -> None:
-        assert radians_of("90deg") == pytest.approx(math.pi / 2)
-        assert radians_of("1.5 rad") == 1.5
+        assert spoken("90deg", "angle") == pytest.approx(math.pi / 2)
+        assert spoken("1.5 rad", "angle") == spoken("1.5", "angle") == 1.5
 
 
 class TestChecksAndScenes:

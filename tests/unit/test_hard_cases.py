@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bh import ArcLength
-from bh.solvers.increments import point
+from bh.solvers.points import point
 from verification.framework.checks import CaseResult
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 from verification.studies.solver.campaign import TEST_SCENES, play, scenes

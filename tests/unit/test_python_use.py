@@ -29,11 +29,11 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "appendix_b_a.toml"
         (lambda: bh.Model(SHEET, MESH), "mesh of a model is a Sheet; give bh.Model(mesh, sheet)"),  # type: ignore[arg-type]
         (lambda: bh.Model(MESH, 0.1), "sheet of a model is a float; give bh.Model(mesh, sheet)"),  # type: ignore[arg-type]
         (lambda: bh.Model(MESH, bh.Sheet), "sheet of a model is the class Sheet; give"),  # type: ignore[arg-type]
-        (lambda: bh.Sheet(E=4000.0, t="0.1"), "sheet t = '0.1' cannot be; give a positive number in mm"),  # type: ignore[arg-type]
+        (lambda: bh.Sheet(E=4000.0, t="0.1"), 'sheet: t = "0.1" has no unit: write 0.1mm'),
         (lambda: bh.Sheet(E=4000.0, t=0.1, nu="0.3"), "sheet nu = '0.3' cannot be"),  # type: ignore[arg-type]
         (lambda: meshes.annulus_sector(100, 10, 45), "angles are radians, not degrees"),
-        (lambda: meshes.annulus_sector(100, 10, "45"), "angle = '45' is not a number"),  # type: ignore[arg-type]
-        (lambda: meshes.annulus_sector("wide", 10, 0.5), "radius = 'wide' is not a number"),  # type: ignore[arg-type]
+        (lambda: meshes.annulus_sector(100, 10, "45"), 'angle = "45" has no unit: write 45deg'),
+        (lambda: meshes.annulus_sector("wide", 10, 0.5), 'radius = "wide" is no length: write one such as'),
         (lambda: meshes.strip(None, 10), "length = None is not a number"),  # type: ignore[arg-type]
         (lambda: meshes.structured(MESH, along=3), "a SheetMesh cannot be meshed; give a pattern"),  # type: ignore[arg-type]
     ],

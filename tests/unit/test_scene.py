@@ -13,8 +13,8 @@ import bh
 from bh.errors import SceneError
 from bh.loading.builder import load_steps
 from bh.model.actuations import Displace, Fold, Force, Moment
+from bh.model.crease_law import CreaseLaw
 from bh.model.serialise import ACTUATIONS as KINDS
-from bh.model.sheet import CreaseLaw
 from bh.model.step import Step
 from bh.model.supports import RigidBody, Support
 from bh.scene.load import Outputs, load_scene, parse_scene

@@ -18,7 +18,7 @@ from bh.model.actuations import Displace, Fold, Moment
 from bh.model.model import Model
 from bh.model.sheet import Sheet
 from bh.paths.path import Path
-from bh.solvers.continuation import LoadControl
+from bh.solvers.load_control import LoadControl
 from fem.kirchhoff_love import Shell, follow
 from fem.loads import EdgeMoments
 from fem.state import ShellState

@@ -15,7 +15,7 @@ from bh.errors import ModelError
 from bh.formulations.observables import crease_nodes, depth_of
 from bh.model.actuations import Displace, Indenter, Tether
 from bh.paths.path import Path
-from bh.solvers.continuation import LoadControl
+from bh.solvers.load_control import LoadControl
 from bh.solvers.outcome import Outcome
 from bh.solving.trace import trace
 

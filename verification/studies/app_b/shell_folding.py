@@ -14,10 +14,10 @@ from bh import Model, Sheet, State, trace
 from bh.formulations.registry import formulation as registered
 from bh.loading.builder import load_steps
 from bh.runtime.threads import one_blas_thread
-from bh.solvers.continuation import LoadControl
-from bh.solvers.increments import Point, extrapolate, point
+from bh.solvers.load_control import LoadControl
 from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import Point, extrapolate, point
 from bh.solvers.system import System
 from bh.solvers.trace import Walk, walk
 from meshes.cells import Kind

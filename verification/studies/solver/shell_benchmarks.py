@@ -8,7 +8,7 @@ import numpy as np
 import skfem
 
 from bh.model.model import Model
-from bh.solvers.increments import Increment
+from bh.solvers.points import Increment
 from fem.kirchhoff_love import follow
 from fem.loads import EdgeMoments
 from fem.plate import Plate, hhj, morley

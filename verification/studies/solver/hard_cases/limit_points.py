@@ -12,9 +12,9 @@ from bh import ArcLength, Model, Sheet
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
 from bh.solvers.arc_length import Cylindrical, Generalised
-from bh.solvers.increments import point
 from bh.solvers.linear import linear_response
 from bh.solvers.outcome import Outcome
+from bh.solvers.points import point
 from verification.framework.checks import CaseResult, line, plot
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 

@@ -1,4 +1,4 @@
-"""What the driver and its strategies hand to each other: points of a path, increments, and extrapolation."""
+"""Points of a path and the increments between them, which driver and strategies hand to each other; extrapolation."""
 
 from __future__ import annotations
 
