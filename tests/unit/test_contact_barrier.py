@@ -228,7 +228,7 @@ def test_a_thickness_that_cannot_fit_and_a_first_state_that_meets_itself() -> No
         .support([5], "z")
         .force([5], each=(1, 0, 0))
     )
-    with pytest.raises(ModelError, match=r"the first state meets itself \(edge 3-4 and triangle 0-1-2\)"):
+    with pytest.raises(ModelError, match=r"the first state meets itself \(edge 3-4 and triangle 0-1-2;"):
         bh.trace(model)
 
 
