@@ -136,7 +136,7 @@ def test_residual_and_tangent_of_a_system_with_contact(name: str) -> None:
     """Central differences of the energy and of the residual at a bent state in which panels touch."""
     model = letter(name)
     mesh = model.mesh
-    system = formulation(name).system(model, load_steps(model)[0], None)
+    system: Any = formulation(name).system(model, load_steps(model)[0], None)
     s = mesh.points[:, 1]
     x = mesh.points.copy()
     first, last = s < 20.0, s > 40.0
@@ -166,7 +166,7 @@ def independent_crossings(points: Array, mesh: meshes.SheetMesh) -> Array:
     from bh.analysis.triangles import intersecting
 
     pairs = candidates(points, mesh.triangles)
-    return pairs[intersecting(points, mesh.triangles, pairs, 1e-9)]
+    return np.asarray(pairs[intersecting(points, mesh.triangles, pairs, 1e-9)])
 
 
 @pytest.mark.parametrize("name", FORMULATIONS)
