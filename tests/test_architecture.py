@@ -63,6 +63,7 @@ RULES: dict[str, tuple[str, ...]] = {
     "bh.studio": (*USERS, "bh.live"),
     "bh.applications": (*ANALYSIS, "bh.plotting", "bh.solving"),
     "bh.sweep": USERS,
+    "bh.testing": USERS,
     "bh.commands": (*USERS, "bh.sweep"),
     "bh": ("meshes", "bh"),  # the facade
     "fem": (*DESCRIPTION, "bh.paths"),  # the judge shares no mechanics with the judged

@@ -11,7 +11,7 @@ gradients, Hessians and continuous collision detection.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
 
 import ipctk
 import numpy as np
@@ -62,7 +62,7 @@ class SheetBarrier:
         self._potential = ipctk.BarrierPotential(reach, pressure, True)
         # additive detection (Li, Kaufman and Jiang 2021): root finders take seconds where edges move in one plane
         self._detection = ipctk.AdditiveCCD()
-        self._last: tuple[Array, Any] | None = None
+        self._last: tuple[Array, ipctk.NormalCollisions] | None = None
 
     def clear(self, x: Array) -> bool:
         """Is the sheet at positions x free of intersections, with layers farther apart than the offset?"""
@@ -153,7 +153,7 @@ class SheetBarrier:
         return "; ".join(found[:most]) + more
 
     @staticmethod
-    def _words(nodes: Any) -> str:
+    def _words(nodes: Iterable[int]) -> str:
         return "-".join(str(int(node)) for node in nodes)
 
     def _crossings(self, x: Array) -> list[tuple[Ints, Ints]]:
@@ -172,7 +172,7 @@ class SheetBarrier:
                     found.append((self.edges[edge], triangle))
         return found
 
-    def _pairs(self, x: Array) -> Any:
+    def _pairs(self, x: Array) -> ipctk.NormalCollisions:
         # the same state is asked for its energy, its Hessian and its distance one after the other
         if self._last is not None and np.array_equal(self._last[0], x):
             return self._last[1]
