@@ -303,7 +303,17 @@ class Path:
         )  # fmt: skip
 
     def system(self, step: int) -> SheetSystem:
-        """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
+        """The system of a step, made when it is first needed; the step begins at the last state of the one before.
+
+        Args:
+            step: its index, from 0.
+
+        Returns:
+            the same system each time.
+
+        Raises:
+            ModelError: the formulation cannot take the step, or the model has contact and the formulation has none.
+        """
         if step not in self._systems:
             if any(each.until is not None for each in self.model.steps[:step]):
                 self._load_steps = load_steps(self.model, self._ended(step))

@@ -119,7 +119,12 @@ class SheetBarrier:
         return nodes, out
 
     def times(self, x: Array, v: Array) -> Array:
-        """(n, 3) Hessian at x times v (n, 3)."""
+        """(n, 3) Hessian at x times v (n, 3).
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            v: (nodes, 3) velocities.
+        """
         pairs = self._pairs(x)
         if len(pairs) == 0:
             return np.zeros_like(v)
@@ -127,7 +132,12 @@ class SheetBarrier:
         return np.asarray(H @ v.ravel()).reshape(-1, 3)
 
     def free_part(self, x: Array, moved: Array) -> float:
-        """How much of the straight way from x to `moved`, both (n, 3), nothing stands in, 0 to 1."""
+        """How much of the straight way from x to `moved` nothing stands in, 0 to 1.
+
+        Args:
+            x: (nodes, 3) positions, mm, with nothing passing through anything.
+            moved: (nodes, 3) positions, mm.
+        """
         return float(
             ipctk.compute_collision_free_stepsize(
                 self._mesh, x, moved, self.offset, narrow_phase_ccd=self._detection
