@@ -20,6 +20,7 @@ from meshes.cells import GmshCells
 from meshes.curves import Array, Curve
 from meshes.cuts import open_cuts
 from meshes.errors import MeshError
+from meshes.limits import check_limit
 from meshes.meetings import breaks
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
@@ -28,6 +29,8 @@ from meshes.topology import Ints
 
 # of every face: its loops of nodes, and edges inside
 Faces = list[tuple[list[list[int]], list[tuple[int, int]]]]
+
+EQUILATERAL = math.sqrt(3.0) / 4.0  # area of such a triangle over the square of its edge
 
 # gmsh is silent, gives the same mesh on every machine, and meshes fronts by the algorithm Frontal-Delaunay
 OPTIONS = (("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.Algorithm", 6))
@@ -111,11 +114,9 @@ def unstructured(
     finer = {name: float(number(edge, "length")) for name, edge in (near or {}).items()}
     if not math.isfinite(size) or size <= 0.0:
         raise MeshError(f"size = {size} cannot be; use a positive edge length in mm")
-    area = sheet_area(pattern)
-    if area / (0.43 * size**2) > 1e6:
-        raise MeshError(
-            f"size = {size} would make some {area / (0.43 * size**2):.1g} triangles; use a larger size"
-        )
+    check_limit(
+        "triangles", sheet_area(pattern) / (EQUILATERAL * size**2), f"this mesh of size = {size:g}", MeshError
+    )
     curves = {f"edge:{name}": curve for name, curve in pattern.edges}
     if not curves:
         raise MeshError("this pattern names no boundary curves; an unstructured mesh needs them")
@@ -123,6 +124,7 @@ def unstructured(
     cuts = {f"edge:{name}": curve for name, curve in pattern.cuts}
     curves |= cuts
     sizes = _sizes(curves, size, finer, growth)
+    check_limit("triangles", _expected(pattern, curves, sizes), "this mesh", MeshError)
     facets = {f"facet:{i}": curve for i, curve in enumerate(pattern.facets)}
     points, chains = _chains(curves | facets, sizes, cuts)
     segments = np.vstack(list(chains.values()))
@@ -159,6 +161,23 @@ def _sizes(curves: dict[str, Curve], size: float, near: dict[str, float], growth
         raise MeshError(f"growth = {growth} cannot be; use how fast edges grow, 0.1 to 0.5 mm a mm")
     u = np.linspace(0.0, 1.0, 513)
     return Sizes(size, near, {name: shapely.LineString(curves[name].point(u)) for name in near}, growth)
+
+
+def _expected(pattern: CreasePattern, curves: Mapping[str, Curve], sizes: Sizes) -> float:
+    """How many triangles to expect: those of the even mesh, and at every line of shorter edges those that it adds.
+
+    Edges of the length s + g x at the distance x from a line of the length L make 2 L dx / (0.433 (s + g x)^2)
+    triangles each side together, down to where they are as long as everywhere; never more than edges of the
+    length s all over the sheet.
+    """
+    area = sheet_area(pattern)
+    total = area / (EQUILATERAL * sizes.largest**2)
+    for name, short in sizes.near.items():
+        graded = (
+            2.0 * curves[name].length / (EQUILATERAL * sizes.growth) * (1.0 / short - 1.0 / sizes.largest)
+        )
+        total += min(graded, area / (EQUILATERAL * short**2))
+    return total
 
 
 def sheet_area(pattern: CreasePattern) -> float:
