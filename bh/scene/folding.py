@@ -176,8 +176,9 @@ def _joined(file: Path, found: _Found, options: dict[str, object], assumed: list
 
 
 def _bent(mesh: SheetMesh) -> bool:
-    """True if a crease turns on its way, by less than a corner and where no other crease meets it: a curve."""
+    """True if a crease turns on its way, by less than a corner and where it meets no other line: a curve."""
     drawn = [mesh.topology.boundary, *(mesh.crease_edges(name) for name in mesh.folds if name in KINDS)]
+    drawn += [mesh.edge_sets["edge:flat"]] if "edge:flat" in mesh.edge_sets else []
     degree = np.bincount(
         np.concatenate([np.asarray(pairs).ravel() for pairs in drawn]), minlength=len(mesh.points)
     )
