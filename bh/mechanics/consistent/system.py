@@ -142,6 +142,18 @@ class ConsistentSystem(SupportedSheet):
         q[self.moving :] = self.rotations_at(self._start_points, 0.0)
         return q
 
+    def unknowns_at(self, x: Array, lam: float) -> Array:
+        """(size,) unknowns of positions x (n, 3), mm, as far as supports allow; rotations are those of least energy.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        q = np.zeros(self.size)
+        q[: self.moving] = self.displacements.components(x - self.positions(q, lam))
+        q[self.moving :] = self.rotations_at(self.positions(q, lam), lam)
+        return q
+
     def rotations_at(self, x: Array, lam: float) -> Array:
         """(rotations,) of least energy at positions x (n, 3).
 
