@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import typer
 
-from meshes.quantities import Kind, QuantityError, spoken
+if TYPE_CHECKING:
+    from meshes.quantities import Kind
 
 
 def _read(text: str | float, kind: Kind) -> float:
     if not isinstance(text, str):  # the default of an option
         return text
+    from meshes.quantities import QuantityError, spoken  # loads numpy, which `bh --help` does without
+
     try:
         return spoken(text, kind)
     except QuantityError as error:
