@@ -17,7 +17,7 @@ from bh.solvers.newton import INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point, power_rate
 from bh.solvers.stability import leave_saddle, locate
-from bh.solvers.system import System
+from bh.solvers.system import System, limited
 
 Array = NDArray[np.float64]
 LOOK = 2  # cuts of an increment before a bifurcation is looked for
@@ -193,6 +193,7 @@ class LoadControl:
         newton = replace(self.newton, unstable=self.at_bifurcation != "stable", held=held)
         method = replace(newton, globalised=0, hasty=True) if brisk or look else newton
         q, forces = extrapolate(points, lam)
+        q, forces = _as_far_as_clear(system, here, lam, q, forces)
         primary = found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
         iterations, note, branch = found.iterations, "", NO_BRANCH
         downhill = look and not brisk and not found.converged
@@ -297,6 +298,16 @@ def jump(system: System, here: Point, there: Point, mismatch: float) -> str:
         if not abs(gained - work) <= most:  # nor if the slopes are not known
             return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
     return ""
+
+
+def _as_far_as_clear(system: System, here: Point, lam: float, q: Array, forces: Array) -> tuple[Array, Array]:
+    """A guess and its element forces, or as much of the way there from the last state as nothing stands in."""
+    change = q - here.q
+    step = limited(system, here.q, change, lam)
+    if step is change:
+        return q, forces
+    part = float(np.linalg.norm(step)) / max(float(np.linalg.norm(change)), 1e-300)
+    return here.q + step, here.forces + part * (forces - here.forces)
 
 
 def _lost(found: Solution) -> bool:

@@ -23,7 +23,7 @@ from bh.solvers.modes import (
     without,
 )
 from bh.solvers.pseudo_transient import PseudoTransient
-from bh.solvers.system import Evaluation, System
+from bh.solvers.system import Evaluation, System, limited
 
 Array = NDArray[np.float64]
 INDEFINITE = "indefinite tangent"  # why full Newton gave up
@@ -146,6 +146,8 @@ class Newton:
             what came of it.
         """
         now = system.evaluate(q, lam)
+        if not np.isfinite(now.energy):
+            return Solution(q, now, 0, False, "the guess has no energy")
         forces = now.forces if forces is None else forces
         least, before = now.imbalance, np.inf
         sizes: list[float] = []  # of the steps taken
@@ -163,6 +165,7 @@ class Newton:
                 return Solution(q, now, iteration, False, "singular tangent")
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, globalised=False)
+            dq = limited(system, q, dq, lam)
             sizes.append(float(np.linalg.norm(dq[: system.primal])))
             if self.hasty and now.imbalance > NEAR_SADDLE and slow(sizes):
                 return Solution(q, now, iteration, False, "slow contraction")
@@ -371,6 +374,7 @@ def line_search(
         start = q.copy()
         start[p:] += dq[p:]
         now = system.evaluate(start, lam)
+    dq = limited(system, start, dq, lam)
     noise = 1e-13 * max(abs(now.merit), abs(slope))
     length = 1.0
     for _ in range(30):
