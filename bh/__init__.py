@@ -12,7 +12,15 @@ from bh.runtime import viewer as _viewer
 from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
-    from bh.errors import InputError, ModelError, PathFileError, SceneError
+    from bh.commands.read import Run, read
+    from bh.errors import (
+        InputError,
+        ModelError,
+        NotReachedError,
+        NotReachedWarning,
+        PathFileError,
+        SceneError,
+    )
     from bh.formulations.protocols import Formulation, SheetSystem
     from bh.formulations.registry import remarks
     from bh.formulations.remarks import Remark
@@ -39,7 +47,8 @@ if TYPE_CHECKING:
 
 # where a name is; `tests/test_architecture.py` holds it against the imports above
 _NAMES = {
-    "bh.errors": "InputError ModelError PathFileError SceneError",
+    "bh.commands.read": "Run read",
+    "bh.errors": "InputError ModelError NotReachedError NotReachedWarning PathFileError SceneError",
     "bh.formulations.protocols": "Formulation SheetSystem",
     "bh.formulations.registry": "remarks",
     "bh.formulations.remarks": "Remark",
@@ -105,6 +114,8 @@ __all__ = [
     "ModelError",
     "Moment",
     "Newton",
+    "NotReachedError",
+    "NotReachedWarning",
     "Outcome",
     "Path",
     "PathFileError",
@@ -112,6 +123,7 @@ __all__ = [
     "Refinement",
     "Remark",
     "RigidBody",
+    "Run",
     "SceneError",
     "Sheet",
     "SheetSystem",
@@ -126,6 +138,7 @@ __all__ = [
     "allow_plugins",
     "depth",
     "load_scene",
+    "read",
     "remarks",
     "trace",
 ]

@@ -132,6 +132,9 @@ def run(
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Output folder; default SCENE-out.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the states in the folder.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a run that was stopped, or is of another scene.")
+    ] = False,
     pictures: Annotated[bool, typer.Option("--pictures", help="Draw the folded sheet (PNG).")] = False,
     vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
     estimate: Annotated[
@@ -148,7 +151,7 @@ def run(
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
         path, names, before, contact = solve(
-            loaded, folder, resume=resume, progress=not quiet, estimate=estimate
+            loaded, folder, resume=resume, force=force, progress=not quiet, estimate=estimate
         )
     except KeyboardInterrupt:
         again = shlex.join(["bh", "run", str(scene), "-o", str(folder), "--resume"])

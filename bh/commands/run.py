@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -18,6 +19,7 @@ import numpy as np
 
 from bh.analysis.contact import Contact, first_contact
 from bh.errors import InputError
+from bh.model.compare import differing_keys, in_words
 from bh.model.serialise import fingerprint
 from bh.paths.export import FOLDED, write_flat, write_state
 from bh.paths.path import Path as Trace
@@ -55,6 +57,7 @@ def solve(
     folder: Path,
     *,
     resume: bool = False,
+    force: bool = False,
     progress: bool | ProgressMeter = False,
     estimate: bool = True,
 ) -> Solved:
@@ -66,6 +69,7 @@ def solve(
         scene: to be solved.
         folder: for the files.
         resume: go on from the states in the folder.
+        force: begin anew where the folder holds a run that was stopped, or one of another scene.
         progress: as for `bh.trace`.
         estimate: solve a coarser mesh, too, where the mesh was given, for an estimate of the error.
 
@@ -73,6 +77,8 @@ def solve(
         InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
             described; a folder that was made for the run is taken away again if nothing came of it.
     """
+    if not (resume or force):
+        check_folder(folder, scene)
     names = _names(folder, scene, resume)
     made = make_folder(folder)
     ours = False
@@ -98,6 +104,11 @@ def _solved(
 ) -> Solved:
     """What `solve` gives, of a folder that nobody else writes."""
     file = folder / names[0]
+    changed = resume and names == FINISHED and _is_finished(folder) and _changed(file, scene)
+    if changed:  # the finished one stays until this one is finished, too
+        check_resumable(file, scene.model)
+        names, file = UNFINISHED, folder / UNFINISHED[0]
+        shutil.copyfile(folder / FINISHED[0], file)
     before = resume and _is_whole(file, scene)
     solved = _solved_meshes(file)
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
@@ -110,7 +121,9 @@ def _solved(
         accuracy=scene.accuracy,
         symmetry=scene.symmetry,
         estimate=estimate and scene.accuracy is None,
+        warn=False,  # the command says it in a line of its own
     )
+    _keep_scene(scene, file)
     clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
     if path.reached:
         if names == UNFINISHED:
@@ -130,6 +143,15 @@ def _solved(
         remove_levels(folder_of(folder / UNFINISHED[0]))
         remove_extras(folder, "-unfinished")
     return Solved(path, names, before, contact)
+
+
+def _keep_scene(scene: Scene, file: Path) -> None:
+    """Put the text of the scene into its path file, for `bh.read`."""
+    if scene.source is None:
+        return
+    with contextlib.suppress(OSError, UnicodeDecodeError), contextlib.closing(PathFile.open(file)) as stored:
+        text = scene.source.read_text(encoding="utf-8-sig")
+        stored.note("scene", {"file": str(scene.source.resolve()), "text": text})
 
 
 def _solved_meshes(file: Path) -> list[str]:
@@ -157,6 +179,54 @@ def path_file(folder: Path) -> Path:
         if (folder / name).is_file():
             return folder / name
     raise InputError(f"there is no {FINISHED[0]} in '{folder}'; give the output folder of `bh run`")
+
+
+def _changed(file: Path, scene: Scene) -> bool:
+    """True if a path file is of another model than the scene's own."""
+    if scene.accuracy is not None:
+        return False
+    with contextlib.closing(PathFile.open(file)) as stored, reading(file):
+        return bool(stored.meta()["provenance"]["input"] != fingerprint(scene.model))
+
+
+def check_folder(folder: Path, scene: Scene) -> None:
+    """See that a new run does not take the place of a run that was stopped, or of one of another scene.
+
+    Args:
+        folder: for the files, which need not exist.
+        scene: to be solved.
+
+    Raises:
+        InputError: it would; one line that names what differs, and what to add to the command.
+    """
+    for name in (UNFINISHED[0], FINISHED[0]):
+        file = folder / name
+        meshes = sorted(folder_of(file).glob("*.bh"))
+        found = file if file.is_file() else meshes[-1] if meshes else None
+        if found is None:
+            continue
+        try:
+            with contextlib.closing(PathFile.open(found)) as stored, reading(found):
+                data, arrays = stored.meta(), stored.arrays()
+                ends, states = stored.steps(), sum(1 for _ in stored.states())
+        except InputError:
+            continue  # no path file: there is nothing to lose
+        keys = differing_keys(data["model"], arrays, scene.model, chosen=scene.accuracy is not None)
+        other = "or choose another folder with -o"
+        if keys:
+            raise InputError(
+                f"'{folder}' holds a run of another scene (it differs in {in_words(keys)}); add --force to replace "
+                f"it, --resume to go on from it where only later steps changed, {other}"
+            )
+        stopped = not file.is_file() or (
+            len(ends) < len(data["model"]["steps"])
+            and all(end[0] == Outcome.REACHED for end in ends.values())
+        )
+        if stopped and states:
+            raise InputError(
+                f"'{folder}' holds a run of this scene that was stopped; add --resume to go on from it, --force to "
+                f"begin anew, {other}"
+            )
 
 
 def holds_states(folder_or_file: Path) -> bool:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import NotReachedError
 from bh.formulations.protocols import Formulation, SheetSystem
 from bh.formulations.registry import checked_system, formulation, remarks
 from bh.formulations.state import State
@@ -19,6 +20,7 @@ from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd, open_ends
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
+from bh.paths.advice import told
 from bh.paths.provenance import provenance_of
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
@@ -93,6 +95,21 @@ class Path:
     def reason(self) -> str:
         """Why the path ended early, or an empty string."""
         return next((step.reason for step in self.steps if not step.reached), "")
+
+    @property
+    def ended_early(self) -> bool:
+        """Did a step end before its actuations were complete, so that the last state is not what was asked for?"""
+        return any(not step.reached for step in self.steps)
+
+    def require(self) -> Path:
+        """The path itself, if every step was reached: `bh.trace(model).require()[-1]`.
+
+        Raises:
+            NotReachedError: one was not; reason and advice in one line.
+        """
+        if not self.reached:
+            raise NotReachedError(told(self))
+        return self
 
     @property
     def stable(self) -> bool | None:
@@ -201,6 +218,9 @@ class Path:
         if index not in self._states:
             record = self.records[index]
             self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
+        ended = str(self.outcome) if index == len(self) - 1 and self.ended_early else ""
+        if self._states[index].ended != ended:
+            self._states[index] = replace(self._states[index], ended=ended)
         return self._states[index]
 
     def observe(self, step: int, q: Array, lam: float, stable: bool | None = None) -> State:
