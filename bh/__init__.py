@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bh.formulations.registry import remarks
     from bh.formulations.remarks import Remark
     from bh.formulations.state import Energy, State
-    from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
+    from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
     from bh.model.crease_law import CreaseLaw
     from bh.model.model import Model
     from bh.model.pinch import Pinch
@@ -53,7 +53,7 @@ _NAMES = {
     "bh.formulations.registry": "remarks",
     "bh.formulations.remarks": "Remark",
     "bh.formulations.state": "Energy State",
-    "bh.model.actuations": "Displace Fold Force Indenter Moment Tether",
+    "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
     "bh.model.crease_law": "CreaseLaw",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
@@ -80,6 +80,7 @@ _SUBMODULES = {
     "creases": "bh.analysis.creases",
     "interactive": "bh.plotting.interactive",
     "isometric": "bh.analysis.isometric",
+    "live": "bh.live",
     "node_sensitivities": "bh.analysis.node_sensitivities",
     "pinching": "bh.applications.pinching",
     "plotting": "bh.plotting",
@@ -88,6 +89,7 @@ _SUBMODULES = {
     "scan": "bh.applications.scan",
     "sensitivities": "bh.analysis.sensitivities",
     "stiffness_probe": "bh.analysis.stiffness_probe",
+    "studio": "bh.studio",
     "sweep": "bh.sweep",
 }
 
@@ -120,6 +122,7 @@ __all__ = [
     "Path",
     "PathFileError",
     "Pinch",
+    "Pull",
     "Refinement",
     "Remark",
     "RigidBody",

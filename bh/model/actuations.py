@@ -368,6 +368,40 @@ class Tether(Body):
             raise ModelError(f"tether at '{self.at}': {self.total} cannot be; stiffness is not negative")
 
 
+@dataclass(frozen=True)
+class Pull(Body):
+    """A spring from a node to a point of space, which moves during the step: a hand that pulls.
+
+    Pulls take the place of the rigid-body support in their step.
+
+    Attributes:
+        node: that is pulled.
+        to: (3,) the point at the end of the step, mm.
+        stiffness: of the spring, N/mm, the same in all directions.
+        start: (3,) the point where the step begins, mm; None for where the node is then.
+    """
+
+    node: int
+    to: tuple[float, float, float]
+    stiffness: float
+    start: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
+        for key, value in (("to", self.to), ("start", self.start)):
+            if value is not None:
+                _vector(f"pull at node {self.node}: {key}", value)
+                object.__setattr__(self, key, tuple(float(x) for x in value))  # lists, as files hold them
+        if not (math.isfinite(self.stiffness) and self.stiffness > 0.0):
+            raise ModelError(
+                f"pull at node {self.node}: stiffness = {self.stiffness} cannot be; give a positive number of N/mm"
+            )
+
+
 def _finite(what: str, values: Sequence[float]) -> None:
     if not all(math.isfinite(value) for value in values):
         raise ModelError(f"{what} is not finite; give numbers")

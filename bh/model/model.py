@@ -111,7 +111,7 @@ class Model:
             bending_stiffness: (m,) their stiffness, N mm / rad.
             folding_hinges: as `bending_hinges`; they become the crease "fold", at rest flat.
             folding_stiffness: (m,) their stiffness, N mm / rad.
-            supports: (s, 4) rows node, x, y, z with 1 for a direction that is held.
+            supports: (s, 4) rows node, x, y, z with 1 for a direction that is fixed.
             green: bars measure Green's strain; see `ElementStiffness`.
 
         Raises:
@@ -140,8 +140,8 @@ class Model:
         )
         if len(creased):
             model = model.crease("fold", stiffness=1.0)
-        for node, *held in np.asarray(supports, dtype=np.int64).reshape(-1, 4).tolist():
-            letters = "".join(axis for axis, on in zip("xyz", held, strict=True) if on)
+        for node, *fixed in np.asarray(supports, dtype=np.int64).reshape(-1, 4).tolist():
+            letters = "".join(axis for axis, on in zip("xyz", fixed, strict=True) if on)
             if letters:
                 model = model.support([node], letters)
         return model

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import PathFileError
-from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Tether
+from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
 from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model
 from bh.model.pinch import Pinch
@@ -32,6 +32,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "moment": Moment,
     "force": Force,
     "displace": Displace,
+    "pull": Pull,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether}

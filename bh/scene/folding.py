@@ -237,13 +237,13 @@ def _step(wish: Wish, sheet: SheetMesh | CreasePattern, width: float) -> tuple[s
     if not len(known):
         percent = PERCENT if wish.percent is None else wish.percent
         angle = math.pi * min(percent / 100.0, 1.0 - 1e-6)
-        told = "the file gives no fold angles" if wish.percent is None else "as asked for"
+        origin = "the file gives no fold angles" if wish.percent is None else "as asked for"
         return f'fold = {{ crease = "all", by = {angle:.6g}, {spring} }}', (
-            f"springs at every crease want {math.degrees(angle):.0f} degrees, {percent:g} % of the way ({told})"
+            f"springs at every crease want {math.degrees(angle):.0f} degrees, {percent:g} % of the way ({origin})"
         )
     fully = bool((known > FULLY).any())
     percent = wish.percent if wish.percent is not None else PERCENT if fully else 100.0
-    told = (
+    origin = (
         "as asked for"
         if wish.percent is not None
         else "they close completely"
@@ -253,7 +253,7 @@ def _step(wish: Wish, sheet: SheetMesh | CreasePattern, width: float) -> tuple[s
     some = "" if len(known) == len(drawn) else "; creases without an angle are taken as closing completely"
     part = f", part = {percent / 100.0:g}" if percent != 100.0 else ""
     return f'fold = {{ crease = "all", by = "drawn"{part}, {spring} }}', (
-        f"springs at every crease want {percent:g} % of the drawn angles ({told}){some}"
+        f"springs at every crease want {percent:g} % of the drawn angles ({origin}){some}"
     )
 
 

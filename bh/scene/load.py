@@ -93,7 +93,7 @@ class Scene:
         model: checked; its steps can be programmed (`bh.loading.builder`), nothing is solved.
         outputs: what a run is to write.
         accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
-        symmetry: the plane of a scene to be solved by halves, or None: `bh.trace(..., symmetry=scene.symmetry)`.
+        symmetry: the plane of symmetry of a scene, or None: `bh.trace(..., symmetry=scene.symmetry)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """

@@ -237,6 +237,18 @@ class DisplaceTable(Table):
     by: Distance = Field(description="a displacement in mm")
 
 
+class PullTable(Table):
+    """Keys of `bh.Pull`."""
+
+    node: Annotated[int, Field(ge=0)] = Field(description="the number of a node")
+    to: Vector = Field(description=VECTOR + " in mm, the point that the node is pulled to by a spring")
+    stiffness: Positive = Field(description="the stiffness of the spring in N/mm, a positive number")
+    start: Vector | None = Field(
+        None,
+        description=VECTOR + " in mm, the point where the step begins; where the node is then unless given",
+    )
+
+
 class UntilTable(Table):
     """What ends a step before its actuations are complete."""
 
@@ -260,10 +272,11 @@ class UntilTable(Table):
         return self
 
 
-ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable]] = {
+ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable | PullTable]] = {
     "fold": FoldTable,
     "pinch": PinchTable,
     "moment": MomentTable,
     "force": ForceTable,
     "displace": DisplaceTable,
+    "pull": PullTable,
 }

@@ -199,7 +199,7 @@ class LoadControl:
         if not found.converged:  # it may hold anything; nothing is asked of it
             return _Trial(here, found, primary, found.reason, "", iterations, branch)
         there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
-        objection = self._jump(system, here, there)
+        objection = jump(system, here, there, self.work_mismatch)
         if not objection and not found.stable and self.at_bifurcation == "stable":
             found, note = leave_saddle(system, found, lam, self.newton)
             iterations += found.iterations
@@ -253,23 +253,34 @@ class LoadControl:
 
         return guess
 
-    def _jump(self, system: System, here: Point, there: Point) -> str:
-        """Why two states are not neighbours on one branch, or an empty string."""
-        turned = system.objection(here.q, here.lam, there.q, there.lam)
-        if turned:
-            return turned
-        gained = there.energy - here.energy
-        taken = there.lam - here.lam
-        size = max(abs(here.power), abs(there.power)) * taken
-        noise = 1e-9 * max(abs(here.energy), abs(there.energy)) + 1e-15 * system.energy_scale
-        most = self.work_mismatch * size + noise
-        work = 0.5 * (here.power + there.power) * taken
-        if abs(gained - work) > most:
-            # a long increment on a curved path; the slopes at its ends tell that from a jump
-            work += taken**2 / 12.0 * (power_rate(system, here) - power_rate(system, there))
-            if not abs(gained - work) <= most:  # nor if the slopes are not known
-                return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
-        return ""
+
+def jump(system: System, here: Point, there: Point, mismatch: float) -> str:
+    """Why two states are not neighbours on one branch, or an empty string.
+
+    Args:
+        system: whose states they are.
+        here: the first.
+        there: the second.
+        mismatch: largest relative difference between the energy gained and the work of the actuation.
+
+    Returns:
+        one clause, or an empty string.
+    """
+    turned = system.objection(here.q, here.lam, there.q, there.lam)
+    if turned:
+        return turned
+    gained = there.energy - here.energy
+    taken = there.lam - here.lam
+    size = max(abs(here.power), abs(there.power)) * abs(taken)
+    noise = 1e-9 * max(abs(here.energy), abs(there.energy)) + 1e-15 * system.energy_scale
+    most = mismatch * size + noise
+    work = 0.5 * (here.power + there.power) * taken
+    if abs(gained - work) > most:
+        # a long increment on a curved path; the slopes at its ends tell that from a jump
+        work += taken**2 / 12.0 * (power_rate(system, here) - power_rate(system, there))
+        if not abs(gained - work) <= most:  # nor if the slopes are not known
+            return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
+    return ""
 
 
 def _lost(found: Solution) -> bool:

@@ -5,7 +5,7 @@ Where both stop, a pseudo-transient motion to rest is the last resort (`bh.solve
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -115,6 +115,25 @@ class Newton:
             lam: load parameter of the step, 0 to 1.
             forces: (f,) element forces that go with the guess; None for those of the system there.
         """
+        return exhaust(self.full_steps(system, q, lam, forces))
+
+    def full_steps(
+        self, system: System, q: Array, lam: float, forces: Array | None = None
+    ) -> Generator[Array, None, Solution]:
+        """`solve_full` one step at a time, for who has other things to do in between.
+
+        Args:
+            system: whose equilibrium is sought.
+            q: (n,) guess.
+            lam: load parameter of the step, 0 to 1.
+            forces: (f,) element forces that go with the guess; None for those of the system there.
+
+        Yields:
+            (n,) unknowns after every step.
+
+        Returns:
+            what came of it.
+        """
         now = system.evaluate(q, lam)
         forces = now.forces if forces is None else forces
         least, before = now.imbalance, np.inf
@@ -140,6 +159,7 @@ class Newton:
             if not np.isfinite(now.energy) or now.imbalance > 1e8 * max(least, 1.0):
                 return Solution(q, now, iteration + 1, False, "diverged")
             least = min(least, now.imbalance)
+            yield q
         if now.imbalance <= self.tolerance:
             return self._finish(system, q, lam, now, self.full, globalised=False)
         return Solution(q, now, self.full, False, "iteration limit")
@@ -159,6 +179,22 @@ class Newton:
             system: whose equilibrium is sought.
             q: (n,) guess.
             lam: load parameter of the step, 0 to 1.
+        """
+        return exhaust(self.globalised_steps(system, q, lam))
+
+    def globalised_steps(self, system: System, q: Array, lam: float) -> Generator[Array, None, Solution]:
+        """`solve_globalised` one step at a time.
+
+        Args:
+            system: whose equilibrium is sought.
+            q: (n,) guess.
+            lam: load parameter of the step, 0 to 1.
+
+        Yields:
+            (n,) unknowns after every step.
+
+        Returns:
+            what came of it.
         """
         now = system.evaluate(q, lam)
         shift, least, before = 0.0, ROUNDED, np.inf
@@ -192,6 +228,7 @@ class Newton:
             before = now.imbalance
             q, now, length = step
             shift = 0.1 * shift if length > 0.5 else shift
+            yield q
         if now.imbalance <= self.tolerance:
             return self._finish(system, q, lam, now, self.globalised, globalised=True)
         return Solution(q, now, self.globalised, False, "iteration limit", globalised=True)
@@ -213,6 +250,23 @@ class Newton:
     ) -> Solution:
         negative = count_negative(system.tangent(q, lam, now.forces).matrix)
         return Solution(q, now, iterations, True, "", negative, globalised)
+
+
+def exhaust(steps: Generator[Array, None, Solution]) -> Solution:
+    """All steps of a solve, one after another.
+
+    Args:
+        steps: of `Newton.full_steps` or `Newton.globalised_steps`.
+
+    Returns:
+        what came of it.
+    """
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            found: Solution = end.value
+            return found
 
 
 def slow(sizes: Sequence[float]) -> bool:

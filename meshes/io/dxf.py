@@ -52,6 +52,7 @@ SILENT = (
 LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX", "3DFACE", "TRACE")
 MOST = 200_000  # entities once all blocks are written out
 DEEPEST = 50  # blocks in blocks
+TOO_MANY = f"the drawing has more than {MOST} entities once its blocks are written out; explode and thin it"
 
 
 class Look(NamedTuple):
@@ -81,6 +82,8 @@ def read_dxf(path: str | os.PathLike[str]) -> Strokes:
     unit = int(drawing.header.get("$INSUNITS", 0)) if stated else 0
     if unit not in UNITS:
         raise FileFormatError(f"$INSUNITS = {unit} is no unit of a drawing; save it in mm, or give scale")
+    if _written_out(drawing, drawing.modelspace(), (), {}) > MOST:
+        raise FileFormatError(TOO_MANY)
     strokes: list[Stroke] = []
     for entity, around in _entities(drawing, drawing.modelspace(), None, (), [0]):
         kind = entity.dxftype()
@@ -129,20 +132,43 @@ def _entities(
             continue
         count[0] += 1
         if count[0] > MOST:
-            raise FileFormatError(
-                f"the drawing has more than {MOST} entities once its blocks are written out; explode and thin it"
-            )
+            raise FileFormatError(TOO_MANY)
         if kind != "INSERT":
             yield entity, around
             continue
-        name = str(entity.dxf.name)
-        if name in inside or len(inside) >= DEEPEST:
-            raise FileFormatError(f"block '{name}' contains itself; remove the reference in it")
+        name = _deeper(entity, inside)
         look = Look(
             _layer_name(entity, around), _colour(drawing, entity, around), _dash(drawing, entity, around)
         )
         for copy in entity.multi_insert() if entity.mcount > 1 else (entity,):
             yield from _entities(drawing, _contents(copy), look, (*inside, name), count)
+
+
+def _written_out(drawing: Any, items: Any, inside: tuple[str, ...], sizes: dict[str, int]) -> int:
+    """Number of entities that blocks come to; each block is looked at once (`sizes`), and nothing is written out.
+
+    To find out by writing them out takes a minute for as many as are allowed.
+    """
+    total = 0
+    for entity in items:
+        kind = entity.dxftype()
+        if kind in SILENT or _off(drawing, entity):
+            continue
+        total += 1
+        if kind == "INSERT":
+            name = _deeper(entity, inside)
+            if name not in sizes:
+                sizes[name] = _written_out(drawing, entity.block() or (), (*inside, name), sizes)
+            total += max(entity.mcount, 1) * sizes[name]
+    return total
+
+
+def _deeper(insert: Any, inside: tuple[str, ...]) -> str:
+    """The name of a block that is referred to within others."""
+    name = str(insert.dxf.name)
+    if name in inside or len(inside) >= DEEPEST:
+        raise FileFormatError(f"block '{name}' contains itself; remove the reference in it")
+    return name
 
 
 def _contents(insert: Any) -> Iterator[Any]:

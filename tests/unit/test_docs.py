@@ -37,6 +37,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: moment": schema.MomentTable,
     "steps: force": schema.ForceTable,
     "steps: displace": schema.DisplaceTable,
+    "steps: pull": schema.PullTable,
     "steps: until": schema.UntilTable,
     "outputs": schema.OutputsTable,
     "accuracy": schema.AccuracyTable,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bh.solvers.factor import Descent
 from bh.solvers.linear import linear_response
-from bh.solvers.load_control import LoadControl
+from bh.solvers.load_control import LoadControl, jump
 from bh.solvers.matrices import BandMatrix
 from bh.solvers.modes import factorise_shifted, lowest_mode
 from bh.solvers.newton import Newton, Solution, line_search, slow
@@ -459,8 +459,8 @@ def test_a_long_increment_is_told_from_a_jump_by_the_slopes_of_the_work() -> Non
     system, strategy = Power(1, [0.0]), LoadControl()
     a, b = (Point(lam, np.zeros(1), np.zeros(1), lam**5, 5.0 * lam**4) for lam in (0.0, 1.0))
     assert abs(1.0 - 0.5 * (a.power + b.power)) > strategy.work_mismatch * b.power
-    assert strategy._jump(system, a, b) == ""
-    assert "not the work" in strategy._jump(system, a, replace(b, energy=4.0))
+    assert jump(system, a, b, strategy.work_mismatch) == ""
+    assert "not the work" in jump(system, a, replace(b, energy=4.0), strategy.work_mismatch)
 
 
 def test_other_newton() -> None:

@@ -316,7 +316,7 @@ class BarsAndHingesSystem(SupportedSheet):
 
     @cached_property
     def compliance(self) -> Array:
-        """Compliance of held creases, rad / (N mm): far below rounding of the angles at ordinary moments.
+        """Compliance of prescribed creases, rad / (N mm): far below rounding of the angles at ordinary moments.
 
         Where panels are rigid, a straight crease can carry moments that balance each other at no cost; it picks the
         smallest ones.
@@ -333,7 +333,7 @@ class BarsAndHingesSystem(SupportedSheet):
         return self.displacements.number[self.elements.hinges[-self.elements.prescribed :]].reshape(-1, 12)
 
     def _constraint_rows(self, turns: Array) -> ConstraintRows:
-        """Gradients of the held angles, in local axes, from those of all hinges (h, 12)."""
+        """Gradients of the prescribed angles, in local axes, from those of all hinges (h, 12)."""
         g = turns[-self.elements.prescribed :]
         if len(self.displacements.turned):
             index = self.constraints.frame_of[self.elements.hinges[-self.elements.prescribed :]]

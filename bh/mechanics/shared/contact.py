@@ -1,4 +1,4 @@
-"""Rigid indenters that a sheet touches without friction, and soft springs to where its nodes were. Compiled.
+"""Rigid indenters that a sheet touches without friction, and springs to where its nodes were or are pulled. Compiled.
 
 An indenter is a rounded rectangle along an axis. With g the distance of a point of the sheet from its surface (mm,
 negative inside), d its `gap` and k its stiffness (N/mm for every mm of edge of the mesh), the potential a length is
@@ -19,10 +19,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.mechanics.shared.assembly import add_lower, rotate
 from bh.mechanics.shared.kinematics import OPTIONS
 from bh.mechanics.shared.sparsity import Slots
-from bh.model.actuations import Indenter, Tether
+from bh.model.actuations import Indenter, Pull, Tether
 from bh.model.step import Body
 from bh.model.supports import select
 from meshes import SheetMesh
@@ -36,12 +37,15 @@ class RigidContact:
     """The indenters and tethers of one step on a mesh; positions x are (n, 3), mm."""
 
     def __init__(self, mesh: SheetMesh, items: tuple[Body, ...], start: Array) -> None:
-        """Points of the sheet that can touch, and the springs of tethers.
+        """Points of the sheet that can touch, and the springs of tethers and pulls.
 
         Args:
             mesh: the stress-free sheet.
-            items: indenters and tethers of the step.
+            items: indenters, tethers and pulls of the step.
             start: (n, 3) positions that tethers hold to, mm.
+
+        Raises:
+            ModelError: a node is pulled that the mesh does not have, or to two points.
         """
         self.triangles = mesh.triangles
         self.indenters = tuple(item for item in items if isinstance(item, Indenter))
@@ -60,7 +64,7 @@ class RigidContact:
             if isinstance(item, Tether):
                 nodes = select(mesh, item.at)
                 self.spring[nodes] += np.asarray(item.total, dtype=float) / len(nodes)
-        self.anchor = start
+        self.anchor, self.pulled = _anchors(items, start, self.spring)
         # a triangle for every node, and which of its corners the node is
         self.home = np.zeros((len(start), 2), dtype=np.int64)
         for corner in range(3):
@@ -83,7 +87,7 @@ class RigidContact:
             lam: load parameter of the step, 0 to 1.
             f: (nodes, 3) N; the gradient is added.
         """
-        moved = x - self.anchor
+        moved = x - self.anchor - lam * self.pulled
         f += self.spring * moved
         total = np.zeros((len(self.indenters), 3))
         energy = _forces(
@@ -160,7 +164,7 @@ class RigidContact:
             moving: rate of lambda.
             out: (nodes, 3); the rate is added.
         """
-        out += self.spring * v
+        out += self.spring * (v - moving * self.pulled)
         _force_rates(
             x,
             v,
@@ -176,13 +180,14 @@ class RigidContact:
         )
 
     def power(self, x: Array, lam: float) -> float:
-        """Rate of energy with lambda at fixed x, N mm: work of the moving indenters on the sheet.
+        """Rate of energy with lambda at fixed x, N mm: work of what moves (indenters, pulls) on the sheet.
 
         Args:
             x: (nodes, 3) positions, mm.
             lam: load parameter of the step, 0 to 1.
         """
-        return float(
+        pulls = -float(np.vdot(self.spring * (x - self.anchor - lam * self.pulled), self.pulled))
+        return pulls + float(
             sum(
                 force @ indenter.by
                 for force, indenter in zip(self.contact_forces(x, lam).values(), self.indenters, strict=True)
@@ -198,6 +203,26 @@ class RigidContact:
         """
         ahead = 1e-6
         return (self.power(x, lam + ahead) - self.power(x, lam - ahead)) / (2.0 * ahead)
+
+
+def _anchors(items: tuple[Body, ...], start: Array, spring: Array) -> tuple[Array, Array]:
+    """Where springs hold the nodes when the step begins, and how far that moves in it, both (n, 3), mm.
+
+    The stiffness of pulls, N/mm, is added to `spring` (n, 3), which has that of the tethers.
+    """
+    anchor, pulled = start.copy(), np.zeros_like(start)
+    for item in items:
+        if not isinstance(item, Pull):
+            continue
+        if not 0 <= item.node < len(start):
+            raise ModelError(f"node {item.node} is pulled, but the mesh has {len(start)} nodes")
+        if spring[item.node].any():
+            raise ModelError(f"node {item.node} is pulled and held by a spring already; do one of them")
+        if item.start is not None:
+            anchor[item.node] = item.start
+        spring[item.node] = item.stiffness
+        pulled[item.node] = np.asarray(item.to) - anchor[item.node]
+    return anchor, pulled
 
 
 @njit(inline="always", **OPTIONS)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import bh
+from bh.analysis.richardson import limit
 from verification.framework.checks import CaseResult, Context, line, plot
-from verification.framework.richardson import limit
 from verification.studies.ch5.pinching import (
     AS_SOURCE,
     CONVERGED,

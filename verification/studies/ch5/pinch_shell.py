@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 import bh
+from bh.analysis.alignment import aligned
 from bh.applications.inverse.transforms import frame
 from meshes.curves import arc_lengths
-from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Context, line, plot
 from verification.studies.ch5.pinching import AS_SOURCE, CONVERGED, Pinched, Stiffness, Way, pinched
 

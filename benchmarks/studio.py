@@ -1,0 +1,90 @@
+"""How long from the slider to the new state in the browser: `python -m benchmarks.studio`, on a quiet machine.
+
+The browser runs on the same machine, without a graphics card. Times are of whole events: the message, the solve, the
+frame and its drawing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+import time
+
+import numpy as np
+
+import bh
+import meshes
+from bh.live import Session
+from bh.runtime.terminal import say
+from bh.studio.server import Studio
+from bh.studio.sheets import LiveSheet, of_model
+from reports.pdf import browser
+
+CELLS = ((20, 4), (48, 8), (96, 16))  # about 1,000, 5,000 and 20,000 unknowns
+EVENTS = 40
+EVENT = """(value) => new Promise((done) => {
+  const slider = document.getElementById("percent"), began = performance.now();
+  slider.value = value; slider.dispatchEvent(new Event("input"));
+  const look = () => {
+    const head = studio.head;
+    if (head.rest && Math.abs(100 * Object.values(head.asked)[0] / Math.PI - value) < 0.3)
+      requestAnimationFrame(() => done(performance.now() - began));
+    else setTimeout(look, 1);
+  };
+  look();
+})"""
+
+
+def sheet(along: int, rows: int) -> LiveSheet:
+    """A sector with one crease."""
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 30.0, 1.5), along=along, rows=rows)
+    return of_model(bh.Model(mesh, bh.Sheet(E=3500.0, nu=0.3, t=0.3)))
+
+
+def session_times(what: LiveSheet) -> list[float]:
+    """Seconds of updates without a window."""
+    session, times = Session(what.model), []
+    for k in range(EVENTS):
+        session.fold("all", 0.01 * (k + 1) * np.pi)
+        times.append(session.rest().seconds)
+    return times[5:]
+
+
+def window_times(what: LiveSheet) -> list[float]:
+    """Seconds from the event to the drawn frame."""
+    from playwright.sync_api import sync_playwright
+
+    studio, found = Studio(what), []
+
+    async def serve() -> None:
+        found.append(studio.serve()[1])
+        await asyncio.Event().wait()
+
+    threading.Thread(target=lambda: asyncio.run(serve()), daemon=True).start()
+    while not found:
+        time.sleep(0.01)
+    alone = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+    options = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", *alone]
+    with sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=browser(), args=options)
+        page = chromium.new_context(viewport={"width": 1400, "height": 820}, bypass_csp=True).new_page()
+        page.goto(found[0])
+        page.wait_for_function("window.studio?.head", timeout=60_000)
+        times = [1e-3 * page.evaluate(EVENT, 1.0 * (k + 1)) for k in range(EVENTS)]
+        chromium.close()
+    return times[5:]
+
+
+def main() -> None:
+    """Print a line a size."""
+    for along, rows in CELLS:
+        what = sheet(along, rows)
+        size = Session(what.model).size
+        for name, measured in (("session", session_times(what)), ("window", window_times(what))):
+            middle, most = 1e3 * np.percentile(measured, [50, 95])
+            say(f"{size:,} unknowns, {name}: median {middle:.0f} ms, 95th percentile {most:.0f} ms")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,9 @@
+"""A sheet that answers while it is handled: folded by sliders, pulled by a hand, always in equilibrium.
+
+`Session` takes changes and a budget of time, and gives the newest equilibrium. No window is in it; `bh.studio` is one.
+"""
+
+from bh.live.controls import Controls, Grip
+from bh.live.session import Frame, Session
+
+__all__ = ["Controls", "Frame", "Grip", "Session"]

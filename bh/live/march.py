@@ -1,0 +1,133 @@
+"""Along one way of a system, one iteration at a time, to a target that may move meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.solvers.load_control import LoadControl, jump
+from bh.solvers.modes import lowest_mode
+from bh.solvers.newton import Solution
+from bh.solvers.points import Point, extrapolate, point
+from bh.solvers.system import System
+
+Array = NDArray[np.float64]
+SMALLEST = 1e-3  # part of the first increment from which on the sheet may leave its branch: it snaps
+PUSH = 1e-2  # along the lowest mode of an unstable state, in parts of the size of the sheet
+
+
+@dataclass
+class March:
+    """The path of a system behind the hand; `points` holds its last states, three at most.
+
+    Attributes:
+        system: of the way; its lambda may go beyond 0 to 1.
+        points: states in equilibrium, the newest last.
+        target: lambda to go to; it may be changed between two iterations.
+        settings: increments and tolerances of the driver.
+        snapped: the newest state lies on another branch than the one before.
+        stuck: why it cannot go on, or an empty string.
+        iterations: so far.
+    """
+
+    system: System
+    points: list[Point]
+    target: float
+    settings: LoadControl
+    snapped: bool = False
+    stuck: str = ""
+    iterations: int = 0
+
+    def __post_init__(self) -> None:
+        """Nothing is under way."""
+        self._newton = replace(self.settings.newton, hasty=True, transient=None)
+        self._run: Generator[Array, None, None] | None = None
+        self._increment = self.settings.limits(self.system)[0] if self.system.rotation > 0.0 else 1.0
+
+    @property
+    def here(self) -> Point:
+        """The newest state."""
+        return self.points[-1]
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the newest state is that of the target."""
+        return self.here.lam == self.target
+
+    def advance(self) -> bool:
+        """One iteration; False where there is nothing to do: it has arrived or is stuck."""
+        if self._run is None:
+            if self.arrived or self.stuck:
+                return False
+            self._run = self._go()
+        try:
+            next(self._run)
+            self.iterations += 1
+        except StopIteration:
+            self._run = None
+        return True
+
+    def _go(self) -> Generator[Array, None, None]:
+        """One accepted state further, or stuck."""
+        size, cuts = self._increment, 0
+        while True:
+            here = self.here
+            left = self.target - here.lam
+            if left == 0.0:
+                return
+            lam = self.target if abs(left) <= size else here.lam + float(np.copysign(size, left))
+            free = size < SMALLEST * self.settings.limits(self.system)[0]
+            found = yield from self._solve(lam, patient=cuts >= self.settings.brisk or free)
+            reason = found.reason if not found.converged else ""
+            note = ""
+            if found.converged and found.stable is False:
+                found, note = yield from self._downhill(found, lam)
+                reason = "" if note else "no stable state was found nearby"
+            if not reason:
+                there = point(self.system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
+                reason = (
+                    self.system.penetration(here.q, here.lam, there.q, lam)
+                    if note or free
+                    else jump(self.system, here, there, self.settings.work_mismatch)
+                )
+                if not reason:
+                    self.snapped = bool(note) or (free and bool(self._off(here, there)))
+                    before = [] if self.snapped else [at for at in self.points[-2:] if at.lam != lam]
+                    self.points = [*before, there]
+                    self._increment = min(
+                        self.settings.limits(self.system)[1], 2.0 * size if not cuts else size
+                    )
+                    return
+            if free:
+                self.stuck = reason
+                return
+            size, cuts = 0.5 * min(size, abs(left)), cuts + 1
+
+    def _off(self, here: Point, there: Point) -> str:
+        return jump(self.system, here, there, self.settings.work_mismatch)
+
+    def _solve(self, lam: float, patient: bool) -> Generator[Array, None, Solution]:
+        """A state at `lam` near the last ones; `patient` goes downhill where full steps do not converge."""
+        q, forces = extrapolate(self.points, lam)
+        found = yield from self._newton.full_steps(self.system, q, lam, forces)
+        if found.converged or not patient:
+            return found
+        found = yield from self._newton.globalised_steps(self.system, q, lam)
+        return found
+
+    def _downhill(self, saddle: Solution, lam: float) -> Generator[Array, None, tuple[Solution, str]]:
+        """From an unstable state along its lowest mode, in both senses, to the stable one of lower energy."""
+        matrix = self.system.tangent(saddle.q, lam, saddle.evaluation.forces).matrix
+        _, mode = lowest_mode(matrix, len(saddle.q), self.system.primal)
+        yield saddle.q
+        size = float(np.ptp(saddle.q[: self.system.primal])) or 1.0
+        push = PUSH * size / max(float(np.abs(mode).max()), 1e-300) * mode
+        best = saddle
+        for start in (saddle.q + push, saddle.q - push):
+            found = yield from self._newton.globalised_steps(self.system, start, lam)
+            if found.converged and found.stable and found.evaluation.energy < best.evaluation.energy:
+                best = found
+        return best, "" if best is saddle else "snapped"

@@ -1,0 +1,428 @@
+"""A sheet under a hand: takes changes, gives the newest equilibrium within a budget of time."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from bh.formulations.protocols import SheetSystem
+from bh.formulations.registry import formulation
+from bh.formulations.state import State
+from bh.live.controls import CLOSED, Controls, Grip, Vector, Way, fold_of
+from bh.live.march import March
+from bh.loading.builder import LoadStepBuilder
+from bh.loading.load_step import LoadStep, StepEnd
+from bh.model.actuations import Force, Pull
+from bh.model.model import Model
+from bh.model.step import Actuation, Step
+from bh.runtime.threads import one_blas_thread
+from bh.solvers.load_control import LoadControl
+from bh.solvers.points import point
+from meshes import SheetMesh
+from meshes.mesh import count
+
+Array = NDArray[np.float64]
+GRIP = 200.0  # stiffness of a grip in parts of D / L^2, of a panel as large as the sheet: it gives way, yet leads
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What is to be shown of a sheet under a hand: always a state in equilibrium.
+
+    Attributes:
+        state: the newest equilibrium.
+        controls: what it is in equilibrium with, and `wanted` what was asked for.
+        forces: (3,) of every grip on the sheet, N, by its node.
+        snapped: the sheet has left its branch since the frame before.
+        note: why it cannot go on to what is wanted, or an empty string.
+        iterations: of Newton's method in all so far.
+        seconds: that the update took.
+        fading: what has pulled until now still does, a part of it.
+    """
+
+    state: State
+    controls: Controls
+    wanted: Controls
+    forces: Mapping[int, Vector]
+    snapped: bool
+    note: str
+    iterations: int
+    seconds: float
+    fading: bool = False
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether this is the equilibrium of what is wanted."""
+        return self.controls == self.wanted and not self.fading
+
+    @property
+    def points(self) -> Array:
+        """(n, 3) node positions, mm."""
+        return self.state.points
+
+    def fold_angles(self) -> dict[str, float]:
+        """Mean fold angle of every crease that is handled.
+
+        Returns:
+            rad by name, positive the way that the crease is drawn.
+        """
+        mesh = self.state.mesh
+        return {
+            name: float(self.state.fold_angle(name).mean())
+            * (-1.0 if mesh.folds.get(name) == "valley" else 1.0)
+            for name in self.controls.folds
+        }
+
+
+@dataclass(eq=False)
+class _Under:
+    """The way in hand: its load step and system, and the march along it."""
+
+    way: Way
+    load: LoadStep
+    system: SheetSystem
+    march: March
+
+
+class Session:
+    """A sheet that answers while it is handled.
+
+    A crease that is a spring in the model turns its rest angle, the others are imposed. The steps of the model are
+    not followed: the sheet begins flat. Without supports it is held at three nodes in its middle, which takes the
+    rigid motions and nothing else.
+    """
+
+    def __init__(self, model: Model, settings: LoadControl | None = None) -> None:
+        """Begin flat and at rest.
+
+        Args:
+            model: sheet, supports and creases.
+            settings: increments and tolerances; None for the driver's own.
+
+        Raises:
+            ModelError: the sheet cannot be solved as described.
+        """
+        self.model = replace(model if model.supports else held(model), steps=())
+        self._settings = settings or LoadControl()
+        self._formulation = formulation(self.model.formulation)
+        names = [name for name in self.mesh.creases if self.mesh.folds.get(name) != "flat"]
+        self._wanted = Controls(dict.fromkeys(_chains(self.mesh, names), 0.0))
+        self._builder = LoadStepBuilder(self.model)
+        self._gone: tuple[int, ...] = ()
+        self._past: list[Controls] = []
+        self._undone: list[Controls] = []
+        self._iterations = 0
+        self._stable: bool | None = True
+        self._under = self._begin(Way(self._wanted, self._wanted), None)
+
+    # ------------------------------------------------------------------------------- what a hand does
+
+    @property
+    def mesh(self) -> SheetMesh:
+        """Of the sheet."""
+        return self.model.mesh
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self._under.system.size
+
+    @property
+    def wanted(self) -> Controls:
+        """What is asked for."""
+        return self._wanted
+
+    @property
+    def creases(self) -> tuple[str, ...]:
+        """Creases that can be folded."""
+        return tuple(self._wanted.folds)
+
+    def fold(self, crease: str, angle: float) -> None:
+        """Ask for a fold angle.
+
+        Args:
+            crease: its name, or "all".
+            angle: fold angle, rad, positive the way that the crease is drawn; held inside a hair of closing.
+
+        Raises:
+            ModelError: no such crease, or no number.
+        """
+        if crease != "all" and crease not in self._wanted.folds:
+            known = ", ".join(self.creases) or "none"
+            raise ModelError(f"there is no crease '{crease}' to fold; choose one of {known}, or 'all'")
+        if not math.isfinite(angle):
+            raise ModelError(f"fold of crease '{crease}' by {angle} cannot be; give a number of rad")
+        angle = min(max(angle, -CLOSED), CLOSED)
+        folds = {name: angle if crease in (name, "all") else old for name, old in self._wanted.folds.items()}
+        self._ask(Controls(folds, self._wanted.grips))
+
+    def pull(self, node: int, to: Vector, stiffness: float | None = None) -> None:
+        """Pull a node to a point by a spring.
+
+        Args:
+            node: of the mesh.
+            to: (3,) the point, mm.
+            stiffness: of the spring, N/mm; None for one that suits the sheet.
+
+        Raises:
+            ModelError: no such node, or no point.
+        """
+        if not 0 <= node < len(self.mesh.points):
+            raise ModelError(
+                f"there is no node {node} to pull; choose one of 0 to {len(self.mesh.points) - 1}"
+            )
+        if len(to) != 3 or not all(math.isfinite(x) for x in to):
+            raise ModelError(f"node {node} cannot be pulled to {to}; give three numbers of mm")
+        old = self._wanted.grips.get(node)
+        given = stiffness or (old.stiffness if old else self._soft)
+        x, y, z = (float(c) for c in to)
+        self._ask(Controls(self._wanted.folds, {**self._wanted.grips, node: Grip((x, y, z), given)}))
+
+    def let_go(self, node: int | None = None) -> None:
+        """Let go of a node, or of all of them; what pulled fades out."""
+        left = {} if node is None else {n: grip for n, grip in self._wanted.grips.items() if n != node}
+        self._ask(Controls(self._wanted.folds, left))
+
+    def undo(self) -> bool:
+        """Go back to what was wanted when the sheet last was at rest with something else; False if there is nothing."""
+        while self._past and self._past[-1] == self._wanted:
+            self._past.pop()
+        if not self._past:
+            return False
+        undone = [*self._undone, self._wanted]
+        self._ask(self._past.pop())
+        self._undone = undone
+        return True
+
+    def redo(self) -> bool:
+        """Take the last `undo` back; False if there is none, or something else was asked for since."""
+        if not self._undone:
+            return False
+        left, wanted = self._undone[:-1], self._undone[-1]
+        self._ask(wanted)
+        self._undone = left
+        return True
+
+    def ask(self, wanted: Controls) -> None:
+        """Ask for all controls at once, such as those of another session of the same sheet.
+
+        Raises:
+            ModelError: a crease or node is not there.
+        """
+        for name, angle in wanted.folds.items():
+            self.fold(name, angle)
+        for node, grip in wanted.grips.items():
+            self.pull(node, grip.to, grip.stiffness)
+
+    # ------------------------------------------------------------------------------- what it answers
+
+    def update(self, budget: float = 0.03) -> Frame:
+        """The newest equilibrium after about `budget` of work, which ends behind the iteration in hand.
+
+        Args:
+            budget: s of wall time, one iteration at least; 0 for no work.
+
+        Returns:
+            a frame; `at_rest` says whether it is that of what is wanted.
+        """
+        began = time.perf_counter()
+        snapped = False
+        with one_blas_thread():
+            self._aim()
+            march = self._under.march
+            going = budget > 0.0  # one iteration at least, however little time there is
+            while going and self._busy():
+                march = self._under.march
+                snapped = snapped or march.snapped
+                going = time.perf_counter() - began < budget
+            snapped = snapped or march.snapped
+            march.snapped = False
+            frame = self._frame(snapped, time.perf_counter() - began)
+        if frame.at_rest and (not self._past or self._past[-1] != self._wanted):
+            self._past.append(self._wanted)
+        return frame
+
+    def rest(self, most: float = 60.0) -> Frame:
+        """The equilibrium of what is wanted, or where the sheet cannot go on.
+
+        Args:
+            most: s of wall time.
+        """
+        ends = time.perf_counter() + most
+        frame = self.update(most)
+        while not frame.at_rest and not frame.note and time.perf_counter() < ends:
+            frame = self.update(ends - time.perf_counter())
+        return frame
+
+    def scene(self) -> Model:
+        """The model whose steps lead straight to what is wanted: one that folds, one that pulls.
+
+        Returns:
+            a model for `bh.trace`; where the sheet has snapped on its way here it may end on another branch.
+        """
+        laws = self.model.creases
+        folds = tuple(fold_of(name, angle, laws.get(name)) for name, angle in self._wanted.folds.items())
+        pulls: tuple[Actuation, ...] = tuple(
+            Pull(node, grip.to, grip.stiffness) for node, grip in self._wanted.grips.items()
+        )
+        steps = [Step(items) for items in (folds, pulls) if items]
+        return replace(self.model, steps=tuple(steps))
+
+    # ------------------------------------------------------------------------------- its own
+
+    @property
+    def _soft(self) -> float:
+        """Stiffness of a grip that suits the sheet, N/mm."""
+        size = float(np.ptp(self.mesh.points, axis=0).max())
+        return GRIP * self.model.sheet.bending_stiffness(nu=0.0) / size**2
+
+    def _ask(self, wanted: Controls) -> None:
+        if wanted != self._wanted:
+            self._wanted, self._undone = wanted, []
+            self._under.march.stuck = ""
+
+    def _busy(self) -> bool:
+        """One iteration more; False where there is nothing left to do."""
+        if self._under.march.advance():
+            return True
+        if self._under.march.stuck or (self._now() == self._wanted and not self._fading()):
+            return False
+        self._aim()
+        return self._under.march.advance()
+
+    def _aim(self) -> None:
+        """Let the march in hand, or a new one from its newest state, go to what is wanted."""
+        under = self._under
+        if under.march.stuck:
+            return
+        if self._fading():
+            if under.way.end == self._wanted:
+                return  # to its end, where nothing pulls any more
+        elif (lam := under.way.find(self._wanted)) is not None:
+            under.march.target = lam
+            return
+        now = self._now()
+        self._iterations += under.march.iterations
+        here = under.march.here
+        state = self._state()
+        self._builder.end_early(under.load, StepEnd(here.lam, state.points, state.dihedral_angles))
+        self._release(now, state)
+        start = now
+        for node, grip in self._wanted.grips.items():
+            old = now.grips.get(node)
+            if old is None or old.stiffness != grip.stiffness:  # it begins without a force
+                x, y, z = state.points[node].tolist()
+                start = Controls(start.folds, {**start.grips, node: Grip((x, y, z), grip.stiffness)})
+        kept = {node: start.grips[node] for node in self._wanted.grips}
+        start = Controls(start.folds, kept)
+        way = Way(start, self._wanted) if self._gone else Way.toward(start, self._wanted)
+        self._under = self._begin(way, state)
+
+    def _fading(self) -> bool:
+        """Whether the way in hand lets forces fade out that are still there: it has to be gone to its end."""
+        force = self._under.load.force
+        return bool(force.start.any()) and self._under.march.here.lam != 1.0
+
+    def _release(self, now: Controls, state: State) -> None:
+        """Nodes that are let go of keep their force as a dead one, which the next way fades out."""
+        forces = self._forces(now, state)
+        gone = [node for node in now.grips if node not in self._wanted.grips]
+        if gone:
+            keep = Step(tuple(Force([node], each=forces[node]) for node in gone))
+            self._builder.build(keep)
+        still = [node for node in self._gone if self._fading()]  # what has faded out is forgotten
+        self._gone = tuple(dict.fromkeys([*still, *gone]))
+
+    def _begin(self, way: Way, state: State | None) -> _Under:
+        gone = tuple(node for node in self._gone if node not in way.end.grips)
+        items = way.actuations(self.model.creases, gone) or (Force([0], each=(0.0, 0.0, 0.0)),)
+        load = self._builder.build(Step(items))
+        system = self._formulation.system(self.model, load, state)
+        q = system.start()
+        march = March(system, [point(system, q, 0.0)], 0.0, self._settings)
+        under = _Under(way, load, system, march)
+        if load.force.start.any():
+            march.target = 1.0
+        elif (lam := way.find(self._wanted)) is not None:
+            march.target = lam
+        return under
+
+    def _now(self) -> Controls:
+        """What the newest state is in equilibrium with."""
+        under = self._under
+        if under.march.here.lam == under.way.find(self._wanted) and not self._fading():
+            return self._wanted  # to the last digit
+        return under.way.at(under.march.here.lam)
+
+    def _state(self) -> State:
+        under, here = self._under, self._under.march.here
+        stable = True if here.negative is None else here.negative == 0
+        return self._formulation.observe(self.model, under.system, here.q, here.lam, 0, stable)
+
+    def _forces(self, now: Controls, state: State) -> dict[int, Vector]:
+        found: dict[int, Vector] = {}
+        for node, grip in now.grips.items():
+            x, y, z = (grip.stiffness * (np.array(grip.to) - state.points[node])).tolist()
+            found[node] = (x, y, z)
+        return found
+
+    def _frame(self, snapped: bool, seconds: float) -> Frame:
+        state, now = self._state(), self._now()
+        iterations = self._iterations + self._under.march.iterations
+        return Frame(
+            state,
+            now,
+            self._wanted,
+            self._forces(now, state),
+            snapped,
+            self._under.march.stuck,
+            iterations,
+            seconds,
+            self._fading(),
+        )
+
+    def __repr__(self) -> str:
+        """One line: "Session(1 crease, 1 grip, 722 unknowns)"."""
+        grips, creases = count(len(self._wanted.grips), "grip"), count(len(self.creases), "crease")
+        return f"Session({creases}, {grips}, {self._under.system.size:,} unknowns)"
+
+
+def held(model: Model) -> Model:
+    """The model held at three nodes of the triangle nearest to the middle of the sheet: six rigid motions, no more.
+
+    Args:
+        model: of a sheet without supports.
+
+    Returns:
+        the same with three supports.
+    """
+    mesh = model.mesh
+    corners = mesh.points[mesh.triangles]
+    middle = mesh.points.mean(axis=0)
+    nearest = int(np.argmin(np.linalg.norm(corners.mean(axis=1) - middle, axis=1)))
+    a, b, c = mesh.triangles[nearest].tolist()
+    along = mesh.points[b] - mesh.points[a]
+    along /= np.linalg.norm(along)
+    normal = np.cross(along, mesh.points[c] - mesh.points[a])
+    normal /= np.linalg.norm(normal)
+    across = np.cross(normal, along)
+    model = model.support([a], "xyz").support([b], [across.tolist(), normal.tolist()])
+    return model.support([c], [normal.tolist()])
+
+
+def _chains(mesh: SheetMesh, names: list[str]) -> list[str]:
+    """Names of creases that cover every creased edge once, shortest names of chains first: FOLD files have several."""
+    found: list[str] = []
+    seen: set[tuple[int, int]] = set()
+    for name in sorted(names, key=lambda each: len(mesh.crease_edges(each))):
+        edges = {(min(a, b), max(a, b)) for a, b in np.asarray(mesh.crease_edges(name)).tolist()}
+        if not edges & seen:
+            found.append(name)
+            seen |= edges
+    return [name for name in names if name in found]

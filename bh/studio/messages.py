@@ -1,0 +1,134 @@
+"""What a window may ask: one class a message, checked before anything is done with it."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
+
+from bh.errors import InputError
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Point = tuple[Finite, Finite, Finite]
+
+
+class Message(BaseModel):
+    """Unknown keys are refused, so that a misspelt one is not lost."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Open(Message):
+    """A drawing that was dropped."""
+
+    do: Literal["open"]
+    name: Annotated[str, Field(max_length=200)]
+    data: bytes
+
+    @field_validator("data", mode="before")
+    @classmethod
+    def decoded(cls, value: object) -> bytes:
+        """Bytes from base64."""
+        try:
+            return base64.b64decode(str(value), validate=True)
+        except binascii.Error as error:
+            raise ValueError("the file is no base64") from error
+
+
+class Pattern(Message):
+    """A pattern of the library."""
+
+    do: Literal["pattern"]
+    name: str
+
+
+class Fold(Message):
+    """The fold angle of a crease, rad; "all" for all."""
+
+    do: Literal["fold"]
+    crease: str
+    angle: Finite
+
+
+class Percent(Message):
+    """Every crease to a part of its way."""
+
+    do: Literal["percent"]
+    value: Annotated[float, Field(ge=-100.0, le=100.0)]
+
+
+class Pull(Message):
+    """A node to a point, mm."""
+
+    do: Literal["pull"]
+    node: Annotated[int, Field(ge=0)]
+    to: Point
+
+
+class LetGo(Message):
+    """Let go of a node, or of all."""
+
+    do: Literal["let-go"]
+    node: int | None = None
+
+
+class Material(Message):
+    """Another material: one of the table, or numbers (MPa, 1, mm)."""
+
+    do: Literal["material"]
+    name: str | None = None
+    E: Positive | None = None
+    nu: Annotated[float, Field(gt=-1.0, le=0.5)] | None = None
+    t: Positive | None = None
+
+
+class Hold(Message):
+    """Hold a node where it is flat, or leave it: "xyz" or nothing."""
+
+    do: Literal["hold"]
+    node: Annotated[int, Field(ge=0)]
+    on: bool
+
+
+class Plain(Message):
+    """What needs no more words."""
+
+    do: Literal["undo", "redo", "check", "flatten"]
+
+
+class Colour(Message):
+    """What the colours of the sheet show."""
+
+    do: Literal["colour"]
+    by: Literal["none", "bending", "stretching", "strain"]
+
+
+class Export(Message):
+    """A file of what is in the window."""
+
+    do: Literal["export"]
+    what: str
+
+
+Asked = Open | Pattern | Fold | Percent | Pull | LetGo | Material | Hold | Plain | Colour | Export
+_ADAPTER: TypeAdapter[Asked] = TypeAdapter(Annotated[Asked, Field(discriminator="do")])
+
+
+def read(text: str | bytes) -> Asked:
+    """A message from its JSON text.
+
+    Args:
+        text: as it came.
+
+    Raises:
+        InputError: it is none; one line.
+    """
+    try:
+        return _ADAPTER.validate_json(text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"this cannot be asked ({place}: {first['msg']})") from None

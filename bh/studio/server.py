@@ -1,0 +1,276 @@
+"""The server of the window: this machine only, a token in the address, a desk for every window."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+import webbrowser
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import tornado.web
+import tornado.websocket
+from tornado.httpserver import HTTPServer
+from tornado.netutil import bind_sockets
+
+from bh.errors import InputError
+from bh.runtime.terminal import say
+from bh.studio.desk import Desk
+from bh.studio.messages import read
+from bh.studio.sheets import LONGEST, LiveSheet
+
+HOST = "127.0.0.1"
+STATIC = Path(__file__).with_name("static")
+LONGEST_MESSAGE = LONGEST * 4 // 3 + 4096  # bytes of a file in base64, and its name
+WINDOWS = 8  # at once
+POLICY = (
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self' ws:"
+)
+HEADERS = {
+    "Content-Security-Policy": POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
+
+
+class Studio:
+    """What all windows of a server share.
+
+    Attributes:
+        token: that an address must have.
+        sheet: that a new window begins with; None for a pattern of the library.
+        windows: that are open.
+    """
+
+    def __init__(self, sheet: LiveSheet | None = None) -> None:
+        """A new token."""
+        self.token = secrets.token_urlsafe(16)
+        self.sheet = sheet
+        self.windows: set[Window] = set()
+        self.pool = ThreadPoolExecutor(WINDOWS, thread_name_prefix="bh-studio")
+
+    def application(self) -> tornado.web.Application:
+        """The pages and the socket."""
+        shared = {"studio": self}
+        return tornado.web.Application(
+            [
+                (r"/", Page, shared),
+                (r"/socket", Window, shared),
+                (r"/static/(.*)", Static, {"path": str(STATIC)}),
+            ],
+            websocket_max_message_size=LONGEST_MESSAGE,
+        )
+
+    def serve(self, port: int = 0) -> tuple[HTTPServer, str]:
+        """Listen on this machine.
+
+        Args:
+            port: 0 for a free one.
+
+        Returns:
+            the server and the address with its token.
+
+        Raises:
+            InputError: the port is taken.
+        """
+        try:
+            sockets = bind_sockets(port, address=HOST)
+        except OSError as error:
+            raise InputError(
+                f"port {port} cannot be used ({error.strerror}); leave --port out for a free one"
+            ) from error
+        server = HTTPServer(self.application())
+        server.add_sockets(sockets)
+        return server, f"http://{HOST}:{sockets[0].getsockname()[1]}/?token={self.token}"
+
+
+class Page(tornado.web.RequestHandler):
+    """The page itself, for who has the token."""
+
+    def initialize(self, studio: Studio) -> None:
+        """What is shared."""
+        self.studio = studio
+
+    def set_default_headers(self) -> None:
+        """Nothing from elsewhere, nothing kept."""
+        for name, value in HEADERS.items():
+            self.set_header(name, value)
+
+    def get(self) -> None:
+        """The page."""
+        if not allowed(self.request, self.get_query_argument("token", ""), self.studio.token):
+            raise tornado.web.HTTPError(403)
+        self.set_header("Content-Type", "text/html; charset=utf-8")
+        self.write((STATIC / "index.html").read_bytes())
+
+
+class Static(tornado.web.StaticFileHandler):
+    """Scripts and styles of the page."""
+
+    def set_default_headers(self) -> None:
+        """As the page's own."""
+        for name, value in HEADERS.items():
+            self.set_header(name, value)
+
+
+class Window(tornado.websocket.WebSocketHandler):
+    """One window: messages in, frames out, one at a time; its desk goes when it is closed."""
+
+    def initialize(self, studio: Studio) -> None:
+        """What is shared."""
+        self.studio = studio
+        self.desk: Desk | None = None
+        self.queue: asyncio.Queue[str | bytes] = asyncio.Queue()
+        self.drawn = asyncio.Event()  # the last frame was shown
+        self.work: asyncio.Task[None] | None = None
+
+    def check_origin(self, origin: str) -> bool:
+        """Only this server's own page."""
+        return urlsplit(origin).netloc == self.request.host
+
+    async def get(self, *args: str, **kwargs: str) -> None:
+        """Refuse who has no token, or one window too many, before the socket is opened."""
+        if not allowed(self.request, self.get_query_argument("token", ""), self.studio.token):
+            raise tornado.web.HTTPError(403)
+        if len(self.studio.windows) >= WINDOWS:
+            raise tornado.web.HTTPError(503)
+        await super().get(*args, **kwargs)
+
+    def open(self, *args: str, **kwargs: str) -> None:  # noqa: ARG002 - Tornado's own arguments
+        """Begin to work.
+
+        Args:
+            args: of the address; there are none.
+            kwargs: none.
+        """
+        self.studio.windows.add(self)
+        self.drawn.set()
+        self.work = asyncio.create_task(self._work())
+
+    def on_message(self, message: str | bytes) -> None:
+        """A frame was drawn, or something is asked."""
+        if message == "drawn":
+            self.drawn.set()
+        else:
+            self.queue.put_nowait(message)
+
+    def on_close(self) -> None:
+        """Give everything back."""
+        self.studio.windows.discard(self)
+        if self.work is not None:
+            self.work.cancel()
+        self.desk = None
+
+    async def _work(self) -> None:
+        run = asyncio.get_running_loop().run_in_executor
+        try:
+            desk = self.desk = await run(self.studio.pool, Desk, self.studio.sheet)
+        except InputError as error:
+            await self._say({"kind": "line", "text": str(error), "bad": True})
+            return
+        await self._say(desk.describe())
+        while True:
+            if not desk.busy or not self.queue.empty():
+                waiting = [await self.queue.get()]
+                while not self.queue.empty():
+                    waiting.append(self.queue.get_nowait())
+                for message in newest(waiting):
+                    await self._do(desk, message)
+            await self.drawn.wait()
+            if desk.busy:
+                try:
+                    frame = await run(self.studio.pool, desk.update)
+                except Exception as error:  # a sheet that breaks takes its session down, not the server
+                    await self._say(_fault(error))
+                    desk.put(desk.sheet)
+                    await self._say(desk.describe())
+                    continue
+                self.drawn.clear()
+                await self.write_message(frame, binary=True)
+
+    async def _do(self, desk: Desk, message: str | bytes) -> None:
+        """One message, answered; the last good state is kept where it cannot be done."""
+        run = asyncio.get_running_loop().run_in_executor
+        try:
+            answers = await run(self.studio.pool, lambda: desk.take(read(message)))
+        except InputError as error:
+            answers = [{"kind": "line", "text": str(error), "bad": True}]
+        except Exception as error:
+            answers = [_fault(error)]
+        for answer in answers:
+            await self._say(answer)
+
+    async def _say(self, answer: dict[str, object]) -> None:
+        await self.write_message(json.dumps(answer))
+
+
+def allowed(request: tornado.httputil.HTTPServerRequest, token: str, wanted: str) -> bool:
+    """Whether a request comes by the address of this machine, with the token.
+
+    Args:
+        request: with its host.
+        token: that it has.
+        wanted: that it should have.
+    """
+    host = request.host.rsplit(":", 1)[0]
+    return host in (HOST, "localhost") and secrets.compare_digest(token.encode(), wanted.encode())
+
+
+def newest(waiting: Sequence[str | bytes]) -> list[str | bytes]:
+    """Messages that are worth doing: of moves of the same slider or point only the last.
+
+    Args:
+        waiting: in the order in which they came.
+
+    Returns:
+        the others left out, in the same order.
+    """
+    last = {_subject(message): number for number, message in enumerate(waiting)}
+    return [m for number, m in enumerate(waiting) if _subject(m) is None or last[_subject(m)] == number]
+
+
+def _subject(message: str | bytes) -> tuple[object, ...] | None:
+    """What a message moves, where a later one of the same makes it useless."""
+    try:
+        data = json.loads(message)
+    except ValueError:
+        return None
+    if not isinstance(data, dict) or data.get("do") not in ("fold", "percent", "pull"):
+        return None
+    return data["do"], data.get("crease"), data.get("node")
+
+
+def _fault(error: Exception) -> dict[str, object]:
+    text = f"a fault of the program ({type(error).__name__}: {error}); the sheet begins anew"
+    return {"kind": "line", "text": text, "bad": True}
+
+
+def open_window(sheet: LiveSheet | None = None, port: int = 0, browser: bool = True) -> None:
+    """Serve the window until it is interrupted.
+
+    Args:
+        sheet: that it begins with; None for a pattern of the library.
+        port: 0 for a free one.
+        browser: open it in the browser of this machine.
+
+    Raises:
+        InputError: the port is taken.
+    """
+
+    async def run() -> None:
+        studio = Studio(sheet)
+        server, address = studio.serve(port)
+        say(f"the window is at {address} (Ctrl-C ends it)")
+        if browser:
+            webbrowser.open(address)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            server.stop()
+            studio.pool.shutdown(wait=False, cancel_futures=True)
+
+    asyncio.run(run())

@@ -1,0 +1,179 @@
+"""Sheets for the window: what a drawing, a pattern of the library or a model is when it is folded live."""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bh.errors import InputError
+from bh.formulations.registry import remarks
+from bh.model.actuations import Fold
+from bh.model.crease_law import CreaseLaw
+from bh.model.model import Model
+from bh.model.sheet import Sheet
+from bh.scene.folding import MATERIALS, PERCENT, Wish, proposals
+from bh.scene.load import Outputs, Scene, parse_scene
+from meshes import SheetMesh
+
+LONGEST = 5_000_000  # bytes of a drawing
+MOST_TRIANGLES = 8000  # of a sheet that is to answer at once
+LIBRARY: Mapping[str, str] = {
+    "arc": 'kind = "annulus_sector"\nradius = 100.0\nwidth = 25.0\nangle = 1.5708',
+    "pleats": 'kind = "annulus_sector"\nradius = [60.0, 75.0, 90.0]\nwidth = 15.0\nangle = 1.2\n'
+    'fold = ["mountain", "valley", "mountain"]',
+    "strip": 'kind = "strip"\nlength = 120.0\nwidth = 60.0\ncreases = [20.0, 40.0]\nfold = ["mountain", "valley"]',
+}
+ALONG, ROWS = 24, 3  # cells of the library's patterns
+
+
+@dataclass(frozen=True, eq=False)
+class LiveSheet:
+    """A sheet that can be put into the window.
+
+    Attributes:
+        name: of the file or the pattern.
+        model: without steps.
+        full: fold angle of every crease at 100 percent, rad.
+        tables: pattern, mesh and model as TOML, for the scene that comes out again; empty for a model of one's own.
+        remarks: one line each: what was assumed, and what to know of the sheet.
+        drawing: name and bytes of the file that `tables` speak of; None for a pattern of the library.
+        percent: of the way that is shown first.
+    """
+
+    name: str
+    model: Model
+    full: Mapping[str, float]
+    tables: str
+    remarks: tuple[str, ...] = ()
+    drawing: tuple[str, bytes] | None = None
+    percent: float = PERCENT
+
+    def of(self, sheet: Sheet) -> LiveSheet:
+        """The same pattern of another material."""
+        return replace(self, model=replace(self.model, sheet=sheet))
+
+
+def of_library(name: str, material: str = "card") -> LiveSheet:
+    """A pattern of the library.
+
+    Args:
+        name: one of `LIBRARY`.
+        material: one of `MATERIALS`.
+
+    Raises:
+        InputError: there is no such pattern or material.
+    """
+    if name not in LIBRARY:
+        raise InputError(f"there is no pattern '{name}'; choose one of {', '.join(LIBRARY)}")
+    tables = f'[pattern]\n{LIBRARY[name]}\n\n[mesh]\nkind = "staggered"\nalong = {ALONG}\nrows = {ROWS}\n'
+    young, nu, t, _ = material_of(material)
+    step = '[[steps]]\nfold = { crease = "all", by = 0.5 }\n'
+    scene = parse_scene(f"{tables}\n[sheet]\nE = {young}\nnu = {nu}\nt = {t}\n\n{step}", name=name)
+    return _live(name, scene, tables, ())
+
+
+def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
+    """A drawing as it was dropped.
+
+    Args:
+        name: of the file; its suffix says what it is.
+        data: its bytes.
+        material: one of `MATERIALS`.
+
+    Raises:
+        InputError: it is too long, cannot be read, has no crease, or no mesh for the window can be made of it.
+    """
+    if len(data) > LONGEST:
+        raise InputError(f"'{name}' is longer than {LONGEST // 10**6} MB; fold it by `bh fold`")
+    plain = Path(name.replace("\\", "/")).name or "drawing"
+    material_of(material)
+    with tempfile.TemporaryDirectory(prefix="bh-studio-") as place:
+        file = Path(place) / plain
+        file.write_bytes(data)
+        failed: InputError | None = None
+        for offer in proposals(file, Wish(material=material)):
+            if offer.text.splitlines().count("[mesh]") == 0:
+                continue  # a run to an accuracy is for `bh fold`
+            try:
+                scene = parse_scene(offer.text, file.parent, file.stem)
+            except InputError as error:
+                failed = failed or error
+                continue
+            if len(scene.model.mesh.triangles) > MOST_TRIANGLES:
+                failed = failed or InputError(
+                    f"'{plain}' has {len(scene.model.mesh.triangles)} triangles on the mesh of {offer.mesh}, "
+                    f"the window takes {MOST_TRIANGLES}; fold it by `bh fold`"
+                )
+                continue
+            tables = _tables(offer.text)
+            return replace(_live(plain, scene, tables, offer.assumed), drawing=(plain, data))
+    raise failed or InputError(f"'{plain}': no mesh of it can be made; see `bh check`")
+
+
+def of_model(model: Model, name: str = "model") -> LiveSheet:
+    """A model of one's own; what comes out again is Python, since no scene may describe its mesh.
+
+    Args:
+        model: its steps are left out.
+        name: to be shown.
+    """
+    return _live(name, Scene(model, Outputs()), "", ())
+
+
+def material_of(name: str) -> tuple[float, float, float, str]:
+    """E (MPa), nu, t (mm) and a description.
+
+    Raises:
+        InputError: there is no such material.
+    """
+    if name not in MATERIALS:
+        raise InputError(f"there is no material '{name}'; choose one of {', '.join(MATERIALS)}")
+    return MATERIALS[name]
+
+
+def _live(name: str, scene: Scene, tables: str, assumed: tuple[str, ...]) -> LiveSheet:
+    """The scene's model with the springs of its steps as crease laws, and how far each crease goes."""
+    model = scene.model
+    laws = dict(model.creases)
+    for step in model.steps:
+        for item in step.actuations:
+            if isinstance(item, Fold) and (item.Lstar is not None or item.stiffness is not None):
+                names = model.mesh.creases if item.crease == "all" else (item.crease,)
+                for crease in names:
+                    if model.mesh.folds.get(crease) != "flat":
+                        laws.setdefault(crease, CreaseLaw(item.Lstar, item.stiffness))
+    model = replace(model, creases=laws, steps=())
+    said = tuple(str(remark) for remark in remarks(model))
+    return LiveSheet(name, model, _full(model.mesh), tables, (*assumed, *said))
+
+
+def _full(mesh: SheetMesh) -> dict[str, float]:
+    """Mean drawn fold angle of every crease, rad; half a turn where none is drawn."""
+    found = {}
+    for name in mesh.creases:
+        drawn = np.abs(np.asarray(mesh.fold_angles.get(name, [math.nan])))
+        known = drawn[~np.isnan(drawn)]
+        found[name] = float(known.mean()) if len(known) else math.pi
+    return found
+
+
+def _tables(text: str) -> str:
+    """The tables of a scene that say what the sheet is: pattern, mesh and model."""
+    kept, on = [], False
+    for line in text.splitlines():
+        if line.startswith("["):
+            on = line.split("]")[0].strip("[") in ("pattern", "mesh", "model")
+        if on:
+            kept.append(line)
+    return "\n".join(kept).strip() + "\n"
+
+
+def quoted(text: str) -> str:
+    """Text as TOML and Python write it."""
+    return json.dumps(text)

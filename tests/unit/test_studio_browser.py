@@ -1,0 +1,183 @@
+"""The window in a real browser: drop, slide, pull, undo, export; no errors, nobody else is asked, axe-core, a phone."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bh
+from bh.scene.load import load_scene
+from bh.studio.server import Studio
+from reports.pdf import browser
+
+PROGRAM = browser()
+pytestmark = pytest.mark.skipif(
+    PROGRAM is None, reason="no chromium or chrome on this machine; .ci/run installs it"
+)
+OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+PATIENCE = 15_000  # ms
+DATA = Path(__file__).resolve().parents[1] / "data"
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """A server in a thread of its own."""
+    found: list[str] = []
+    ready, loop = threading.Event(), asyncio.new_event_loop()
+
+    async def serve() -> None:
+        studio = Studio()
+        site, where = studio.serve()
+        found.append(where)
+        ready.set()
+        try:
+            await asyncio.Event().wait()
+        finally:
+            site.stop()
+            studio.pool.shutdown(wait=False, cancel_futures=True)
+
+    def run() -> None:
+        asyncio.set_event_loop(loop)
+        tasks.append(loop.create_task(serve()))
+        try:
+            loop.run_until_complete(tasks[0])
+        except asyncio.CancelledError:
+            loop.close()
+
+    tasks: list[asyncio.Task[None]] = []
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    assert ready.wait(10.0)
+    yield found[0]
+    loop.call_soon_threadsafe(tasks[0].cancel)
+    thread.join(10.0)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    alone = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+    with api.sync_playwright() as driver:
+        found = driver.chromium.launch(executable_path=PROGRAM, args=[*OPTIONS, *alone])
+        yield found
+        found.close()
+
+
+class Visit:
+    """A window that is open, and what the browser had to say."""
+
+    def __init__(self, chromium: Any, address: str, width: int = 1400, **options: Any) -> None:
+        """Open it, and wait for the sheet; `bypass_csp` lets the test look into the page."""
+        self.context = chromium.new_context(
+            viewport={"width": width, "height": 820}, bypass_csp=True, accept_downloads=True, **options
+        )
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(PATIENCE)
+        self.told: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda message: self.told.append(f"{message.type}: {message.text}"))
+        self.page.on("pageerror", lambda error: self.told.append(f"error: {error}"))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(address)
+        self.page.wait_for_function("window.studio?.head")
+
+    def rests(self, condition: str = "true") -> None:
+        """Wait until the sheet is in equilibrium with what is asked, and a condition on `head` holds."""
+        self.page.wait_for_function(
+            f"(() => {{ const head = studio.head; return head.rest && ({condition}); }})()"
+        )
+
+    def points(self) -> np.ndarray[Any, Any]:
+        return np.array(self.page.evaluate("Array.from(studio.points)")).reshape(-1, 3)
+
+
+@pytest.fixture
+def window(chromium: Any, address: str) -> Iterator[Visit]:
+    found = Visit(chromium, address)
+    yield found
+    found.context.close()
+
+
+def test_fold_pull_undo_export(window: Visit, tmp_path: Path) -> None:
+    """What a person does in three minutes; the scene that comes out ends in the shape that was seen."""
+    page = window.page
+    page.set_input_files("#file", DATA / "pleats.svg")
+    page.wait_for_function("studio.sheet.name === 'pleats.svg'")
+    page.locator("#percent").fill("30")
+    window.rests("Object.values(head.asked)[0] > 0.5")
+    assert page.locator("#badge").inner_text() == "in equilibrium"
+    folded = window.points()
+    node = int(np.argmax(folded[:, 0] + folded[:, 1]))
+    x, y = page.evaluate(f"studio.place({node})")
+    inside = page.evaluate(
+        f"studio.place({int(np.argmin(np.linalg.norm(folded - folded.mean(axis=0), axis=1)))})"
+    )
+    x, y = x + 0.02 * (inside[0] - x), y + 0.02 * (inside[1] - y)  # just inside the rim
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for k in range(1, 6):
+        page.mouse.move(x, y - 8 * k)
+    page.mouse.up()
+    window.rests("Object.keys(head.forces).length === 1")
+    assert page.locator("#force").inner_text().endswith(" N")
+    page.locator("#let-go").click()
+    window.rests("Object.keys(head.forces).length === 0")
+    np.testing.assert_allclose(window.points(), folded, atol=1e-3)
+    page.locator("#percent").fill("40")
+    window.rests("Object.values(head.asked)[0] > 1.2")
+    page.keyboard.press("Control+z")
+    window.rests("Object.values(head.asked)[0] < 1.2")
+    np.testing.assert_allclose(window.points(), folded, atol=1e-3)
+    with page.expect_download() as waiting:
+        page.locator("#export").select_option("scene")
+    waiting.value.save_as(tmp_path / "scene.zip")
+    with zipfile.ZipFile(tmp_path / "scene.zip") as archive:
+        archive.extractall(tmp_path)
+    path = bh.trace(load_scene(tmp_path / "pleats.toml").model)
+    np.testing.assert_allclose(path[-1].points, window.points(), atol=1e-3)
+    assert window.told == []
+    home = page.url.split("?")[0]
+    assert [
+        url for url in window.asked if not url.startswith((home, "ws://127.0.0.1", "blob:", "data:"))
+    ] == []
+
+
+def test_what_cannot_be_opened_is_said_in_the_window(window: Visit, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.svg"
+    bad.write_text("no drawing at all")
+    window.page.set_input_files("#file", bad)
+    window.page.wait_for_function(
+        "!document.getElementById('message').hidden && /bad/.test(message.textContent)"
+    )
+    assert window.page.evaluate("studio.sheet.name") == "arc"
+
+
+def test_a_crease_lights_up_and_a_dot_holds(window: Visit) -> None:
+    page = window.page
+    page.locator("#flat g[data-crease]").first.focus()
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.dataset.crease") == "crease"
+    assert "lit" in (page.locator("#flat g[data-crease]").first.get_attribute("class") or "")
+    held = page.evaluate("studio.sheet.held.length")
+    page.locator("#flat circle:not(.held)").first.focus()
+    page.keyboard.press("Space")
+    page.wait_for_function(f"studio.sheet.held.length === {held + 1}")
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(360, "dark"), (1400, "light"), (2560, "dark")])
+def test_nobody_is_shut_out(chromium: Any, address: str, width: int, scheme: str) -> None:
+    """axe-core finds nothing, and nothing is wider than the window."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed").Axe()
+    seen = Visit(chromium, address, width, color_scheme=scheme)
+    violations = axe.run(seen.page).response["violations"]
+    assert [(item["id"], [node["html"][:90] for node in item["nodes"]]) for item in violations] == []
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+    seen.context.close()
