@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from bh.paths.path import Path
 
 ADVICE: dict[Outcome, str] = {
-    Outcome.LIMIT_POINT: "displace where the force acts, which goes on beyond the largest force",
+    Outcome.LIMIT_POINT: "impose the displacement or the angle in place of the force or couple; that goes on beyond "
+    "the largest one",
     Outcome.BIFURCATION: "leave the strategy out, or take at_bifurcation = 'stable', to follow the stable branch",
     Outcome.UNSTABLE: "look at path.critical_points, and at path.remarks for how the sheet would leave the state",
     Outcome.MECHANISM: "add supports, or stiffness to what moves",

@@ -42,7 +42,7 @@ def text(**given: Any) -> str:
 
 
 def early() -> bh.Model:
-    """A couple that no turn of the soft crease balances; nothing stops it from closing."""
+    """A couple that no turn of the soft crease balances."""
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.4), along=4)
     model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.1), formulation="bars-and-hinges", hinge_lock=False)
     return model.crease("crease", stiffness=0.1).fold("crease", rest=3.0).moment("crease", to=5.0)
@@ -57,13 +57,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_an_early_end_warns_raises_and_shows() -> None:
     with pytest.warns(
-        bh.NotReachedWarning, match=r"ended early, contact, in step 2 of 2 at lambda .*stop earlier"
+        bh.NotReachedWarning, match=r"ended early, limit-point, in step 2 of 2 at lambda 0\.0.*; impose the"
     ):
         path = bh.trace(early())
-    assert repr(path[-1]).endswith("ENDED EARLY: contact)")
+    assert repr(path[-1]).endswith("ENDED EARLY: limit-point)")
     assert "EARLY" not in repr(path[-2])
     assert path[-1] is path[-1]
-    with pytest.raises(bh.NotReachedError, match="the path ended early, contact"):
+    with pytest.raises(bh.NotReachedError, match="the path ended early, limit-point"):
         path.require()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -73,7 +73,7 @@ def test_an_early_end_warns_raises_and_shows() -> None:
 def test_an_early_end_is_still_told_when_it_is_loaded(tmp_path: Path) -> None:
     path = bh.trace(early(), warn=False)
     path.save(tmp_path / "x.bh")
-    assert "ENDED EARLY: contact" in repr(bh.Path.load(tmp_path / "x.bh")[-1])
+    assert "ENDED EARLY: limit-point" in repr(bh.Path.load(tmp_path / "x.bh")[-1])
 
 
 def test_a_path_that_is_reached_is_quiet() -> None:
