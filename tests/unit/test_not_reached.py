@@ -176,6 +176,40 @@ def test_results_are_read_back(here: Path) -> None:
     assert "not solved from a scene" in bh.read("other.bh").scene_reason
 
 
+def union_jack(skew: float) -> meshes.SheetMesh:
+    """A sector of 4 x 16 cells whose diagonals meet in every second node; cross lines are turned by the skew, rad."""
+    r, a = np.meshgrid(np.linspace(90.0, 110.0, 5), np.linspace(0.0, 0.785, 17), indexing="ij")
+    a = a + skew * (r - 100.0) / 100.0
+    points = np.column_stack(((r * np.cos(a)).ravel(), (r * np.sin(a)).ravel()))
+    triangles = []
+    for i in range(4):
+        for j in range(16):
+            p, q = 17 * i + j, 17 * (i + 1) + j
+            cells = (
+                [(p, q, q + 1), (p, q + 1, p + 1)] if (i + j) % 2 == 0 else [(p, q, p + 1), (q, q + 1, p + 1)]
+            )
+            triangles += cells
+    crease = np.array([(34 + j, 35 + j) for j in range(16)])
+    return meshes.SheetMesh(
+        points, np.array(triangles), {"crease:crease": crease}, folds={"crease": "mountain"}
+    )
+
+
+def test_imported_meshes_get_remarks_and_locked_creases_are_said() -> None:
+    """Nodes of four edges beside the normal of the crease make imposed angles lock: 17.4 in place of 0.083 N mm."""
+    energies = []
+    for skew in (0.0, 0.02):
+        model = bh.Model(union_jack(skew), bh.Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges")
+        spring = model.fold("crease", by=1.57, Lstar=25.0)
+        model = model.fold("crease", by=1.57)
+        codes = [remark.code for remark in bh.remarks(model)]
+        assert "crease" in codes
+        assert ("four-edges" in codes) == (skew > 0.0)
+        assert "four-edges" not in [remark.code for remark in bh.remarks(spring)]
+        energies.append(bh.trace(model, warn=False)[-1].energy.total)
+    assert energies[1] > 100.0 * energies[0]
+
+
 def test_patterns_print_as_one_line() -> None:
     assert repr(meshes.strip(100.0, 40.0, [20.0])) == "CreasePattern(100 x 40 mm, 1 crease)"
     assert repr(meshes.full_annulus([20.0, 30.0], 5.0)) == "CreasePattern(70 x 70 mm, 2 creases, 1 hole)"
