@@ -144,7 +144,8 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
-    from bh.commands.run import UNFINISHED, holds_states, solve, write_extras
+    from bh.commands.occupied import UNFINISHED
+    from bh.commands.run import holds_states, solve, write_extras
     from bh.commands.summary import summary
     from bh.scene.load import load_scene
 
@@ -207,7 +208,7 @@ def view(
     state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
 ) -> None:
     """Show a state of a solved path, or draw it to a file."""
-    from bh.commands.run import path_file
+    from bh.commands.occupied import path_file
     from bh.errors import InputError
     from bh.paths.path import Path as Trace
 
@@ -254,7 +255,7 @@ def export(
 
         done = write_flat(file, load_scene(source).model.mesh, facets)
     else:
-        from bh.commands.run import path_file
+        from bh.commands.occupied import path_file
         from bh.paths.path import Path as Trace
 
         solved = Trace.load(path_file(source) if source.is_dir() else source)

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bh.analysis.contact import first_contact
+from bh.commands.occupied import FINISHED, UNFINISHED
 from bh.commands.run import (
-    FINISHED,
-    UNFINISHED,
     make_folder,
     remove_extras,
     result,

@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 
-from bh.commands.run import FINISHED, UNFINISHED, path_file
+from bh.commands.occupied import FINISHED, UNFINISHED, path_file
 from bh.errors import InputError, PathFileError
 from bh.paths.path import Path
 from bh.paths.storage import PathFile, reading

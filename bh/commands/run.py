@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bh.analysis.contact import Contact, first_contact
+from bh.commands.occupied import FINISHED, UNFINISHED, changed, check_folder
 from bh.errors import InputError
-from bh.model.compare import differing_keys, in_words
 from bh.model.serialise import fingerprint
 from bh.paths.export import FOLDED, write_flat, write_state
 from bh.paths.path import Path as Trace
@@ -33,8 +33,6 @@ from bh.solving.levels import folder_of, move
 from bh.solving.levels import remove as remove_levels
 from bh.solving.trace import trace
 from meshes.io.export import replacing
-
-FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
 
 
 class Solved(NamedTuple):
@@ -105,8 +103,8 @@ def _solved(
 ) -> Solved:
     """What `solve` gives, of a folder that nobody else writes."""
     file = folder / names[0]
-    changed = resume and names == FINISHED and _is_finished(folder) and _changed(file, scene)
-    if changed:  # the finished one stays until this one is finished, too
+    goes_on = resume and names == FINISHED and _is_finished(folder) and changed(file, scene)
+    if goes_on:  # the finished one stays until this one is finished, too
         check_resumable(file, scene.model)
         names, file = UNFINISHED, folder / UNFINISHED[0]
         shutil.copyfile(folder / FINISHED[0], file)
@@ -168,66 +166,6 @@ def _is_whole(file: Path, scene: Scene) -> bool:
     with contextlib.closing(PathFile.open(file)) as stored, reading(file):
         outcomes = [outcome for outcome, *_ in stored.steps().values()]
     return outcomes == [Outcome.REACHED] * len(model.steps)
-
-
-def path_file(folder: Path) -> Path:
-    """The path file in the output folder of a run.
-
-    Raises:
-        InputError: there is none.
-    """
-    for name, _ in (FINISHED, UNFINISHED):
-        if (folder / name).is_file():
-            return folder / name
-    raise InputError(f"there is no {FINISHED[0]} in '{folder}'; give the output folder of `bh run`")
-
-
-def _changed(file: Path, scene: Scene) -> bool:
-    """True if a path file is of another model than the scene's own."""
-    if scene.accuracy is not None:
-        return False
-    with contextlib.closing(PathFile.open(file)) as stored, reading(file):
-        return bool(stored.meta()["provenance"]["input"] != fingerprint(scene.model))
-
-
-def check_folder(folder: Path, scene: Scene) -> None:
-    """See that a new run does not take the place of a run that was stopped, or of one of another scene.
-
-    Args:
-        folder: for the files, which need not exist.
-        scene: to be solved.
-
-    Raises:
-        InputError: it would; one line that names what differs, and what to add to the command.
-    """
-    for name in (UNFINISHED[0], FINISHED[0]):
-        file = folder / name
-        meshes = sorted(folder_of(file).glob("*.bh"))
-        found = file if file.is_file() else meshes[-1] if meshes else None
-        if found is None:
-            continue
-        try:
-            with contextlib.closing(PathFile.open(found)) as stored, reading(found):
-                data, arrays = stored.meta(), stored.arrays()
-                ends, states = stored.steps(), sum(1 for _ in stored.states())
-        except InputError:
-            continue  # no path file: there is nothing to lose
-        keys = differing_keys(data["model"], arrays, scene.model, chosen=scene.accuracy is not None)
-        other = "or choose another folder with -o"
-        if keys:
-            raise InputError(
-                f"'{folder}' holds a run of another scene (it differs in {in_words(keys)}); add --force to replace "
-                f"it, --resume to go on from it where only later steps changed, {other}"
-            )
-        stopped = not file.is_file() or (
-            len(ends) < len(data["model"]["steps"])
-            and all(end[0] == Outcome.REACHED for end in ends.values())
-        )
-        if stopped and states:
-            raise InputError(
-                f"'{folder}' holds a run of this scene that was stopped; add --resume to go on from it, --force to "
-                f"begin anew, {other}"
-            )
 
 
 def holds_states(folder_or_file: Path) -> bool:

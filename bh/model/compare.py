@@ -5,19 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from itertools import zip_longest
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from bh.model.model import Model
 from bh.model.serialise import AnyArray, describe
 
+Data = Mapping[str, object]
 CHOSEN = ("mesh", "formulation")  # by a run to an accuracy, whatever the scene has there
 MOST = 5  # keys in a message
 
 
 def differing_keys(
-    data: Mapping[str, Any], arrays: Mapping[str, AnyArray], model: Model, chosen: bool = False
+    data: Data, arrays: Mapping[str, AnyArray], model: Model, chosen: bool = False
 ) -> list[str]:
     """Keys by which a stored model differs from another one: "sheet.t = 0.1, now 0.2", "steps[1]".
 
@@ -33,10 +34,12 @@ def differing_keys(
     now, new = describe(model)
     now = json.loads(json.dumps(now))
     if chosen:
-        same_curves = data["mesh"]["curves"] == now["mesh"]["curves"]
+        same_curves = cast("Data", data["mesh"])["curves"] == now["mesh"]["curves"]
         found = [] if same_curves else ["pattern"]
     else:
-        found = [] if _same_mesh(data["mesh"], arrays, now["mesh"], new) else ["pattern or mesh"]
+        found = (
+            [] if _same_mesh(cast("Data", data["mesh"]), arrays, now["mesh"], new) else ["pattern or mesh"]
+        )
     for key in ("formulation", "sheet", "supports", "creases", "steps", "hinge_lock", "green"):
         if not (chosen and key in CHOSEN):
             found += _differing(key, data.get(key), now.get(key))
@@ -60,9 +63,9 @@ def in_words(keys: list[str]) -> str:
 
 
 def _same_mesh(
-    one: Mapping[str, Any],
+    one: Data,
     stored: Mapping[str, AnyArray],
-    other: Mapping[str, Any],
+    other: Data,
     new: Mapping[str, AnyArray],
 ) -> bool:
     remarks = ({key: value for key, value in each.items() if key != "remarks"} for each in (one, other))
@@ -74,15 +77,14 @@ def _same_mesh(
     )
 
 
-def _differing(at: str, old: Any, new: Any) -> list[str]:
+def _differing(at: str, old: object, new: object) -> list[str]:
     """Dotted keys below `at` whose values differ."""
     if old == new:
         return []
     if isinstance(old, dict) and isinstance(new, dict) and old.get("kind") == new.get("kind"):
         keys = dict.fromkeys((*old, *new))
         return [each for key in keys for each in _differing(f"{at}.{key}", old.get(key), new.get(key))]
-    lists = isinstance(old, list) and isinstance(new, list)
-    if lists and any(isinstance(each, dict | str) for each in (*old, *new)):
+    if isinstance(old, list) and isinstance(new, list) and _of_words((*old, *new)):
         pairs = enumerate(zip_longest(old, new))
         if at == "steps":
             return [f"steps[{i}]{_what(a, b)}" for i, (a, b) in pairs if a != b]
@@ -90,18 +92,25 @@ def _differing(at: str, old: Any, new: Any) -> list[str]:
     return [f"{at} = {_shown(old)}, now {_shown(new)}"]
 
 
-def _what(old: Any, new: Any) -> str:
+def _of_words(items: tuple[object, ...]) -> bool:
+    """True where a list is one of things, not of numbers."""
+    return any(isinstance(each, dict | str) for each in items)
+
+
+def _what(old: object, new: object) -> str:
     """What is different in a step, shortly: the key where it is one, else nothing."""
     if old is None or new is None:
         return " (added)" if old is None else " (removed)"
-    if len(old["actuations"]) != len(new["actuations"]):
+    before, after = cast("Data", old), cast("Data", new)
+    were, are = (cast("list[Data]", each["actuations"]) for each in (before, after))
+    if len(were) != len(are):
         return ""
-    acts = zip(old["actuations"], new["actuations"], strict=True)
+    acts = zip(were, are, strict=True)
     keys = [key for a, b in acts for key in _differing(f".{a.get('kind')}", a, b)]
-    keys += _differing(".until", old["until"], new["until"])
+    keys += _differing(".until", before["until"], after["until"])
     return keys[0] if len(keys) == 1 else ""
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     text = json.dumps(value) if value is not None else "nothing"
     return text if len(text) <= 40 else text[:36] + " ..."

@@ -1,13 +1,8 @@
-"""A path that did not reach its end in one line: how far it came, why it ended there, and what to try."""
+"""What to try where a path did not reach its end, by its outcome."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from bh.solvers.outcome import Outcome
-
-if TYPE_CHECKING:
-    from bh.paths.path import Path
 
 ADVICE: dict[Outcome, str] = {
     Outcome.LIMIT_POINT: "impose the displacement or the angle in place of the force or couple; that goes on beyond "
@@ -21,17 +16,3 @@ ADVICE: dict[Outcome, str] = {
     Outcome.TARGET_MISSED: "let the actuation go further, or ask for a value that occurs",
     Outcome.UNFINISHED: "go on with resume",
 }
-
-
-def told(path: Path) -> str:
-    """Outcome, place, reason and advice of a path in one line.
-
-    Args:
-        path: that did not reach its end.
-    """
-    number = min(len(path.steps), len(path.model.steps))
-    lam = path.records[-1].lam if path.records and path.records[-1].step == number - 1 else 0.0
-    reason = f" ({path.reason})" if path.reason else ""
-    where = f"step {max(number, 1)} of {len(path.model.steps)} at lambda {lam:.3g}"
-    advice = ADVICE.get(path.outcome, "")
-    return f"the path ended early, {path.outcome}, in {where}{reason}" + (f"; {advice}" if advice else "")

@@ -20,7 +20,7 @@ from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd, open_ends
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
-from bh.paths.advice import told
+from bh.paths.advice import ADVICE
 from bh.paths.provenance import provenance_of
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
@@ -101,6 +101,21 @@ class Path:
         """Did a step end before its actuations were complete, so that the last state is not what was asked for?"""
         return any(not step.reached for step in self.steps)
 
+    @property
+    def early_end(self) -> str:
+        """Outcome, place, reason and advice of a path that did not reach its end, one line; empty where it did."""
+        if self.reached:
+            return ""
+        number = min(max(len(self.steps), 1), len(self.model.steps))
+        last = self.records[-1] if self.records else None
+        lam = last.lam if last is not None and last.step == number - 1 else 0.0
+        reason = f" ({self.reason})" if self.reason else ""
+        advice = ADVICE.get(self.outcome, "")
+        return (
+            f"the path ended early, {self.outcome}, in step {number} of {len(self.model.steps)} at lambda {lam:.3g}"
+            f"{reason}" + (f"; {advice}" if advice else "")
+        )
+
     def require(self) -> Path:
         """The path itself, if every step was reached: `bh.trace(model).require()[-1]`.
 
@@ -108,7 +123,7 @@ class Path:
             NotReachedError: one was not; reason and advice in one line.
         """
         if not self.reached:
-            raise NotReachedError(told(self))
+            raise NotReachedError(self.early_end)
         return self
 
     @property

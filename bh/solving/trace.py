@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from bh.errors import ModelError, NotReachedWarning
 from bh.model.model import Model
-from bh.paths.advice import told
 from bh.paths.path import Path
 from bh.runtime.compiling import compilation_told
 from bh.runtime.progress import ProgressMeter, meter
@@ -91,7 +90,7 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
             if file is not None:
                 path.save_accuracy(file)
     if warn and not path.reached:
-        warnings.warn(told(path), NotReachedWarning, stacklevel=2)
+        warnings.warn(path.early_end, NotReachedWarning, stacklevel=2)
     return path
 
 

@@ -219,6 +219,9 @@ def tied_nodes(mesh: SheetMesh, crease: str) -> list[int]:
     Args:
         mesh: flat.
         crease: its name.
+
+    Returns:
+        node indices, in order.
     """
     edges = mesh.topology.edges
     degree = np.bincount(edges.ravel(), minlength=len(mesh.points))
