@@ -85,7 +85,7 @@ def write_index(source: Path, gallery: bool) -> None:
     trees = {caption: [f"docs/{name}" for name in names] for caption, names in PAGES.items()}
     trees["Studies"] += [f"docs/{name}" for name in rest]
     trees["Use"].insert(1, "gallery/index" if gallery else "examples/README")
-    trees["Use"] += ["examples/README"] if gallery else []
+    trees["Use"] += [*(["examples/README"] if gallery else []), "examples/own_project/README"]
     trees["Project"] = ["CONTRIBUTING", *trees["Project"], "SECURITY", "CHANGELOG"]
     trees["Reference"] = ["reference/index"]
     for caption, pages in trees.items():

@@ -19,6 +19,7 @@ import numpy as np
 
 from bh.analysis.contact import Contact, first_contact
 from bh.commands.occupied import FINISHED, UNFINISHED, changed, check_folder
+from bh.commands.result import result
 from bh.errors import InputError
 from bh.model.serialise import fingerprint
 from bh.paths.export import FOLDED, write_flat, write_state
@@ -28,6 +29,7 @@ from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
+from bh.solvers.trace import Strategy
 from bh.solving.follow import check_resumable
 from bh.solving.levels import folder_of, move
 from bh.solving.levels import remove as remove_levels
@@ -59,6 +61,7 @@ def solve(
     force: bool = False,
     progress: bool | ProgressMeter = False,
     estimate: bool = True,
+    strategy: Strategy | None = None,
 ) -> Solved:
     """Trace a scene into a folder, which is made if need be.
 
@@ -71,6 +74,7 @@ def solve(
         force: begin anew where the folder holds a run that was stopped, or one of another scene.
         progress: as for `bh.trace`.
         estimate: solve a coarser mesh, too, where the mesh was given, for an estimate of the error.
+        strategy: of the increments; None for the scene's.
 
     Raises:
         InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
@@ -84,7 +88,9 @@ def solve(
     try:
         with only_writer(folder):
             ours = True
-            return _solved(scene, folder, names, resume=resume, progress=progress, estimate=estimate)
+            return _solved(
+                scene, folder, names, resume=resume, progress=progress, estimate=estimate, strategy=strategy
+            )
     except (InputError, KeyboardInterrupt):
         if ours and not resume and not holds_states(folder):
             remove_levels(folder_of(folder / names[0]))
@@ -100,6 +106,7 @@ def _solved(
     resume: bool,
     progress: bool | ProgressMeter,
     estimate: bool,
+    strategy: Strategy | None,
 ) -> Solved:
     """What `solve` gives, of a folder that nobody else writes."""
     file = folder / names[0]
@@ -119,6 +126,7 @@ def _solved(
         resume=resume,
         accuracy=scene.accuracy,
         symmetry=scene.symmetry,
+        strategy=strategy or scene.strategy,
         estimate=estimate and scene.accuracy is None,
         warn=False,  # the command says it in a line of its own
     )
@@ -259,91 +267,6 @@ def _move(file: Path, place: Path) -> None:
     # a journal that a killed run left there belongs to the file that goes
     place.with_name(place.name + "-journal").unlink(missing_ok=True)
     file.replace(place)
-
-
-def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, object]:
-    """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact.
-
-    Args:
-        path: solved, as far as it goes.
-        scene: that it is of.
-        contact: the path's first self-contact, if any.
-    """
-    model = path.model
-    mesh, last = model.mesh, path[-1]
-    folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
-    steps = []
-    for number in range(len(model.steps)):
-        records = [record for record in path.records if record.step == number]
-        tried = number < len(path.steps)
-        steps.append(
-            {
-                "outcome": path.steps[number].outcome if tried else "not tried",
-                "reason": path.steps[number].reason if tried else "an earlier step ended early",
-                "states": len(records),
-                "iterations": sum(record.iterations for record in records),
-            }
-        )
-    return {
-        "outcome": path.outcome,
-        "reason": path.reason,
-        "stable": path.stable,
-        "remarks": path.remarks,
-        "critical_points": [
-            {
-                "step": step,
-                "kind": c.kind,
-                "lambda": c.lam,
-                "error": c.error,
-                "negative_modes": list(c.negative),
-            }
-            for step, c in path.critical_points
-        ],
-        "energy": {kind: _number(value) for kind, value in last.energy.as_dict().items()},
-        "lock_energy": _number(last.energy.lock),
-        "fold_angle": {
-            crease: {"mean": _number(a.mean()), "min": _number(a.min()), "max": _number(a.max())}
-            for crease, a in folds.items()
-            if len(a)
-        },
-        "self_contact": _contact(path, contact),
-        "steps": steps,
-        "iterations": path.iterations,
-        "wall_time_s": path.wall_time_s,
-        "unknowns": path.unknowns,
-        "mesh": {
-            "nodes": len(mesh.points),
-            "triangles": len(mesh.triangles),
-            "aspect_ratio": _number(mesh.aspect_ratio),
-        },
-        "formulation": model.formulation,
-        "accuracy": path.accuracy.as_dict() if path.accuracy is not None else None,
-        "no_estimate": path.estimate_reason or None,
-        "versions": path.provenance["versions"],
-        "input": path.provenance["input"],
-        "scene": str(scene.source),
-    }
-
-
-def _contact(path: Trace, contact: Contact | None) -> dict[str, object]:
-    """Whether the sheet passes through itself, and where first; of very many triangle pairs the first hundred."""
-    found: dict[str, object] = {"found": contact is not None, "states": len(path)}
-    if contact is not None:
-        found |= {
-            "about": "reported, not prevented: from this state on the sheet passes through itself",
-            "state": contact.state,
-            "step": contact.step,
-            "lambda": contact.lam,
-            "panels": [list(pair) for pair in contact.panels],
-            "triangle_pairs": len(contact.triangles),
-            "triangles": contact.triangles[:100].tolist(),
-        }
-    return found
-
-
-def _number(value: float) -> float | None:
-    """A number that JSON can hold; there is none for nan."""
-    return float(value) if abs(value) < float("inf") else None
 
 
 def remove_extras(folder: Path, mark: str) -> None:
