@@ -203,7 +203,10 @@ def test_a_finished_result_is_never_lost(here: Any, capsys: pytest.CaptureFixtur
     def still_kept() -> Any:
         return all((here / "out" / name).read_bytes() == content for name, content in kept.items())
 
-    assert main(["run", "early.toml", "-o", "out", "-q"]) == 1
+    assert main(["run", "early.toml", "-o", "out", "-q"]) == 2
+    assert "holds a run of another scene (it differs in " in capsys.readouterr().err
+    assert still_kept()
+    assert main(["run", "early.toml", "-o", "out", "-q", "--force"]) == 1
     assert still_kept()
     assert "earlier run is kept" in capsys.readouterr().err
     assert result("out/result-unfinished.json")["steps"][0]["outcome"] == "reached"
@@ -211,7 +214,7 @@ def test_a_finished_result_is_never_lost(here: Any, capsys: pytest.CaptureFixtur
     assert main(["run", "bad.toml", "-o", "out"]) == 2
     assert still_kept()
     # the next run that reaches its end takes the place
-    assert main(["run", "two.toml", "-o", "out", "-q"]) == 0
+    assert main(["run", "two.toml", "-o", "out", "-q", "--force"]) == 0
     assert sorted(os.listdir("out")) == ["path.bh", "result.json"]
     assert result("out/result.json")["scene"] == "two.toml"
     assert len(Trace.load("out/path.bh").steps) == 2
@@ -219,7 +222,7 @@ def test_a_finished_result_is_never_lost(here: Any, capsys: pytest.CaptureFixtur
 
 def test_an_early_end_is_replaced(here: Any) -> None:
     assert main(["run", "early.toml", "-o", "out", "-q"]) == 1
-    assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
+    assert main(["run", "good.toml", "-o", "out", "-q", "--force"]) == 0
     assert result("out/result.json")["outcome"] == "reached"
     assert sorted(os.listdir("out")) == ["path.bh", "result.json"]
 
@@ -279,7 +282,7 @@ def test_resume_finds_the_run_that_was_begun_beside_a_finished_one(
 ) -> None:
     assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
     interrupt_after(2, monkeypatch)
-    assert main(["run", "two.toml", "-o", "out"]) == 130
+    assert main(["run", "two.toml", "-o", "out", "--force"]) == 130
     assert "bh run two.toml -o out --resume" in capsys.readouterr().err
     monkeypatch.undo()
     monkeypatch.chdir(here)
@@ -406,13 +409,15 @@ def test_extras_of_an_older_run_do_not_stay(here: Any) -> None:
         main(["run", "asks.toml", "-o", "out", "-q", "--resume"]) == 0
     )  # nothing new: they are of this result
     assert set(os.listdir("out")) == {*ours, "folded.png", "path.pvd", "path"}
-    assert main(["run", "early.toml", "-o", "out", "-q"]) == 1  # nor does a run that is not kept touch them
+    assert (
+        main(["run", "early.toml", "-o", "out", "-q", "--force"]) == 1
+    )  # nor does a run that is not kept touch them
     assert {"folded.png", "path.pvd", "folded.fold"} <= set(os.listdir("out"))
     (here / "out" / "folded-unfinished.png").touch()
-    assert main(["run", "two.toml", "-o", "out", "-q"]) == 0
+    assert main(["run", "two.toml", "-o", "out", "-q", "--force"]) == 0
     assert sorted(os.listdir("out")) == ["path", "path.bh", "result.json"]
     assert os.listdir("out/path") == ["notes.txt"]
-    assert main(["run", "asks.toml", "-o", "out", "-q"]) == 0
+    assert main(["run", "asks.toml", "-o", "out", "-q", "--force"]) == 0
     assert sorted(os.listdir("out")) == [ours[0], "path", *ours[1:]]
 
 
