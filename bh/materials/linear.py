@@ -97,6 +97,10 @@ def turned(matrix: Array, angle: Array) -> Array:
     """(k, 3, 3) moduli in axes that stand at angles (k,) rad to those in which they are `matrix` (3, 3).
 
     The energy of a strain stays: C' = T^T C T where T makes a strain (xx, yy, 2 xy) in the old axes of one in the new.
+
+    Args:
+        matrix: (3, 3) for components (xx, yy, 2 xy).
+        angle: (k,) from the old x axis to the new ones, rad.
     """
     c, s = np.cos(angle), np.sin(angle)
     T = np.empty((len(c), 3, 3))
