@@ -145,12 +145,7 @@ def consistent_elements(
     # local axes are turned in blocks of three rows: there must be as many nodes, be they none
     nodes = np.pad(nodes, ((0, 0), (0, -(-int(width.max()) // 3) - nodes.shape[1])), constant_values=-1)
 
-    reference = dihedral_angles(mesh.points, topology.hinges)
     prescribed = load_step.prescribed_angles(prescribed_start)
-    rest = [
-        np.append(np.where(law == PRESCRIBED, at, reference), np.pi)[joined.hinge]
-        for at in (prescribed.start, prescribed.end)
-    ]
     springs = np.flatnonzero(spring)
     ends = mesh.points[topology.hinges[:, 1:3]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -165,7 +160,7 @@ def consistent_elements(
         heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2),
         stretching=Stretching(membrane, of_strain, mesh.points),
         bending=Bending(joined, bending_law, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
-        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
+        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=_rest(mesh, joined, law, prescribed), nodes=nodes,
         width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=Ramp(begin, load_step.rest.end[springs]),
         couple=couple,
@@ -288,6 +283,16 @@ def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     ghost[clamp] = np.cross(points[:, 2] - points[:, 1], normal)
     return quad, ghost
+
+
+def _rest(mesh: SheetMesh, joined: Patches, law: Ints, prescribed: Ramp) -> Ramp:
+    """(c, a) rest dihedral angles of the patches: imposed ones, those of the stress-free sheet, and pi at clamps, rad."""
+    reference = dihedral_angles(mesh.points, mesh.topology.hinges)
+    start, end = (
+        np.append(np.where(law == PRESCRIBED, at, reference), np.pi)[joined.hinge]
+        for at in (prescribed.start, prescribed.end)
+    )
+    return Ramp(start, end)
 
 
 def _rows(joined: Patches, quad: Ints) -> tuple[Ints, Ints]:
