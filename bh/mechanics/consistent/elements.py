@@ -160,8 +160,8 @@ def consistent_elements(
         heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2),
         stretching=Stretching(membrane, of_strain, mesh.points),
         bending=Bending(joined, bending_law, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
-        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=_rest(mesh, joined, law, prescribed), nodes=nodes,
-        width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
+        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, width=width, nodes=nodes,
+        rest=_rest(mesh, joined, law, prescribed), springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=Ramp(begin, load_step.rest.end[springs]),
         couple=couple,
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
@@ -286,7 +286,7 @@ def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
 
 
 def _rest(mesh: SheetMesh, joined: Patches, law: Ints, prescribed: Ramp) -> Ramp:
-    """(c, a) rest dihedral angles of the patches: imposed ones, those of the stress-free sheet, and pi at clamps, rad."""
+    """(c, a) rest dihedral angles of the patches: imposed, of the stress-free sheet, pi at clamps, rad."""
     reference = dihedral_angles(mesh.points, mesh.topology.hinges)
     start, end = (
         np.append(np.where(law == PRESCRIBED, at, reference), np.pi)[joined.hinge]
