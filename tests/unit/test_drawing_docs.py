@@ -210,7 +210,7 @@ class TestRemarks:
             ("aspect_ratio = 8.0\nkind = 'alternating'", ["crease"]),
             ("aspect_ratio = 8.0\nkind = 'one-way'", ["crease", "diagonals"]),
             ("aspect_ratio = 8.0\nkind = 'mirrored'\nrows = 2", ["crease", "diagonals", "rows"]),
-            ("size = 3.0\nkind = 'gmsh'", ["rulings"]),
+            ("size = 3.0\nkind = 'gmsh'", ["crease", "rulings"]),
         ],
     )
     def test_bars_and_hinges(self, mesh: str, codes: Any) -> None:
