@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
 from bh.materials import Constant, LinearElastic, Material
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.bending import Bending
+from bh.mechanics.consistent.clamps import clamps
 from bh.mechanics.consistent.kernels import OWN, TURN
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.patches import (
@@ -58,6 +60,7 @@ class ConsistentElements:
         prescribed: (m,) prescribed dihedral angles at every hinge, rad; nan where it is not prescribed.
         lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at prescribed ones.
         rotations: how many there are.
+        let_go: (rotations,) couples of clamps that are let go of, on the rotations of their edges, N mm.
     """
 
     members: Ints
@@ -84,6 +87,7 @@ class ConsistentElements:
     prescribed: Ramp
     lock: Array
     rotations: int
+    let_go: Ramp
 
 
 def consistent_elements(
@@ -94,6 +98,7 @@ def consistent_elements(
     plane: Mirror | None = None,
     measure: Measure = smoothed_strain,
     material: Material = LINEAR,
+    start: State | None = None,
 ) -> ConsistentElements:
     """Element arrays of a model in one step.
 
@@ -105,6 +110,7 @@ def consistent_elements(
         plane: of the symmetry, for the half of a sheet (`bh.mechanics.shared.mirrored`); None for all.
         measure: of the strain.
         material: laws of strain and of curvature.
+        start: the state that the step begins at, for clamps as it lies; None for the stress-free sheet.
 
     Raises:
         ModelError: given element stiffness, or a couple on a crease that is no spring.
@@ -117,20 +123,23 @@ def consistent_elements(
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
     maps, of_curvature = curvature_maps(edges, areas), material.bending(sheet)
     B = bending_matrices(maps, areas, of_curvature.moduli(np.zeros((1, 3)))[0])
-    clamped = np.zeros(len(topology.edges), dtype=bool)
-    clamped[topology.find_edges(load_step.constraints.clamped)] = True
+    held = clamps(mesh, load_step, start)
     spring = law == SPRING
     part = None if plane is None else plane.triangle_weight
     condense = isinstance(of_curvature, Constant)
-    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part, condense=condense)
+    joined = patches(mesh, B, spring, held.edges, triangle_ranks(mesh), group=part, condense=condense)
     if plane is not None:
         from bh.mechanics.consistent.half import half_patches
 
         joined = half_patches(joined, spring, plane)
-    rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
+    let_go = joined.kind == TURN  # edges of the boundary whose rotation is free, but loaded
+    let_go &= (joined.hinge < 0) & (held.couple != 0.0)[_edges(mesh, joined)]
+    rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane, let_go)
+    couples = np.zeros(rotations)
+    couples[rotation[let_go]] = held.couple[_edges(mesh, joined)[let_go]]
     part_area = areas if part is None else part * areas
     membrane, law_of_strain = measure(mesh, creased(mesh, law)), material.stretching(sheet)
-    quad, ghost = _quads(mesh, joined)
+    quad, ghost = _quads(mesh, joined, held.outward)
     nodes, place = _rows(joined, quad)
     has = rotation >= 0
     in_nodes = 3 * (nodes >= 0).sum(axis=1)
@@ -164,6 +173,7 @@ def consistent_elements(
         couple=couple,
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
         lock=lock_stiffness(model, load_step), rotations=rotations,
+        let_go=Ramp(couples, np.zeros(rotations)),
     )  # fmt: skip
     return whole if plane is None else _half(whole, plane)
 
@@ -229,13 +239,19 @@ def triangle_ranks(mesh: SheetMesh) -> Array:
     return np.asarray(position[mesh.triangles].mean(axis=1))
 
 
+def _edges(mesh: SheetMesh, joined: Patches) -> Ints:
+    """(c, a) edge of every angle; of any edge where there is none."""
+    return np.asarray(mesh.topology.triangle_edges.ravel()[joined.half_edge])
+
+
 def _number_rotations(
-    mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None
+    mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None, let_go: Bools
 ) -> tuple[Ints, Ints, int]:
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
 
     There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that
-    keeps its own; but one for a spring in the plane of a symmetric sheet, and none for what lies outside of its half.
+    keeps its own, as those do whose clamp is `let_go` (c, a); but one for a spring in the plane of a symmetric sheet,
+    and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
     two_sided = spring.copy()
@@ -250,13 +266,16 @@ def _number_rotations(
     side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
     has = (joined.hinge >= 0) & ~joined.inner
     rotation = np.where(has, both[joined.hinge, side], -1)
-    free = (joined.hinge < 0) & (joined.kind == OWN)
+    free = ((joined.hinge < 0) & (joined.kind == OWN)) | let_go
     rotation[free] = count.sum() + np.arange(free.sum())
     return rotation, both, int(count.sum() + free.sum())
 
 
-def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
-    """Nodes (c, a, 4) of TURN angles, and ghosts (c, a, 3) of clamps: where the sheet would go on, mm."""
+def _quads(mesh: SheetMesh, joined: Patches, outward: Array) -> tuple[Ints, Array]:
+    """Nodes (c, a, 4) of TURN angles, and ghosts (c, a, 3) of clamps: where the sheet would go on, mm.
+
+    That is `outward` (e, 3) where it is given, else as in the stress-free sheet.
+    """
     quad = np.zeros((*joined.kind.shape, 4), dtype=np.int64)
     ghost = np.zeros((*joined.kind.shape, 3))
     turning = (joined.kind == TURN) & (joined.hinge >= 0)
@@ -269,7 +288,8 @@ def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
     points = mesh.points[quad[clamp]]
     normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    ghost[clamp] = np.cross(points[:, 2] - points[:, 1], normal)
+    given = outward[_edges(mesh, joined)[clamp]]
+    ghost[clamp] = np.where(np.isnan(given), np.cross(points[:, 2] - points[:, 1], normal), given)
     return quad, ghost
 
 
