@@ -153,13 +153,16 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type], kind: type | N
     return from_file(data["kind"], kind)(**lists)
 
 
-def _step(step: Step) -> dict[str, Any]:
+def _step(step: Step) -> dict[str, object]:
     actuations = [_tagged(item, STEP_ITEMS) for item in step.actuations]
-    found: dict[str, Any] = {
-        "actuations": [_without_none(item, "further") for item in actuations],
+    for item in actuations:  # models of versions without it keep their fingerprint
+        if item.get("further", 0.0) is None:
+            del item["further"]
+    found: dict[str, object] = {
+        "actuations": actuations,
         "until": None if step.until is None else _plain(step.until),
     }
-    if step.support:  # models of versions without these keep their fingerprint
+    if step.support:
         found["support"] = [_support(item) for item in step.support]
     if step.release:
         found["release"] = [
@@ -167,10 +170,6 @@ def _step(step: Step) -> dict[str, Any]:
             for item in step.release
         ]
     return found
-
-
-def _without_none(data: dict[str, Any], key: str) -> dict[str, Any]:
-    return {name: value for name, value in data.items() if name != key or value is not None}
 
 
 def _stored_step(data: Mapping[str, Any]) -> Step:

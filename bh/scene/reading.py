@@ -243,6 +243,9 @@ def places(value: object, at: str) -> tuple[str | tuple[int, ...], ...]:
         value: what the scene has there.
         at: its dotted path.
 
+    Returns:
+        a name or node indices for each.
+
     Raises:
         SceneError: it is something else; one line.
     """

@@ -248,7 +248,7 @@ WRONG = [
     (f"displace = {EDGE}, by = 1.0, further = 1.0 }}", "needs either by"),
     ('support = { at = "node:1" }', "steps[1]: the supports leave 3 of 6 rigid motions free"),
     (f'hold = "edge:start"\nrelease = "edge:start"\n{UNTIL}', "has to be complete"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("change", "says"), WRONG)

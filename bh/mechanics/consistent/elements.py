@@ -14,7 +14,7 @@ from bh.loading.load_step import LoadStep
 from bh.materials import Constant, LinearElastic, Material
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.bending import Bending
-from bh.mechanics.consistent.clamps import clamps
+from bh.mechanics.consistent.clamps import Clamps, clamps
 from bh.mechanics.consistent.kernels import OWN, TURN
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.patches import (
@@ -132,11 +132,7 @@ def consistent_elements(
         from bh.mechanics.consistent.half import half_patches
 
         joined = half_patches(joined, spring, plane)
-    let_go = joined.kind == TURN  # edges of the boundary whose rotation is free, but loaded
-    let_go &= (joined.hinge < 0) & (held.couple != 0.0)[_edges(mesh, joined)]
-    rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane, let_go)
-    couples = np.zeros(rotations)
-    couples[rotation[let_go]] = held.couple[_edges(mesh, joined)[let_go]]
+    rotation, turns, rotations, let_go = _number_rotations(mesh, joined, spring, plane, held)
     part_area = areas if part is None else part * areas
     membrane, law_of_strain = measure(mesh, creased(mesh, law)), material.stretching(sheet)
     quad, ghost = _quads(mesh, joined, held.outward)
@@ -172,8 +168,7 @@ def consistent_elements(
         spring_stiffness=k_fold, spring_rest=Ramp(begin, load_step.rest.end[springs]),
         couple=couple,
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
-        lock=lock_stiffness(model, load_step), rotations=rotations,
-        let_go=Ramp(couples, np.zeros(rotations)),
+        lock=lock_stiffness(model, load_step), rotations=rotations, let_go=let_go,
     )  # fmt: skip
     return whole if plane is None else _half(whole, plane)
 
@@ -239,18 +234,13 @@ def triangle_ranks(mesh: SheetMesh) -> Array:
     return np.asarray(position[mesh.triangles].mean(axis=1))
 
 
-def _edges(mesh: SheetMesh, joined: Patches) -> Ints:
-    """(c, a) edge of every angle; of any edge where there is none."""
-    return np.asarray(mesh.topology.triangle_edges.ravel()[joined.half_edge])
-
-
 def _number_rotations(
-    mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None, let_go: Bools
-) -> tuple[Ints, Ints, int]:
-    """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
+    mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None, held: Clamps
+) -> tuple[Ints, Ints, int, Ramp]:
+    """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), their number, and couples, N mm.
 
     There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that
-    keeps its own, as those do whose clamp is `let_go` (c, a); but one for a spring in the plane of a symmetric sheet,
+    keeps its own, as those do whose clamp is let go of, with its couple; but one for a spring in the plane of a symmetric sheet,
     and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
@@ -266,9 +256,14 @@ def _number_rotations(
     side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
     has = (joined.hinge >= 0) & ~joined.inner
     rotation = np.where(has, both[joined.hinge, side], -1)
+    couple = held.couple[mesh.topology.triangle_edges.ravel()[joined.half_edge]]
+    let_go = (joined.kind == TURN) & (joined.hinge < 0) & (couple != 0.0)
     free = ((joined.hinge < 0) & (joined.kind == OWN)) | let_go
     rotation[free] = count.sum() + np.arange(free.sum())
-    return rotation, both, int(count.sum() + free.sum())
+    rotations = int(count.sum() + free.sum())
+    couples = np.zeros(rotations)
+    couples[rotation[let_go]] = couple[let_go]
+    return rotation, both, rotations, Ramp(couples, np.zeros(rotations))
 
 
 def _quads(mesh: SheetMesh, joined: Patches, outward: Array) -> tuple[Ints, Array]:
@@ -288,7 +283,7 @@ def _quads(mesh: SheetMesh, joined: Patches, outward: Array) -> tuple[Ints, Arra
     points = mesh.points[quad[clamp]]
     normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    given = outward[_edges(mesh, joined)[clamp]]
+    given = outward[mesh.topology.triangle_edges.ravel()[joined.half_edge[clamp]]]
     ghost[clamp] = np.where(np.isnan(given), np.cross(points[:, 2] - points[:, 1], normal), given)
     return quad, ghost
 
