@@ -123,8 +123,7 @@ def consistent_elements(
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
     maps, of_curvature = curvature_maps(edges, areas), material.bending(sheet)
     B = bending_matrices(maps, areas, of_curvature.moduli(np.zeros((1, 3)))[0])
-    held = clamps(mesh, load_step, start)
-    spring = law == SPRING
+    held, spring = clamps(mesh, load_step, start), law == SPRING
     part = None if plane is None else plane.triangle_weight
     condense = isinstance(of_curvature, Constant)
     joined = patches(mesh, B, spring, held.edges, triangle_ranks(mesh), group=part, condense=condense)
@@ -240,8 +239,8 @@ def _number_rotations(
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), their number, and couples, N mm.
 
     There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that
-    keeps its own, as those do whose clamp is let go of, with its couple; but one for a spring in the plane of a symmetric sheet,
-    and none for what lies outside of its half.
+    keeps its own, as those do whose clamp is let go of, with its couple; but one for a spring in the plane of a
+    symmetric sheet, and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
     two_sided = spring.copy()
