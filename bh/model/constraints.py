@@ -303,7 +303,7 @@ def _orthonormal(node: int, rows: list[_Row]) -> tuple[Array, Array]:
         if norm > 1e-9:
             axes.append(rest / norm)
             values.append(value / norm)
-        elif np.nanmax(np.abs(value)) > 1e-12 * (1.0 + abs(end)):
+        elif np.nanmax(np.abs(value)) > 1e-12 * (1.0 + abs(float(np.nan_to_num(end)))):
             raise ModelError(
                 f"node {node} is fixed and displaced along the same direction; remove the support or the displacement"
             )

@@ -262,6 +262,8 @@ def test_what_cannot_be(change: str, says: str, tmp_path: Path, capsys: pytest.C
 
 def test_what_cannot_be_in_python() -> None:
     model = folded("consistent").step(hold="edge:start")
+    with pytest.raises(ModelError, match="is fixed and displaced"):  # before anything is solved
+        load_steps(model.displace("corner:outer-start", "z", further=1.0))
     with pytest.raises(ModelError, match="by halves"):
         trace(model, symmetry="y")
     with pytest.raises(ModelError, match="have no slope at an edge to clamp"):
