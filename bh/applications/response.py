@@ -19,6 +19,7 @@ from bh.runtime.progress import ProgressMeter, meter
 from bh.solvers.automatic import Automatic
 from bh.solvers.load_control import LoadControl
 from bh.solvers.matrices import IndefiniteError
+from bh.solvers.outcome import Outcome
 from bh.solving.trace import trace
 
 if TYPE_CHECKING:
@@ -89,10 +90,15 @@ class Response:
     direction: tuple[float, float, float]
     points: tuple[ResponsePoint, ...]
     peaks: tuple[Peak, ...]
-    outcome: str
+    outcome: Outcome
     reason: str
     critical: tuple[str, ...]
     path: Path
+
+    @property
+    def reached(self) -> bool:
+        """Was the whole displacement?"""
+        return self.outcome is Outcome.REACHED
 
     def as_dict(self) -> dict[str, object]:
         """Plain data for JSON: mm, N, N/mm, N mm; what is not there is None.
@@ -103,7 +109,7 @@ class Response:
         return {
             "at": self.at,
             "direction": list(self.direction),
-            "outcome": self.outcome,
+            "outcome": str(self.outcome),
             "reason": self.reason,
             "points": [{key: _plain(value) for key, value in asdict(point).items()} for point in self.points],
             "peaks": [asdict(peak) for peak in self.peaks],
@@ -163,7 +169,7 @@ def response(
         if step == len(longer.steps) - 1
     )
     peaks = _peaks(found, kinks)
-    return Response(at, (x, y, z), found, peaks, str(path.outcome), path.reason, critical, path)
+    return Response(at, (x, y, z), found, peaks, path.outcome, path.reason, critical, path)
 
 
 def _points(
@@ -252,11 +258,12 @@ def lines(found: Response) -> list[str]:
     words = {True: "yes", False: "no", None: ""}
     rows = [
         (
-            f"{p.displacement:.5g}", f"{p.force:.5g}", f"{p.stiffness:.5g}", f"{p.energy:.5g}",
-            words[p.stable], words[p.stable_under_force],
+            *(f"{value:.5g}" for value in (p.displacement, p.force, p.stiffness, p.energy)),
+            words[p.stable],
+            words[p.stable_under_force],
         )
         for p in found.points
-    ]  # fmt: skip
+    ]
     widths = [max(len(row[k]) for row in (heads, *rows)) for k in range(len(heads))]
     table = [
         "  ".join(word.rjust(width) for word, width in zip(row, widths, strict=True))

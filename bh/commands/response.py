@@ -72,7 +72,7 @@ def response(  # noqa: PLR0913 - the options of a command line
     for file in (json_file, picture):
         if file is not None and not quiet:
             say(f"wrote {file}")
-    if found.outcome != "reached":
+    if not found.reached:
         say(f"bh: {scene}: the curve ended early: {found.outcome} ({found.reason})", err=True)
         raise typer.Exit(1)
 
