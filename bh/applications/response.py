@@ -19,7 +19,7 @@ from bh.runtime.progress import ProgressMeter, meter
 from bh.solvers.automatic import Automatic
 from bh.solvers.load_control import LoadControl
 from bh.solvers.matrices import IndefiniteError
-from bh.solvers.outcome import Outcome
+from bh.solvers.outcome import Critical, Outcome
 from bh.solving.trace import trace
 
 if TYPE_CHECKING:
@@ -194,7 +194,7 @@ def _points(
         number: (passed.lam * to, system.power(passed.q, passed.lam) / to)
         for number, (_, record) in enumerate(records, start=1)
         for passed in record.critical
-        if "bifurcation" in passed.kind and passed.q is not None
+        if passed.kind is Critical.BIFURCATION
     }
     return tuple(found), kinks
 
