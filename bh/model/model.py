@@ -76,6 +76,11 @@ class Model:
                 raise ModelError(
                     f"the {name} of a model is {what}; give bh.Model(mesh, sheet) {how} as {name}"
                 )
+        if self.sheet.grain is not None and not drawn_flat(self.mesh):
+            raise ModelError(
+                "the grain is a direction in the drawing, so the stress-free sheet must lie in z = const with its "
+                "triangles counter-clockwise; unfold it first, or give a sheet without a grain"
+            )
         for step in self.steps:
             if not isinstance(step, Step):
                 raise ModelError(
@@ -286,6 +291,17 @@ def _places(given: Place | Sequence[Place | Constraint]) -> tuple[Place | Constr
     if len(given) and all(isinstance(each, int | np.integer) for each in given):
         return (tuple(int(each) for each in given),)  # type: ignore[arg-type]
     return tuple(each if isinstance(each, str | Constraint) else tuple(each) for each in given)  # type: ignore[arg-type]
+
+
+def drawn_flat(mesh: SheetMesh) -> bool:
+    """Whether a mesh lies in a plane z = const (to 1e-9 of its size), its triangles counter-clockwise from +z.
+
+    Args:
+        mesh: of the stress-free sheet.
+    """
+    corner = mesh.points[mesh.triangles]
+    up = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2]
+    return bool(np.ptp(mesh.points[:, 2]) <= 1e-9 * mesh.size and (up > 0.0).all())
 
 
 def _on_edges(mesh: SheetMesh, what: str, rows: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:

@@ -128,11 +128,11 @@ class Desk:
         now = self.sheet.model.sheet
         if message.name is not None:
             young, nu, t, _ = material_of(message.name)
-            self.material = message.name
-        else:
-            young, nu, t = now.E, now.nu, now.t
-        nu = nu if self.sheet.model.formulation != "bars-and-hinges" else 0.0
-        sheet = Sheet(E=message.E or young, nu=nu if message.nu is None else message.nu, t=message.t or t)
+            self.material, now = message.name, Sheet(E=young, nu=nu, t=t)
+        nu = now.nu if self.sheet.model.formulation != "bars-and-hinges" else 0.0
+        sheet = replace(
+            now, E=message.E or now.E, nu=nu if message.nu is None else message.nu, t=message.t or now.t
+        )
         self.put(self.sheet.of(sheet), self.session.wanted)
 
     def _check(self) -> Json:

@@ -6,7 +6,6 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
@@ -551,17 +550,13 @@ def test_short_help_is_that_of_the_commands() -> None:
         assert entry.load().__doc__.splitlines()[0] == ABOUT[entry.name]
 
 
-def test_starts_fast_and_light() -> None:
+def test_starts_light() -> None:
+    """Nothing is loaded that a command line alone does not need."""
     heavy = "numpy", "numba", "pydantic", "pyvista", "scipy", "matplotlib", "shapely"
     check = f"import sys, bh.commands.cli; sys.exit(' '.join(m for m in {heavy} if m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", check], capture_output=True, text=True).stderr.strip() == ""
-    times = []
-    for _ in range(3):
-        began = time.perf_counter()
-        done = subprocess.run([BIN, "--version"], capture_output=True, text=True, check=True)
-        times.append(time.perf_counter() - began)
+    done = subprocess.run([BIN, "--version"], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("bh ")
-    assert min(times) < 1.0  # 0.15 s on an idle machine
 
 
 def test_commands_of_other_packages(
