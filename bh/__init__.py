@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from bh.model.refinement import Goal, Refinement
     from bh.model.sheet import ElementStiffness, Sheet
     from bh.model.step import Actuation, Body, Step, StepBuilder, Zone
-    from bh.model.supports import Constraint, RigidBody, Support
+    from bh.model.supports import Constraint, Hold, RigidBody, Support
     from bh.model.until import Until, depth
     from bh.paths.estimate import Accuracy
     from bh.paths.path import Path
@@ -69,7 +69,7 @@ _NAMES = {
     "bh.model.refinement": "Goal Refinement",
     "bh.model.sheet": "ElementStiffness Sheet",
     "bh.model.step": "Actuation Body Step StepBuilder Zone",
-    "bh.model.supports": "Constraint RigidBody Support",
+    "bh.model.supports": "Constraint Hold RigidBody Support",
     "bh.model.until": "Until depth",
     "bh.paths.estimate": "Accuracy",
     "bh.paths.path": "Path",
@@ -119,6 +119,7 @@ __all__ = [
     "Force",
     "Formulation",
     "Goal",
+    "Hold",
     "Indenter",
     "InputError",
     "LoadControl",

@@ -9,6 +9,10 @@ class ModelError(InputError):
     """A model that cannot be solved as described."""
 
 
+class NotHeldError(ModelError):
+    """Supports that leave rigid motions free, in the state in which a step begins."""
+
+
 class SceneError(InputError):
     """A scene file that is not understood."""
 
@@ -28,6 +32,7 @@ class NotReachedWarning(UserWarning):
 __all__ = [
     "InputError",
     "ModelError",
+    "NotHeldError",
     "NotReachedError",
     "NotReachedWarning",
     "PathFileError",

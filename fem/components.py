@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.model.constraints import Constraints
 from bh.model.ramp import Ramp
-from bh.model.supports import Constraints
 from fem.connectors import Connectors
 from fem.shell import ShellElements
 from meshes import SheetMesh

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.builder import load_steps
+from bh.loading.load_step import StepEnd
 from bh.model.actuations import Displace, Fold, Force
+from bh.model.constraints import Constraints
 from bh.model.model import Model
 from bh.model.ramp import Ramp
 from bh.model.step import Actuation
-from bh.model.supports import Constraints, select
+from bh.model.supports import select
 from fem.components import edge_set
 from fem.shell import ShellElements
 from meshes.curved import ElementMesh
@@ -34,7 +36,7 @@ class EdgeMoments:
     at: tuple[tuple[str, float, float], ...] = ()
 
 
-def constraints(mesh: ElementMesh, model: Model, step: int) -> Constraints:
+def constraints(mesh: ElementMesh, model: Model, step: int, points: Array | None = None) -> Constraints:
     """Supports and prescribed displacements in step `step` on all nodes, middle nodes of named edges included.
 
     A support of listed nodes holds just these corners.
@@ -43,12 +45,16 @@ def constraints(mesh: ElementMesh, model: Model, step: int) -> Constraints:
         mesh: elements.
         model: has supports and steps.
         step: number of the step.
+        points: (n, 3) of all nodes where it begins, mm; None for the flat sheet.
     """
     steps = tuple(
         replace(each, actuations=tuple(_plain(item) for item in each.actuations))
         for each in model.steps[: step + 1]
     )
-    return load_steps(replace(model, mesh=mesh.linear, steps=steps))[step].constraints
+    ends = {}
+    if points is not None and any(each.looks_back for each in steps):
+        ends = {step - 1: StepEnd(1.0, points, np.zeros(0))}
+    return load_steps(replace(model, mesh=mesh.linear, steps=steps), ends)[step].constraints
 
 
 def _plain(item: Actuation) -> Actuation:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model.supports import MOTIONS, free_motions, rigid_motions
+from bh.model.constraints import MOTIONS, free_motions, rigid_motions
 from fem.components import Components
 from fem.connectors import Connectors
 from fem.shell import ShellElements

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
+from bh.model.constraints import TURNED, UNBALANCED
 from bh.model.model import Model
 from bh.model.ramp import Ramp
-from bh.model.supports import TURNED, UNBALANCED
 from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.outcome import Outcome
 from bh.solvers.system import Evaluation, Tangent, grows_ahead
@@ -111,12 +111,17 @@ class ShellSystem:
         beta = flat if start is None else start.fold_angles
         couple = flat if start is None else start.crease_couples
         self.creases = connectors(mesh, model, load_step, beta, couple)
-        self.constraints = loads.constraints(mesh, model, step)
+        self.constraints = loads.constraints(mesh, model, step, None if start is None else x)
         clamped = mesh.sheet.topology.find_edges(load_step.constraints.clamped)
         self.components = lay_out(elements, self.constraints, self.creases, x, beta, clamped)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
-        if self.constraints.rigid_body:
+        if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
+            pull, free = self.gradient(self.at(self.start(), 0.0)), self.components.free
+            carried = np.zeros(len(pull))
+            carried[free] = pull[free]
+            self.load, self._here = Ramp(self.load.start + carried, self.load.end), None
+        elif self.constraints.rigid_body:
             self._check_balance()
 
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:

@@ -51,6 +51,11 @@ class Situation:
             raise ModelError(
                 "a step that ends where an observable has a value has no sensitivities; give it its end"
             )
+        if any(step.looks_back for step in path.model.steps[: record.step + 1]):
+            raise ModelError(
+                "supports that change, or move further from where they are, have no sensitivities; give displacements "
+                "from the stress-free sheet"
+            )
         if load_steps(path.model)[record.step].bodies:
             raise ModelError("sheets that bars press on have no sensitivities; leave the bars out")
         self.step, self.q, self.lam = record.step, record.q, record.lam

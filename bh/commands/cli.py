@@ -21,6 +21,7 @@ try:
 
     from bh.commands.compare import compare
     from bh.commands.fold_options import fold
+    from bh.commands.response import response
     from bh.runtime.consent import take_options
     from bh.runtime.terminal import say
 except KeyboardInterrupt:  # `main` tells of it from here on
@@ -211,6 +212,7 @@ def run(
 
 app.command()(fold)
 app.command()(compare)
+app.command()(response)
 
 
 @app.command()

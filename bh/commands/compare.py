@@ -43,7 +43,7 @@ def compare(
     from bh.scene.load import load_scene
     from meshes.io.export import replacing
 
-    _check(picture)
+    check_picture(picture)
     loaded = load_scene(scene, changes or ())
     wanted = None if stiffness is None else _stiffness(stiffness)
     found = comparison.compare(
@@ -82,7 +82,15 @@ def _stiffness(text: str) -> Stiff:
     return Stiff(place, AXES[axis])
 
 
-def _check(file: Path | None) -> None:
+def check_picture(file: Path | None) -> None:
+    """See that the name of a picture is one of a kind that can be drawn.
+
+    Args:
+        file: its name, or None for no picture.
+
+    Raises:
+        InputError: it is none; one line.
+    """
     from bh.errors import InputError
 
     if file is not None and file.suffix.lower() not in (".png", ".svg", ".pdf"):

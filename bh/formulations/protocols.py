@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from bh.formulations.remarks import Remark
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
+from bh.model.constraints import Constraints
 from bh.model.model import Model
-from bh.model.supports import Constraints
 from bh.solvers.system import System
 from meshes.topology import Ints
 

@@ -86,10 +86,11 @@ def unlikely(model: Model) -> tuple[Remark, ...]:
         )
     for number, step in enumerate(model.steps):
         for item in step.actuations:
-            if isinstance(item, Displace) and abs(item.by) > FAR * model.mesh.size:
-                times = abs(item.by) / model.mesh.size
+            way = (item.by or item.further or 0.0) if isinstance(item, Displace) else 0.0
+            if abs(way) > FAR * model.mesh.size:
+                times = abs(way) / model.mesh.size
                 found.append(
-                    f"step {number + 1}: a displacement of {item.by:g} mm is {times:.3g} times the size of the sheet; "
+                    f"step {number + 1}: a displacement of {way:g} mm is {times:.3g} times the size of the sheet; "
                     "it is in mm, or has a unit"
                 )
             if isinstance(item, Indenter) and max(abs(item.azimuth), abs(item.tilt)) > 2.0 * math.pi:

@@ -66,6 +66,9 @@ class State:
             where it works to open the dihedral angle below the sheet against the crease. Near closed with what the
             lock carries (`Model.hinge_lock`).
         contact_forces: force of every `Indenter` of the step on the sheet, (3,), N, by its name.
+        edge_slopes: (e,) at edges of the boundary the angle from the triangle up to the sheet's tangent plane, rad, nan
+            inside; and `clamp_couples` (e,) what clamps carry there, N mm. None where a formulation has no slopes, or
+            keeps them otherwise.
         ended: the outcome where the path ended early at this state, such as "stalled": it is not what was asked for.
         stable: True if the tangent is positive definite there (False: not, None: not known).
     """
@@ -81,6 +84,8 @@ class State:
     crease_moments: Array
     stable: bool | None = None
     contact_forces: Mapping[str, Array] = field(default_factory=dict)
+    edge_slopes: Array | None = None
+    clamp_couples: Array | None = None
     ended: str = ""
 
     def __repr__(self) -> str:

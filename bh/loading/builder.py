@@ -2,104 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.errors import ModelError
-from bh.loading.load_step import LoadStep, Pinched, StepEnd, edge_hinges, hinge_name
+from bh.errors import ModelError, NotHeldError
+from bh.loading.asked import Asked, StepInHand
+from bh.loading.load_step import LoadStep, StepEnd, edge_hinges, hinge_name
+from bh.loading.supports import Supports, isostatic
+from bh.model.constraints import Constraints, Prescribed, resolve
 from bh.model.crease_law import CreaseLaw
 from bh.model.laws import PRESCRIBED, SPRING
 from bh.model.model import Model
 from bh.model.ramp import Ramp
 from bh.model.sheet import Sheet
 from bh.model.step import Body, Step, Zone
-from bh.model.supports import Prescribed, resolve
 from meshes import SheetMesh
-from meshes.topology import Ints, dihedral_angles
+from meshes.topology import Ints
 
 Array = NDArray[np.float64]
-Direction = tuple[float, float, float]
 OVERLAP = 1e-9  # rad or N mm / mm: two zones that differ by less ask for the same
-
-
-@dataclass(eq=False)
-class _Asked:
-    """What hinges (m,) and nodes (n,) are asked for at the end of a step; the next step begins with it.
-
-    For the fields see `LoadStep`. `pinched` marks hinges whose prescribed angle follows from a solved state.
-    """
-
-    law: NDArray[np.int64]
-    stiffness: Array
-    rest: Array
-    rest_ends: Array
-    prescribed: Array
-    moment: Array
-    force: Array
-    pinched: NDArray[np.bool_]
-    displaced: dict[tuple[int, Direction], float]
-
-    @classmethod
-    def nothing(cls, mesh: SheetMesh) -> _Asked:
-        """Nothing yet: the stress-free sheet."""
-        hinges, nodes = len(mesh.topology.hinges), len(mesh.points)
-        return cls(
-            law=np.zeros(hinges, dtype=np.int64),
-            stiffness=np.zeros(hinges),
-            rest=dihedral_angles(mesh.points, mesh.topology.hinges),
-            rest_ends=np.full((hinges, 2), math.pi),
-            prescribed=np.full(hinges, np.nan),
-            moment=np.zeros(hinges),
-            force=np.zeros((nodes, 3)),
-            pinched=np.zeros(hinges, dtype=bool),
-            displaced={},
-        )
-
-    def copy(self) -> _Asked:
-        """The same in arrays of its own."""
-        return _Asked(**{name: value.copy() for name, value in vars(self).items()})
-
-    def angles(self) -> Array:
-        """(m,) angles that this is meant to bring about, rad."""
-        by_law = [self.law == PRESCRIBED, self.law == SPRING]
-        return np.select(by_law, [self.prescribed, self.rest], math.pi)
-
-
-@dataclass(eq=False)
-class _Step:
-    """What belongs to the step in hand alone.
-
-    Attributes:
-        angles: (m,) that a late actuation begins with, rad.
-        pinch: see `LoadStep`.
-        released, folded: (m,) hinges that were let go of, or folded as a whole.
-        given: (2, m) angles and moments that something was given, nan elsewhere.
-        moved: displacements that were asked for, mm.
-        zones: what zones ask for, and where these are.
-        bodies: see `LoadStep`.
-    """
-
-    angles: Array
-    pinch: Pinched
-    released: NDArray[np.bool_]
-    folded: NDArray[np.bool_]
-    given: Array
-    moved: dict[tuple[int, Direction], float] = field(default_factory=dict)
-    zones: dict[int, tuple[float, float]] = field(default_factory=dict)
-    bodies: list[Body] = field(default_factory=list)
-
-    @classmethod
-    def after(cls, asked: _Asked) -> _Step:
-        """Nothing is asked for yet. A pinch of an earlier step stays as it is until something else is."""
-        hinges, now = len(asked.law), asked.angles()
-        pinch = replace(Pinched.none(hinges), present=now.copy())
-        pinch.toward[asked.pinched] = asked.prescribed[asked.pinched]
-        none = np.zeros(hinges, dtype=bool)
-        return cls(now, pinch, none, none.copy(), np.full((2, hinges), np.nan))
 
 
 class LoadStepBuilder:
@@ -113,11 +37,11 @@ class LoadStepBuilder:
         """
         self.mesh: SheetMesh = model.mesh
         self.sheet: Sheet = model.sheet
-        self._supports = model.supports
+        self._supports = Supports(model)
         self._number = 0
-        self._asked = _Asked.nothing(model.mesh)
+        self._asked = Asked.nothing(model.mesh)
         self._rest_of_laws = self._asked.rest.copy()  # they come in during the first step
-        self._step = _Step.after(self._asked)
+        self._step = StepInHand.after(self._asked)
         for name, crease in model.creases.items():
             self.spring(self._hinges(name), crease.Lstar, crease.stiffness)
             self._rest_of_laws[self._hinges(name)] = crease.rest
@@ -230,21 +154,22 @@ class LoadStepBuilder:
         """Dead forces (k, 3) or (3,), N, in place of what pulled there."""
         self._asked.force[nodes] = force
 
-    def displace(self, nodes: Ints, direction: Sequence[float], by: float) -> None:
-        """Prescribe the displacement of nodes (k,) along a unit vector, mm from the stress-free position.
+    def displace(self, nodes: Ints, direction: Sequence[float], by: float, further: bool = False) -> None:
+        """Prescribe the displacement of nodes (k,) along a unit vector, mm; see `StepBuilder.displace`.
 
         Raises:
             ModelError: a node is displaced twice along it in one step.
         """
         x, y, z = (float(part) for part in direction)
         for node in nodes.tolist():
-            known = self._step.moved.setdefault((node, (x, y, z)), by)
-            if known != by:
+            known, relative = self._step.moved.setdefault((node, (x, y, z)), (by, further))
+            if known != by or relative is not further:
                 raise ModelError(
                     f"node {node} is displaced by {known:g} and by {by:g} mm along the same direction in one step; "
                     "remove one of them"
                 )
-            self._asked.displaced[node, (x, y, z)] = by
+            begin = self._supports.displacement(node, (x, y, z)) if further else 0.0
+            self._asked.displaced[node, (x, y, z)] = begin + by
 
     def attach(self, body: Body) -> None:
         """Let a body act on the sheet in this step."""
@@ -257,10 +182,12 @@ class LoadStepBuilder:
         start = self._asked.copy()
         asked = self._asked
         self._number += 1
+        self._supports.change(step, asked.displaced)
+        start.displaced = {key: self._supports.now(key, value) for key, value in asked.displaced.items()}
         if self._number == 1:
             asked.rest = self._rest_of_laws.copy()
             asked.rest_ends = np.repeat(asked.rest, 2).reshape(-1, 2)
-        self._step = now = _Step.after(asked)
+        self._step = now = StepInHand.after(asked)
         start.prescribed[asked.pinched] = np.nan  # it begins where it is
         for item in step.actuations:
             if not item.late:
@@ -280,11 +207,18 @@ class LoadStepBuilder:
             pinch=now.pinch,
             moment=Ramp(start.moment, end.moment),
             force=Ramp(start.force, end.force),
-            constraints=resolve(
-                self.mesh, self._supports, self._displacements(start), in_contact=bool(now.bodies)
-            ),
+            constraints=self._constraints(start, bool(now.bodies), bool(step.release)),
             bodies=tuple(now.bodies),
+            releases=bool(step.release),
         )
+
+    def ended(self, points: Array) -> None:
+        """Tell where the nodes are when the next step begins, (n, 3), mm: what lies there is held there.
+
+        Args:
+            points: positions at the end of the step that was built last.
+        """
+        self._supports.points = points
 
     def end_early(self, step: LoadStep, end: StepEnd) -> None:
         """Let the next step begin where `step` ended before it was complete.
@@ -355,13 +289,33 @@ class LoadStepBuilder:
                     f"{zone.at:g}); keep their zones apart, or pinch one after the other"
                 )
 
-    def _displacements(self, start: _Asked) -> list[Prescribed]:
+    def _constraints(self, start: Asked, in_contact: bool, releases: bool) -> Constraints:
         # a node that begins to be displaced in a later step begins where it is
-        first = np.nan if self._number > 1 else 0.0
-        return [
-            Prescribed(np.array([node]), direction, start.displaced.get((node, direction), first), end)
-            for (node, direction), end in self._asked.displaced.items()
-        ]
+        moves = []
+        for (node, direction), end in self._asked.displaced.items():
+            first = self._supports.displacement(node, direction)
+            begin = start.displaced.get((node, direction), first)
+            by, further = self._step.moved.get((node, direction), (0.0, False))
+            moves.append(Prescribed(np.array([node]), direction, begin, end, by if further else 0.0))
+        supports = self._supports
+        try:
+            found = resolve(self.mesh, supports.flat, moves, in_contact, supports.lying)
+            if releases and found.rigid_body and supports.points is not None and self._number > 1:
+                # the forces that let go would turn a free sheet while they fade: it is held at six places meanwhile
+                if self._asked.force.any():
+                    raise NotHeldError(
+                        "nothing holds the sheet any more while forces act; let them go to zero in a step before"
+                    )
+                stay = supports.lying
+                assert stay is not None
+                stay = replace(stay, supports=(*stay.supports, *isostatic(found, supports.points)))
+                found = replace(resolve(self.mesh, supports.flat, moves, lying=stay), rigid_body=False)
+        except NotHeldError as error:
+            if self._supports.points is None or self._number == 1:
+                raise
+            raise NotHeldError(f"where step {self._number} begins, {error}") from None
+        self._supports.points = None  # until the end of this step is told
+        return found
 
 
 def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple[LoadStep, ...]:
@@ -369,7 +323,8 @@ def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple
 
     Args:
         model: what is described.
-        ends: where steps ended that ended early, by their index.
+        ends: where steps ended, by their index: those that ended early, and the last one where supports change. What
+            is held as it lies is nan in constraints of a step before which it is not known.
 
     Returns:
         one load step for each step.
@@ -382,5 +337,7 @@ def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple
     for number, step in enumerate(model.steps):
         found.append(builder.build(step))
         if ends is not None and number in ends:
-            builder.end_early(found[-1], ends[number])
+            if ends[number].lam < 1.0:
+                builder.end_early(found[-1], ends[number])
+            builder.ended(ends[number].points)
     return tuple(found)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.model.constraints import Constraints
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.ramp import Ramp
 from bh.model.step import Body
-from bh.model.supports import Constraints
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -59,6 +59,7 @@ class LoadStep:
         force: (n, 3) dead forces, N.
         constraints: supports and prescribed displacements.
         bodies: indenters and tethers that act in this step.
+        releases: supports are let go of, whose forces on the sheet go to zero during the step.
     """
 
     law: NDArray[np.int64]
@@ -71,6 +72,7 @@ class LoadStep:
     force: Ramp
     constraints: Constraints
     bodies: tuple[Body, ...] = ()
+    releases: bool = False
 
     def prescribed_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""
@@ -104,7 +106,7 @@ class LoadStep:
 
 @dataclass(frozen=True, eq=False)
 class StepEnd:
-    """Where a step ended before its actuations were complete.
+    """Where a step ended.
 
     Attributes:
         lam: its control parameter there.

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
+from bh.model.constraints import Constraints
 from bh.model.model import Model
-from bh.model.supports import Constraints, RigidBody, Support
+from bh.model.supports import RigidBody, Support
 from meshes import Arc, SheetMesh
 from meshes.fans import places
 from meshes.topology import Ints
@@ -212,6 +213,10 @@ def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
             )
     for number, step in enumerate(steps):
         where = f"step {number + 1}"
+        if model.steps[number].looks_back:
+            raise ModelError(
+                f"{where}: a sheet whose supports change is not solved by halves; leave out symmetry"
+            )
         if step.bodies:
             raise ModelError(
                 f"{where}: a sheet that touches bodies is not solved by halves; leave out symmetry"

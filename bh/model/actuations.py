@@ -228,19 +228,32 @@ class Force(Actuation):
 
 @dataclass(frozen=True)
 class Displace(Actuation):
-    """Prescribed displacement from the stress-free position: `by` (mm) along `direction` (three numbers, or x, y, z).
+    """Prescribed displacement along `direction` (three numbers, or x, y, z), `by` or `further` of which is given.
 
-    Nodes stay free across the direction, and keep their displacement in later steps.
+    Nodes stay free across the direction, and keep their displacement in later steps until they are released.
+
+    Attributes:
+        at: a place of the mesh or node indices.
+        direction: "x", "y", "z" or a vector (3,) of any length.
+        by: displacement at the end of the step from the stress-free position, mm.
+        further: the same from where each node is when the step begins, mm.
     """
 
     at: str | Sequence[int]
     direction: str | Sequence[float]
-    by: float
+    by: float | None = None
+    further: float | None = None
 
     if TYPE_CHECKING:
 
-        def __init__(self, at: str | Sequence[int], direction: str | Sequence[float], by: Typed) -> None:
-            """See the class."""
+        def __init__(
+            self,
+            at: str | Sequence[int],
+            direction: str | Sequence[float],
+            by: Typed | None = None,
+            further: Typed | None = None,
+        ) -> None:
+            """See the attributes."""
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
@@ -248,8 +261,13 @@ class Displace(Actuation):
         Raises:
             ModelError: one line that names the value and what to give.
         """
-        take_units(self, f"displacement at '{self.at}'", by="length")
-        _finite(f"displacement at '{self.at}'", (self.by,))
+        what = f"displacement at '{self.at}'"
+        if (self.by is None) == (self.further is None):
+            raise ModelError(
+                f"{what} needs either by (mm from the stress-free position) or further (mm from the present one)"
+            )
+        take_units(self, what, by="length", further="length")
+        _finite(what, [value for value in (self.by, self.further) if value is not None])
         if isinstance(self.direction, str):
             if self.direction not in ("x", "y", "z"):
                 raise ModelError(
@@ -264,7 +282,16 @@ class Displace(Actuation):
         """Ask for the displacement."""
         raw = AXES[self.direction] if isinstance(self.direction, str) else self.direction
         unit = np.asarray(raw, dtype=float) / np.linalg.norm(raw)
-        builder.displace(select(builder.mesh, self.at), unit.tolist(), self.by)
+        nodes = select(builder.mesh, self.at)
+        if self.further is not None:
+            builder.displace(nodes, unit.tolist(), self.further, further=True)
+        elif self.by is not None:
+            builder.displace(nodes, unit.tolist(), self.by)
+
+    @property
+    def looks_back(self) -> bool:
+        """See `Actuation.looks_back`."""
+        return self.further is not None
 
 
 @dataclass(frozen=True)

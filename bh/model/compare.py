@@ -107,7 +107,8 @@ def _what(old: object, new: object) -> str:
         return ""
     acts = zip(were, are, strict=True)
     keys = [key for a, b in acts for key in _differing(f".{a.get('kind')}", a, b)]
-    keys += _differing(".until", before["until"], after["until"])
+    for key in ("until", "support", "release"):
+        keys += _differing(f".{key}", before.get(key), after.get(key))
     return keys[0] if len(keys) == 1 else ""
 
 

@@ -16,7 +16,7 @@ from bh.model.crease_law import CreaseLaw
 from bh.model.pinch import Pinch
 from bh.model.sheet import ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
-from bh.model.supports import Constraint, RigidBody, Support
+from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
 from bh.runtime.consent import said
 from meshes import SheetMesh
@@ -24,6 +24,7 @@ from meshes.mesh import count
 from meshes.topology import Ints
 
 Contact = float | Literal["thickness", False]
+Place = str | Sequence[int]
 OF_GIVEN_STIFFNESS: str = "bars-and-hinges"  # no other formulation has elements to which it could be given
 
 
@@ -198,14 +199,28 @@ class Model:
         self.mesh.crease_edges(name)
         return replace(self, creases={**self.creases, name: CreaseLaw(**law)})
 
-    def step(self, *actuations: Actuation, until: Until | None = None) -> Model:
+    def step(
+        self,
+        *actuations: Actuation,
+        until: Until | None = None,
+        support: Constraint | Sequence[Constraint] = (),
+        release: Place | Constraint | Sequence[Place | Constraint] = (),
+        hold: Place | Sequence[Place] = (),
+    ) -> Model:
         """Add a step in which all `actuations` act together; it ends before they are complete where `until` says.
 
         Args:
             *actuations: that act together.
             until: ends the step early; None for never.
+            support: comes in when the step begins, and stays: nodes and clamped slopes are held where they are then.
+            release: is let go of then: places of supports or of prescribed displacements, or supports themselves. Their
+                forces go to zero during the step.
+            hold: places that are clamped as they lie: all directions, and the slope at edges of the boundary.
         """
-        return replace(self, steps=(*self.steps, Step(actuations, until)))
+        comes = (support,) if isinstance(support, Constraint) else tuple(support)
+        goes = (release,) if isinstance(release, Constraint) else _places(release)
+        held = tuple(Hold(each) for each in _places(hold) if not isinstance(each, Constraint))
+        return replace(self, steps=(*self.steps, Step(actuations, until, (*comes, *held), goes)))
 
     def fold(self, crease: str, until: Until | None = None, **how: Any) -> Model:
         """Add a step that folds a crease; arguments of `bh.Fold`.
@@ -251,15 +266,31 @@ class Model:
         """
         return self.step(Force(at, **how))
 
-    def displace(self, at: str | Sequence[int], direction: str | Sequence[float], by: float | str) -> Model:
+    def displace(
+        self,
+        at: str | Sequence[int],
+        direction: str | Sequence[float],
+        by: float | str | None = None,
+        further: float | str | None = None,
+    ) -> Model:
         """Add a step with prescribed displacements; see `bh.Displace`.
 
         Args:
             at: name of a place, or node indices.
             direction: x, y or z, or a vector (3,) of any length.
             by: displacement along it at the end of the step, mm from the stress-free position.
+            further: the same from where the node is when the step begins, mm; in place of `by`.
         """
-        return self.step(Displace(at, direction, by))
+        return self.step(Displace(at, direction, by, further))
+
+
+def _places(given: Place | Sequence[Place | Constraint]) -> tuple[Place | Constraint, ...]:
+    """One place, or several: a list of numbers is one of nodes."""
+    if isinstance(given, str):
+        return (given,)
+    if len(given) and all(isinstance(each, int | np.integer) for each in given):
+        return (tuple(int(each) for each in given),)  # type: ignore[arg-type]
+    return tuple(each if isinstance(each, str | Constraint) else tuple(each) for each in given)  # type: ignore[arg-type]
 
 
 def drawn_flat(mesh: SheetMesh) -> bool:

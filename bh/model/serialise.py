@@ -19,7 +19,7 @@ from bh.model.pinch import Pinch
 from bh.model.plugins import consent, from_file
 from bh.model.sheet import ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
-from bh.model.supports import Constraint, RigidBody, Support
+from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
 from bh.runtime.consent import said
 from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
@@ -35,6 +35,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "pull": Pull,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
+SUPPORTS: dict[str, type[Constraint]] = {"hold": Hold}
 STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether}
 FORMAT = 2  # raised with every change of the description
 
@@ -152,18 +153,42 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type], kind: type | N
     return from_file(data["kind"], kind)(**lists)
 
 
-def _step(step: Step) -> dict[str, Any]:
-    return {
-        "actuations": [_tagged(item, STEP_ITEMS) for item in step.actuations],
+def _step(step: Step) -> dict[str, object]:
+    actuations = [_tagged(item, STEP_ITEMS) for item in step.actuations]
+    for item in actuations:  # models of versions without it keep their fingerprint
+        if item.get("further", 0.0) is None:
+            del item["further"]
+    found: dict[str, object] = {
+        "actuations": actuations,
         "until": None if step.until is None else _plain(step.until),
     }
+    if step.support:
+        found["support"] = [_support(item) for item in step.support]
+    if step.release:
+        found["release"] = [
+            {"support": _support(item)} if isinstance(item, Constraint) else _jsonable(item)
+            for item in step.release
+        ]
+    return found
 
 
 def _stored_step(data: Mapping[str, Any]) -> Step:
     if data["until"] is not None:
         _agreed(data["until"]["observable"])
     until = None if data["until"] is None else Until(**data["until"])
-    return Step(tuple(_untagged(item, STEP_ITEMS, Actuation) for item in data["actuations"]), until)
+    return Step(
+        tuple(_untagged(item, STEP_ITEMS, Actuation) for item in data["actuations"]),
+        until,
+        tuple(_constraint(item) for item in data.get("support", ())),
+        tuple(
+            _constraint(item["support"])
+            if isinstance(item, dict)
+            else item
+            if isinstance(item, str)
+            else tuple(item)
+            for item in data.get("release", ())
+        ),
+    )
 
 
 def _agreed(name: str) -> str:
@@ -176,13 +201,13 @@ def _agreed(name: str) -> str:
 def _support(item: Constraint) -> Any:
     if isinstance(item, RigidBody):
         return "rigid-body"
-    return _plain(item) if type(item) is Support else _tagged(item, {})
+    return _plain(item) if type(item) is Support else _tagged(item, SUPPORTS)
 
 
 def _constraint(data: Any) -> Constraint:
     if data == "rigid-body":
         return RigidBody()
-    found: Constraint = _untagged(data, {}, Constraint) if "kind" in data else Support(**data)
+    found: Constraint = _untagged(data, SUPPORTS, Constraint) if "kind" in data else Support(**data)
     return found
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.model.sheet import Sheet
+from bh.model.supports import Constraint
 from bh.model.until import Until
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -126,13 +127,14 @@ class StepBuilder(Protocol):
         """
         ...
 
-    def displace(self, nodes: Ints, direction: Sequence[float], by: float) -> None:
+    def displace(self, nodes: Ints, direction: Sequence[float], by: float, further: bool = False) -> None:
         """Prescribe the displacement of nodes (k,) along a unit vector (3,), mm from the stress-free position.
 
         Args:
             nodes: (k,) node indices.
             direction: (3,) unit vector.
             by: displacement at the end of the step, mm.
+            further: measure it from where each node is when the step begins.
         """
         ...
 
@@ -148,6 +150,11 @@ class Actuation:
     """
 
     late: ClassVar[bool] = False  # applied after the others of its step, from where they lead
+
+    @property
+    def looks_back(self) -> bool:
+        """Does what it asks for depend on where nodes are when the step begins?"""
+        return False
 
     def prepare(self, builder: StepBuilder) -> None:
         """Ask for springs that must be there before the first step."""
@@ -171,24 +178,38 @@ class Body(Actuation):
 
 @dataclass(frozen=True)
 class Step:
-    """Actuations that act together while lambda runs from 0 to 1.
+    """Actuations that act together while lambda runs from 0 to 1, and supports that change when it begins.
 
     Attributes:
-        actuations: at least one.
+        actuations: at least one, unless supports change.
         until: ends the step before they are complete, where an observable has a value; or None.
+        support: supports that come in and stay; they hold nodes, and slopes of clamps, where the step finds them.
+        release: what is let go of, before `support` comes in: places of supports or of prescribed displacements, or
+            supports themselves. The forces that it carried go to zero while lambda runs from 0 to 1.
     """
 
-    actuations: tuple[Actuation, ...]
+    actuations: tuple[Actuation, ...] = ()
     until: Until | None = None
+    support: tuple[Constraint, ...] = ()
+    release: tuple[str | Sequence[int] | Constraint, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what is no step.
 
         Raises:
-            ModelError: no actuation, or something that is none; one line.
+            ModelError: nothing happens in it, or something that is no actuation or support; one line.
         """
-        if not self.actuations:
-            raise ModelError("a step needs at least one actuation (fold, pinch, moment, force or displace)")
+        if not (self.actuations or self.changes_supports):
+            raise ModelError(
+                "a step needs at least one actuation (fold, pinch, moment, force or displace), or supports that change"
+            )
+        for each in self.support:
+            if not isinstance(each, Constraint):
+                raise ModelError(f"a step takes supports such as bh.Support, not a {type(each).__name__}")
+        if self.release and self.until is not None:
+            raise ModelError(
+                "a step that releases supports has to be complete; let a step of its own end early"
+            )
         for item in self.actuations:
             if isinstance(item, Until):
                 raise ModelError("what ends a step is no actuation; give it by name: step(..., until=...)")
@@ -196,3 +217,13 @@ class Step:
                 raise ModelError(
                     f"a step takes actuations, not a {type(item).__name__}; derive it from bh.Actuation"
                 )
+
+    @property
+    def changes_supports(self) -> bool:
+        """Do supports come in, or go?"""
+        return bool(self.support or self.release)
+
+    @property
+    def looks_back(self) -> bool:
+        """Does what it is depend on the state that it begins with, beyond what steps before have asked for?"""
+        return self.changes_supports or any(item.looks_back for item in self.actuations)

@@ -349,7 +349,8 @@ class Path:
             ModelError: the formulation cannot take the step, or the model has contact and the formulation has none.
         """
         if step not in self._systems:
-            if any(each.until is not None for each in self.model.steps[:step]):
+            before = self.model.steps[:step]
+            if any(each.until is not None for each in before) or self._looks_back(step):
                 self._load_steps = load_steps(self.model, self._ended(step))
             made = self._formulation.system(self.model, self._load_steps[step], self._start(step))
             if self.model.contact is not False and not isinstance(made, Limited):
@@ -365,17 +366,22 @@ class Path:
             return None
         return self._halves.of(step, self.system(step), self._start(step), self._ended(step))
 
+    def _looks_back(self, step: int) -> bool:
+        """Does what a step asks for depend on the state that it, or one before it, begins with?"""
+        return any(each.looks_back for each in self.model.steps[: step + 1])
+
     def _start(self, step: int) -> State | None:
         """The state that a step begins at; None is the stress-free sheet."""
         last = max((i for i, r in enumerate(self.records) if r.step < step), default=None)
         return None if last is None else self[last]
 
     def _ended(self, before: int) -> dict[int, StepEnd]:
-        """Steps before `before` that ended early, by an `Until`."""
+        """Ends of steps before `before`: where an `Until` ended them early, and the last where supports changed."""
         last = {record.step: index for index, record in enumerate(self.records) if record.step < before}
         found = {}
         for step, index in last.items():
-            if self.model.steps[step].until is not None and self.records[index].lam < 1.0:
+            early = self.model.steps[step].until is not None and self.records[index].lam < 1.0
+            if early or (step == before - 1 and self._looks_back(before)):
                 state = self[index]
                 found[step] = StepEnd(state.lam, state.points, state.dihedral_angles)
         return found

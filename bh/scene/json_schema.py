@@ -17,6 +17,14 @@ SINGLE: dict[str, type[Table]] = {
 }
 NAMED = "^[^:]+:[^:]+$"  # module:name, of the user's own
 VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+NODES = {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1}
+PLACES: Schema = {
+    "anyOf": [
+        {"type": "string"},
+        NODES,
+        {"type": "array", "items": {"anyOf": [{"type": "string"}, NODES]}, "minItems": 1},
+    ]
+}
 OWN = {
     "type": "object",
     "properties": {"kind": {"type": "string", "pattern": NAMED}},
@@ -34,11 +42,13 @@ def schema() -> Schema:
     patterns: list[type[Table]] = [*LIBRARY.values(), DrawingPattern]
     steps = {key: _one_or_more(_table(found, kind)) for key, kind in tables.ACTUATIONS.items()}
     steps["until"] = _table(found, tables.UntilTable)
+    support: Schema = {"anyOf": [_table(found, tables.SupportTable), OWN]}
+    steps |= {"support": _one_or_more(support), "hold": PLACES, "release": PLACES}
     scene = {
         "pattern": {"anyOf": [*_tables(found, patterns), OWN]},
         **{name: _table(found, kind) for name, kind in SINGLE.items()},
         "mesh": {"anyOf": _tables(found, MESHES)},
-        "supports": {"type": "array", "items": {"anyOf": [_table(found, tables.SupportTable), OWN]}},
+        "supports": {"type": "array", "items": support},
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
         "symmetry": {"anyOf": [{"enum": ["x", "y"]}, VECTOR]},
         "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},

@@ -16,13 +16,13 @@ from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
 from bh.model.actuations import Displace, Force
 from bh.model.crease_law import CreaseLaw
-from bh.model.model import Model
+from bh.model.model import Model, Place
 from bh.model.plugins import consent, made
 from bh.model.refinement import Goal
 from bh.model.serialise import ACTUATIONS as MAKERS
 from bh.model.sheet import Sheet
 from bh.model.step import Actuation, Step
-from bh.model.supports import Constraint, RigidBody, Support, directions, select
+from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, select
 from bh.model.until import Until
 from bh.scene.changes import set_keys
 from bh.scene.meshing import mesh_of
@@ -34,6 +34,7 @@ from bh.scene.reading import (
     nearest,
     one_line,
     one_or_more,
+    places,
     read_table,
     read_toml,
     shown,
@@ -67,6 +68,7 @@ SECTIONS = (
     "accuracy",
     "symmetry",
 )
+CHANGES = ("support", "hold", "release")  # keys of a step beside its actuations
 LONGEST_FILE = 20_000_000  # bytes
 
 
@@ -219,7 +221,8 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         formulation=name,
         hinge_lock=how.hinge_lock,
     )
-    _check(model)
+    _check_names(model)
+    _check_steps(model)
     return Scene(
         model,
         Outputs(**arguments(outputs)),
@@ -293,18 +296,32 @@ def _crease(item: object, at: str) -> CreaseLaw:
 
 def _step(item: object, at: str) -> Step:
     step = as_table(item, at)
-    check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTUATIONS, "until"))
+    check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTUATIONS, "until", *CHANGES))
     if not set(step) - {"until"}:
-        raise SceneError(f"{at} is empty; add one of {', '.join(ACTUATIONS)}")
+        raise SceneError(f"{at} is empty; add one of {', '.join((*ACTUATIONS, *CHANGES))}")
     found: list[Actuation] = []
     until = None
+    support, release = _changes(step, at)
     for key, value in step.items():
+        if key in CHANGES:
+            continue
         if key == "until":
             until = _until(value, f"{at}.until")
             continue
         for where, each in one_or_more(value, f"{at}.{key}"):
             found.append(_actuation(key, each, where))
-    return Step(tuple(found), until)
+    with within(at):
+        return Step(tuple(found), until, support, release)
+
+
+def _changes(step: dict[str, object], at: str) -> tuple[tuple[Constraint, ...], tuple[Place, ...]]:
+    """Supports that come in with a step, and places that it releases."""
+    support: list[Constraint] = []
+    if "support" in step:
+        support += [_support(each, where) for where, each in one_or_more(step["support"], f"{at}.support")]
+    if "hold" in step:
+        support += [Hold(place) for place in places(step["hold"], f"{at}.hold")]
+    return tuple(support), places(step["release"], f"{at}.release") if "release" in step else ()
 
 
 def _until(item: object, at: str) -> Until:
@@ -339,17 +356,25 @@ def _direction(vector: Sequence[float], at: str) -> tuple[float, ...]:
     return tuple(component / largest for component in vector)
 
 
-def _check(model: Model) -> None:
-    """Are all places and creases there, can the steps be programmed? Errors tell where in the scene it is."""
+def _check_place(model: Model, support: Constraint, at: str) -> None:
+    if isinstance(support, Support | Hold):
+        with within(at):
+            select(model.mesh, support.at)
+
+
+def _check_names(model: Model) -> None:
+    """Are all places and creases there? Errors tell where in the scene it is."""
     mesh = model.mesh
     for name in model.creases:
         with within(f"creases.{name}"):
             mesh.crease_edges(name)
     for i, support in enumerate(model.supports):
-        if isinstance(support, Support):
-            with within(f"supports[{i}].at"):
-                select(mesh, support.at)
+        _check_place(model, support, f"supports[{i}].at")
     for i, asked in enumerate(model.steps):
+        for support in asked.support:
+            _check_place(
+                model, support, f"steps[{i}].{'hold' if isinstance(support, Hold) else 'support.at'}"
+            )
         for item in asked.actuations:
             key = type(item).__name__.lower()
             crease = getattr(item, "crease", "all")
@@ -359,6 +384,10 @@ def _check(model: Model) -> None:
             if isinstance(item, Force | Displace):
                 with within(f"steps[{i}].{key}.at"):
                     select(mesh, item.at)
+
+
+def _check_steps(model: Model) -> None:
+    """Can the steps be programmed?"""
     try:
         steps = load_steps(model)
     except InputError:
@@ -367,6 +396,8 @@ def _check(model: Model) -> None:
                 load_steps(replace(model, steps=model.steps[: i + 1]))
         raise
     for i, step in enumerate(steps):
+        if any(each.looks_back for each in model.steps[1 : i + 1]):
+            break  # what is held in these is known when it has been solved
         if step.constraints.rigid_body and step.force.end.any():  # forces on a free sheet have to balance
             with within(f"steps[{i}]"):
                 formulation(model.formulation).system(model, step, None)

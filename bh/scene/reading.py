@@ -238,6 +238,35 @@ def one_or_more(value: object, at: str) -> list[tuple[str, object]]:
     return [(f"{at}[{i}]", each) for i, each in enumerate(value)]
 
 
+def places(value: object, at: str) -> tuple[str | tuple[int, ...], ...]:
+    """A place, or several: names, and lists of node indices. A list of numbers is one place.
+
+    Args:
+        value: what the scene has there.
+        at: its dotted path.
+
+    Returns:
+        a name or node indices for each.
+
+    Raises:
+        SceneError: it is something else; one line.
+    """
+
+    def nodes(item: object) -> tuple[int, ...] | None:
+        if not isinstance(item, list) or not item:
+            return None
+        found = tuple(each for each in item if isinstance(each, int) and not isinstance(each, bool))
+        return found if len(found) == len(item) and min(found) >= 0 else None
+
+    given = [value] if isinstance(value, str) or nodes(value) else value
+    items = (
+        [each if isinstance(each, str) else nodes(each) for each in given] if isinstance(given, list) else []
+    )
+    if not items or None in items:
+        raise SceneError(f"{at} = {shown(value)} cannot be; give {PLACE}, or a list of these")
+    return tuple(item for item in items if item is not None)
+
+
 @contextmanager
 def within(at: str) -> Iterator[None]:
     """Errors inside get the dotted path in front, as a `SceneError`.

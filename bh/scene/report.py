@@ -63,8 +63,9 @@ def report(scene: Scene) -> list[str]:
     if not model.supports:
         lines.append("supports: none; rigid motions are taken out, nothing is held")
     for i, step in enumerate(model.steps):
-        items = (*step.actuations, step.until) if step.until else step.actuations
-        lines.append(f"step {i + 1}: " + ", ".join(_words(item) for item in items))
+        items = [_words(item) for item in (*step.actuations, *step.support, step.until) if item]
+        goes = [f"release {item if isinstance(item, str) else 'nodes'}" for item in step.release]
+        lines.append(f"step {i + 1}: " + ", ".join([*goes, *items]))
     # a mesh that is yet to be chosen is here to show the places, and nothing can be said of it
     shown = [r for r in remarks(model) if scene.accuracy is None or r.code == "drawing"]
     return lines + [f"remark ({remark.code}): {remark}" for remark in shown]
@@ -81,7 +82,7 @@ def _words(item: object) -> str:
     given = {key: value for key, value in vars(item).items() if value is not None}
     place = given.pop("crease", None) or given.pop("at", "")
     rest = ", ".join(f"{key} = {value}" for key, value in given.items())
-    return f"{type(item).__name__.lower()} {place} ({rest})"
+    return f"{type(item).__name__.lower()} {place}" + (f" ({rest})" if rest else "")
 
 
 def draw(scene: Scene, file: str | os.PathLike[str]) -> Path:

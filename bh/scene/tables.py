@@ -268,7 +268,12 @@ class DisplaceTable(Table):
 
     at: Place = Field(description=PLACE)
     direction: Literal["x", "y", "z"] | Vector = Field(description='"x", "y", "z" or a direction [x, y, z]')
-    by: Distance = Field(description="a displacement in mm")
+    by: Distance | None = Field(
+        None, description="a displacement in mm from the stress-free position, or give further"
+    )
+    further: Distance | None = Field(
+        None, description="a displacement in mm from where the node is when the step begins"
+    )
 
 
 class PullTable(Table):

@@ -10,7 +10,7 @@ from dataclasses import astuple, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
-from bh.errors import ModelError, PathFileError
+from bh.errors import ModelError, NotHeldError, PathFileError
 from bh.formulations.observables import measure
 from bh.loading.builder import load_steps
 from bh.loading.load_step import same_until_here
@@ -114,9 +114,14 @@ def _opened(
 def _run_step(
     path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
 ) -> StepOutcome:
-    half = path.half(step)
-    system = path.system(step) if half is None else half.system
     began = time.perf_counter()
+    try:
+        half = path.half(step)
+        system = path.system(step) if half is None else half.system
+    except NotHeldError as error:  # in a state that nobody knew before
+        if not path.records:
+            raise
+        return StepOutcome(Outcome.MECHANISM, str(error))
 
     def accept(record: Record) -> None:
         record = record if half is None else record.of_whole(half)

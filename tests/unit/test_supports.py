@@ -16,7 +16,8 @@ import bh
 import meshes
 from bh import Displace, Fold, Force, Model, ModelError, RigidBody, Sheet, Support, trace
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
-from bh.model.supports import Prescribed, directions, free_motions, resolve, rigid_motions, select
+from bh.model.constraints import Prescribed, free_motions, resolve, rigid_motions
+from bh.model.supports import directions, select
 from meshes import MeshError, SheetMesh
 
 Array = NDArray[np.float64]

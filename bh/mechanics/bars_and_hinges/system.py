@@ -74,7 +74,8 @@ class BarsAndHingesSystem(SupportedSheet):
         mesh = model.mesh
         if len(load_step.constraints.clamped):
             raise ModelError(
-                "bars and hinges have no slope at an edge to clamp; take formulation consistent, or hold the next row"
+                "bars and hinges have no slope at an edge to clamp; take formulation consistent, or hold "
+                "nodes: support in place of hold, and the next row for the slope"
             )
         self.reference = mesh.points
         start_points = mesh.points if start is None else start.points

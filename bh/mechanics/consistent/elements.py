@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
 from bh.materials import Constant, Directed, Law, LinearElastic, Material
 from bh.materials.protocols import in_axes
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.bending import Bending
+from bh.mechanics.consistent.clamps import Clamps, clamps
 from bh.mechanics.consistent.kernels import OWN, TURN
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.patches import (
@@ -61,6 +63,7 @@ class ConsistentElements:
         prescribed: (m,) prescribed dihedral angles at every hinge, rad; nan where it is not prescribed.
         lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at prescribed ones.
         rotations: how many there are.
+        let_go: (rotations,) couples of clamps that are let go of, on the rotations of their edges, N mm.
     """
 
     members: Ints
@@ -87,6 +90,7 @@ class ConsistentElements:
     prescribed: Ramp
     lock: Array
     rotations: int
+    let_go: Ramp
 
 
 def consistent_elements(
@@ -97,6 +101,7 @@ def consistent_elements(
     plane: Mirror | None = None,
     measure: Measure = smoothed_strain,
     material: Material = LINEAR,
+    start: State | None = None,
 ) -> ConsistentElements:
     """Element arrays of a model in one step.
 
@@ -108,6 +113,7 @@ def consistent_elements(
         plane: of the symmetry, for the half of a sheet (`bh.mechanics.shared.mirrored`); None for all.
         measure: of the strain.
         material: laws of strain and of curvature.
+        start: the state that the step begins at, for clamps as it lies; None for the stress-free sheet.
 
     Raises:
         ModelError: given element stiffness, a couple on a crease that is no spring, or a grain that the material does
@@ -122,21 +128,19 @@ def consistent_elements(
     of_strain, of_curvature = _laws(material, sheet)
     maps, angle = curvature_maps(edges, areas), frame_angles(mesh.points, mesh.triangles)
     B = bending_matrices(maps, areas, in_axes(of_curvature, angle).moduli(np.zeros((len(areas), 3))))
-    clamped = np.zeros(len(topology.edges), dtype=bool)
-    clamped[topology.find_edges(load_step.constraints.clamped)] = True
-    spring = law == SPRING
+    held, spring = clamps(mesh, load_step, start), law == SPRING
     part = None if plane is None else plane.triangle_weight
     condense = isinstance(of_curvature, Constant)
-    joined = patches(mesh, B, spring, clamped, triangle_ranks(mesh), group=part, condense=condense)
+    joined = patches(mesh, B, spring, held.edges, triangle_ranks(mesh), group=part, condense=condense)
     if plane is not None:
         from bh.mechanics.consistent.half import half_patches
 
         joined = half_patches(joined, spring, plane)
-    rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
+    rotation, turns, rotations, let_go = _number_rotations(mesh, joined, spring, plane, held)
     part_area = areas if part is None else part * areas
     membrane = measure(mesh, creased(mesh, law))
     bending_law = in_axes(of_curvature, angle[joined.members[:, 0]])
-    quad, ghost = _quads(mesh, joined)
+    quad, ghost = _quads(mesh, joined, held.outward)
     nodes, place = _rows(joined, quad)
     has = rotation >= 0
     in_nodes = 3 * (nodes >= 0).sum(axis=1)
@@ -166,7 +170,7 @@ def consistent_elements(
         spring_stiffness=k_fold, spring_rest=Ramp(begin, load_step.rest.end[springs]),
         couple=couple,
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
-        lock=lock_stiffness(model, load_step), rotations=rotations,
+        lock=lock_stiffness(model, load_step), rotations=rotations, let_go=let_go,
     )  # fmt: skip
     return whole if plane is None else _half(whole, plane)
 
@@ -243,12 +247,13 @@ def triangle_ranks(mesh: SheetMesh) -> Array:
 
 
 def _number_rotations(
-    mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None
-) -> tuple[Ints, Ints, int]:
-    """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), and their number.
+    mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None, held: Clamps
+) -> tuple[Ints, Ints, int, Ramp]:
+    """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), their number, and couples, N mm.
 
     There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that
-    keeps its own; but one for a spring in the plane of a symmetric sheet, and none for what lies outside of its half.
+    keeps its own, as those do whose clamp is let go of, with its couple; but one for a spring in the plane of a
+    symmetric sheet, and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
     two_sided = spring.copy()
@@ -263,13 +268,21 @@ def _number_rotations(
     side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
     has = (joined.hinge >= 0) & ~joined.inner
     rotation = np.where(has, both[joined.hinge, side], -1)
-    free = (joined.hinge < 0) & (joined.kind == OWN)
+    couple = held.couple[mesh.topology.triangle_edges.ravel()[joined.half_edge]]
+    let_go = (joined.kind == TURN) & (joined.hinge < 0) & (couple != 0.0)
+    free = ((joined.hinge < 0) & (joined.kind == OWN)) | let_go
     rotation[free] = count.sum() + np.arange(free.sum())
-    return rotation, both, int(count.sum() + free.sum())
+    rotations = int(count.sum() + free.sum())
+    couples = np.zeros(rotations)
+    couples[rotation[let_go]] = couple[let_go]
+    return rotation, both, rotations, Ramp(couples, np.zeros(rotations))
 
 
-def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
-    """Nodes (c, a, 4) of TURN angles, and ghosts (c, a, 3) of clamps: where the sheet would go on, mm."""
+def _quads(mesh: SheetMesh, joined: Patches, outward: Array) -> tuple[Ints, Array]:
+    """Nodes (c, a, 4) of TURN angles, and ghosts (c, a, 3) of clamps: where the sheet would go on, mm.
+
+    That is `outward` (e, 3) where it is given, else as in the stress-free sheet.
+    """
     quad = np.zeros((*joined.kind.shape, 4), dtype=np.int64)
     ghost = np.zeros((*joined.kind.shape, 3))
     turning = (joined.kind == TURN) & (joined.hinge >= 0)
@@ -282,7 +295,8 @@ def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
     points = mesh.points[quad[clamp]]
     normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    ghost[clamp] = np.cross(points[:, 2] - points[:, 1], normal)
+    given = outward[mesh.topology.triangle_edges.ravel()[joined.half_edge[clamp]]]
+    ghost[clamp] = np.where(np.isnan(given), np.cross(points[:, 2] - points[:, 1], normal), given)
     return quad, ghost
 
 

@@ -18,6 +18,7 @@ from bh.formulations.state import Energy, State
 from bh.loading.load_step import LoadStep
 from bh.materials import Material
 from bh.mechanics.consistent import remarks
+from bh.mechanics.consistent.clamps import read_slopes
 from bh.mechanics.consistent.derivatives import ConsistentDerivatives
 from bh.mechanics.consistent.elements import LINEAR
 from bh.mechanics.consistent.kernels import TURN
@@ -118,6 +119,7 @@ class Consistent:
         by_hinge = np.zeros(len(angles))
         by_hinge[e.patches.hinge[turning]] = M[turning]
         moments[prescribed] = (by_hinge / lengths)[prescribed]
+        slopes, couples = read_slopes(mesh, e.patches, now.theta, M)
         return State(
             mesh=mesh, step=step, lam=lam, points=x,
             energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact),
@@ -128,7 +130,7 @@ class Consistent:
                 "folding": to_triangles(mesh, folding, topology.hinge_edges[e.springs]),
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
-            crease_moments=moments, stable=stable,
+            crease_moments=moments, stable=stable, edge_slopes=slopes, clamp_couples=couples,
             contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
         )  # fmt: skip
 

@@ -90,7 +90,9 @@ class ConsistentSystem(SupportedSheet):
             if start is None
             else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
         )
-        self.elements = consistent_elements(model, load_step, angles, moments, plane, measure, material)
+        self.elements = consistent_elements(
+            model, load_step, angles, moments, plane, measure, material, start
+        )
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = np.array(
@@ -190,7 +192,7 @@ class ConsistentSystem(SupportedSheet):
             lam: load parameter of the step, 0 to 1.
         """
         e = self.elements
-        f, r = np.zeros_like(x), np.zeros(e.rotations)
+        f, r = np.zeros_like(x), e.let_go.at(lam)
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
         turns = np.empty(len(e.springs))
         N, M, S, L = self.split(forces)
@@ -230,6 +232,7 @@ class ConsistentSystem(SupportedSheet):
             + now.lock
             + touched
             - float(np.vdot(load, x - self.mesh.points))
+            + float(self.elements.let_go.at(lam) @ q[self.moving :])
         )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
         imbalance = self._imbalance(residual, now.size, load, x) if energy < np.inf else np.inf
@@ -375,7 +378,7 @@ class ConsistentSystem(SupportedSheet):
         v = self.displacements.prescribed_motion
         B = e.bending.stiffness(now.theta)
         rates, turns = self.force_rates(x, v, np.zeros(e.rotations), B, closing=False, controlled=True)
-        f, r = np.zeros_like(x), np.zeros(e.rotations)
+        f, r = np.zeros_like(x), e.let_go.rate
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
         e.stretching.force_rates(x, v, N, dN, f)
         kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, M, dM, f, r)
@@ -407,6 +410,7 @@ class ConsistentSystem(SupportedSheet):
         _, M, S, _ = self.split(now.forces)
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
         total -= float(np.vdot(self.force.rate, x - self.mesh.points))
+        total += float(self.elements.let_go.rate @ q[self.moving :])
         if self.rigid_contact is not None:
             total += self.rigid_contact.power(x, lam)
             self.rigid_contact.forces(x, lam, now.f)

@@ -14,9 +14,10 @@ from bh.mechanics.shared import penetration as hinge_penetration
 from bh.mechanics.shared.contact import RigidContact
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
+from bh.model.constraints import MOTIONS, TURNED, rigid_motions
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.model import Model
-from bh.model.supports import MOTIONS, TURNED, rigid_motions
+from bh.model.ramp import Ramp
 from bh.solvers.outcome import Outcome
 from bh.solvers.system import System, grows_ahead
 from meshes import SheetMesh
@@ -61,9 +62,12 @@ class SupportedSheet:
             from bh.mechanics.shared.mirrored import MirroredDisplacements
 
             self.displacements = MirroredDisplacements(self.mesh, load_step.constraints, start_points, plane)
+        if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
+            let_go = start.reactions - self.displacements.reactions(start.reactions)
+            self.force = Ramp(self.force.start + let_go, self.force.end)
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
-        if self.constraints.rigid_body:
+        if self.constraints.rigid_body and (start is None or not load_step.releases):
             self.displacements.check_balance(self.force)
         self.barrier: SheetBarrier | None = None
         if model.contact is not False:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.model.constraints import UNBALANCED, Constraints, free_motions, rigid_motions
 from bh.model.ramp import Ramp
-from bh.model.supports import UNBALANCED, Constraints, free_motions, rigid_motions
 from meshes import SheetMesh
 from meshes.topology import Ints
 

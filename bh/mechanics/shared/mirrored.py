@@ -17,8 +17,8 @@ from bh.loading.load_step import LoadStep
 from bh.loading.symmetry import Mirror
 from bh.mechanics.bars_and_hinges.elements import Elements
 from bh.mechanics.shared.displacements import Displacements
+from bh.model.constraints import Constraints
 from bh.model.ramp import Ramp
-from bh.model.supports import Constraints
 from meshes import SheetMesh
 from meshes.topology import Ints
 

@@ -1,0 +1,100 @@
+"""Slopes of the sheet at edges of its boundary: read from a state, held as they lie, and let go of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.formulations.state import State
+from bh.loading.load_step import LoadStep
+from bh.mechanics.consistent.kernels import TURN
+from bh.mechanics.consistent.patches import Patches
+from meshes import SheetMesh
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Clamps:
+    """What edges of the boundary are asked for in a step.
+
+    Attributes:
+        edges: (e,) True where the slope is held, or was until the step began.
+        outward: (e, 3) where the sheet goes on beyond an edge that is held as it lies, mm, as long as the edge; nan
+            for all others.
+        couple: (e,) what a clamp that is let go of carried, N mm: it goes to zero during the step.
+    """
+
+    edges: NDArray[np.bool_]
+    outward: Array
+    couple: Array
+
+
+def clamps(mesh: SheetMesh, load_step: LoadStep, start: State | None) -> Clamps:
+    """The clamps of a step that begins at a state.
+
+    Args:
+        mesh: the stress-free sheet.
+        load_step: has the clamped edges.
+        start: a state of the consistent formulation; None for the stress-free sheet.
+    """
+    topology, held = mesh.topology, load_step.constraints
+    edges = np.zeros(len(topology.edges), dtype=bool)
+    rows = topology.find_edges(held.clamped)
+    edges[rows] = True
+    lying = np.zeros_like(edges)
+    lying[rows] = held.as_it_lies
+    couple = np.zeros(len(edges))
+    outward = np.full((len(edges), 3), np.nan)
+    if start is None or start.edge_slopes is None or start.clamp_couples is None:
+        return Clamps(edges, outward, couple)
+    if load_step.releases:
+        couple = np.where(edges, 0.0, start.clamp_couples)
+    lying |= couple != 0.0
+    outward[lying] = _directions(mesh, start, np.flatnonzero(lying))
+    return Clamps(edges | lying, outward, couple)
+
+
+def _directions(mesh: SheetMesh, start: State, edges: Ints) -> Array:
+    """(k, 3) where the sheet goes on beyond edges of the boundary in a state, mm, as long as the edge."""
+    topology = mesh.topology
+    triangle = topology.edge_triangles[edges, 0]
+    side = (topology.triangle_edges[triangle] == edges[:, None]).argmax(axis=1)
+    corners = mesh.triangles[triangle[:, None], (side[:, None] + np.arange(3)) % 3]
+    x = start.points[corners]  # the corner, then its opposite edge counter-clockwise
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    edge = x[:, 2] - x[:, 1]
+    assert start.edge_slopes is not None
+    slope = start.edge_slopes[edges][:, None]
+    length = np.linalg.norm(edge, axis=1)[:, None]
+    return np.asarray(np.cos(slope) * np.cross(edge, normal) + np.sin(slope) * length * normal)
+
+
+def read_slopes(mesh: SheetMesh, joined: Patches, theta: Array, moments: Array) -> tuple[Array, Array]:
+    """(e,) slopes at the boundary, rad, nan inside; and (e,) couples of clamps there, N mm, zero elsewhere.
+
+    A slope is the angle from the triangle at the edge up to the sheet's tangent plane there.
+
+    Args:
+        mesh: the stress-free sheet.
+        joined: patches.
+        theta: (c, a) their angles, rad.
+        moments: (c, a) N mm.
+    """
+    topology = mesh.topology
+    of_half = topology.triangle_edges.ravel()
+    slopes, couples = np.full(len(topology.edges), np.nan), np.zeros(len(topology.edges))
+    members = joined.members
+    half = np.where(members[:, :, None] >= 0, 3 * members[:, :, None] + np.arange(3), -1).reshape(
+        len(members), -1
+    )
+    edge = of_half[half]
+    rim = (half >= 0) & (topology.edge_hinges[edge] < 0)
+    slopes[edge[rim]] = np.einsum("cha,ca->ch", joined.shares, theta)[rim]
+    clamp = (joined.kind == TURN) & (joined.hinge < 0)
+    couples[of_half[joined.half_edge[clamp]]] = moments[clamp]
+    return slopes, couples
