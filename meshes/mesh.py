@@ -67,8 +67,8 @@ class SheetMesh:
         aspect_ratio: mean panel height across the crease over width along it (alpha = H / W), or nan.
         remarks: what was taken for granted when the pattern was read, one line each.
         origin: the pattern that it was made of, where there is one; see `pattern`.
-        drawn: (n, 3) where the nodes were when the mesh was made, mm, and where its curves are; a copy with other points
-            keeps them, so that a mesh that was moved still knows its curves. None: here.
+        drawn: (n, 3) where the nodes were when the mesh was made, mm, and where its curves are; a copy with other
+            points keeps them, so that a mesh that was moved still knows its curves. None: here.
 
     Raises:
         MeshError: indices out of range, degenerate triangles, non-manifold edges, sets that are no edges.

@@ -99,7 +99,7 @@ class Consistent:
         """
         e, mesh = system.elements, system.mesh
         topology = mesh.topology
-        x = system.positions(q, lam)
+        x = system.near(q, lam)
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
         contact = 0.0 if system.barrier is None else system.barrier.forces(x, now.f)
@@ -119,7 +119,7 @@ class Consistent:
         by_hinge[e.patches.hinge[turning]] = M[turning]
         moments[prescribed] = (by_hinge / lengths)[prescribed]
         return State(
-            mesh=mesh, step=step, lam=lam, points=x,
+            mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact),
             dihedral_angles=angles,
             energy_density={

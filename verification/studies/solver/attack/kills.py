@@ -1,4 +1,4 @@
-"""Random kills and interrupts of run, sweep, verify and report: what is finished is kept, and the end has the same bits."""
+"""Random kills and interrupts of run, sweep, verify and report: what is finished is kept, the end has the same bits."""
 
 from __future__ import annotations
 
@@ -176,8 +176,8 @@ def _judged(ended: Ended, send: signal.Signals) -> list[str]:
             failures.append(f"exit code {ended.code} in place of 130: {ended.said.strip()[-200:]}")
         if ended.lines != 1 and "Traceback" in ended.said:
             failures.append("a traceback")
-        if ended.after_s > SOON_S:
-            failures.append(f"ended {ended.after_s:.1f} s after Ctrl-C")
+        if ended.after_s > SOON_S * ended.crowd:
+            failures.append(f"ended {ended.after_s:.1f} s after Ctrl-C, {ended.crowd:.1f} processes a core")
     return failures
 
 

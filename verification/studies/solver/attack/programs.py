@@ -28,6 +28,7 @@ class Ended:
         cpu_s: processor time of it and of the children that it waited for, s.
         megabytes: the most memory that it held.
         left: processes of its session that were still there `GONE_S` later.
+        crowd: processes that shared a core then (mean of a minute), 1 or more.
     """
 
     code: int
@@ -36,6 +37,7 @@ class Ended:
     cpu_s: float
     megabytes: float
     left: int
+    crowd: float = 1.0
 
     @property
     def lines(self) -> int:
@@ -101,11 +103,13 @@ def play(
     status, usage = done if done is not None else (signal.SIGKILL, None)
     program.returncode = os.waitstatus_to_exitcode(status)
     cpu = usage.ru_utime + usage.ru_stime if usage else 0.0
-    return Ended(program.returncode, text, took, cpu, usage.ru_maxrss / 1024.0 if usage else 0.0, left)
+    memory = usage.ru_maxrss / 1024.0 if usage else 0.0
+    crowd = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+    return Ended(program.returncode, text, took, cpu, memory, left, crowd)
 
 
 def _heeding() -> None:
-    """Interrupts count in the program, also where this process runs in the background of a shell, which ignores them."""
+    """Interrupts count in the program, also where this process runs in the background of a shell."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 

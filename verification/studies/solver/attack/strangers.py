@@ -39,14 +39,14 @@ def proofs(folder: Path, random: np.random.Generator) -> Found:
     (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
     _play(("run", "scene.toml", "-q", "-o", "run", "--no-estimate"), folder)
     _poison(folder / "run" / "path.bh")
-    stored = (
+    stored: tuple[tuple[str, ...], ...] = (
         ("view", "run", "--picture", "a.png"),
         ("run", "scene.toml", "-q", "-o", "run", "--resume"),
         ("export", "run", "a.obj"),
     )
-    for words in stored:
+    for again in stored:
         tried += 1
-        failures += _refused(_play(words, folder), folder, f"stored path, {words[0]}")
+        failures += _refused(_play(again, folder), folder, f"stored path, {again[0]}")
     return Found(tried, failures)
 
 
