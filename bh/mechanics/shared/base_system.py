@@ -123,7 +123,12 @@ class SupportedSheet:
         return self.displacements.positions(q[: self.moving], lam)
 
     def near(self, q: Array, lam: float) -> Array:
-        """(n, 3) the same from an origin that is not far from the sheet, for all that is only of differences, mm."""
+        """(n, 3) positions, mm, from an origin that is not far from the sheet, for all that is of differences only.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         return self.displacements.near(q[: self.moving], lam)
 
     def rounding(self, q: Array, lam: float) -> float:
@@ -210,7 +215,12 @@ class SupportedSheet:
 
 
 def typical_force(size: float, load: Array) -> float:
-    """The larger of the elements' typical force and the largest component of the loads (n, 3), N, never 0."""
+    """The larger of the elements' typical force and the largest component of the loads, N, never 0.
+
+    Args:
+        size: typical force of the elements, N.
+        load: (n, 3) on the nodes, N.
+    """
     return max(size, float(np.abs(load).max(initial=0.0)), TINIEST)
 
 

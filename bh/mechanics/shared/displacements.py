@@ -96,6 +96,9 @@ class Displacements:
         Args:
             u: (k,) displacements, mm.
             lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            (n, 3) positions, mm.
         """
         return self.home + self._moves(u, lam)
 
