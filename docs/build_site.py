@@ -25,7 +25,10 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
 PAGES = {
-    "Use": ("installation", "drawing", "studio", "scenes", "plots", "testing", "report", "reliability"),
+    "Use": (
+        "installation", "drawing", "studio", "scenes", "materials", "results", "plots", "testing", "report",
+        "reliability",
+    ),
     "Studies": (
         "stiffness", "corrugations", "pinching", "inverse_design", "isometric", "sensitivities", "scaling", "scan",
         "performance",
