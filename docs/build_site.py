@@ -27,6 +27,7 @@ EXAMPLES = ROOT / "examples"
 PAGES = {
     "Use": (
         "installation", "drawing", "studio", "scenes", "materials", "results", "plots", "testing", "report",
+        "reliability",
     ),
     "Studies": (
         "stiffness", "corrugations", "pinching", "inverse_design", "isometric", "sensitivities", "scaling", "scan",

@@ -15,7 +15,7 @@ GENTLE = (
 
 
 def straight_edges(model: Model) -> tuple[Remark, ...]:
-    """A remark where rows of edges bow but lie on no curve, as of a mesh whose nodes were moved without its curves.
+    """A remark where rows of edges bow but lie on no curve, as of a mesh from a file of straight edges.
 
     Returns:
         the remark, or none.

@@ -168,16 +168,47 @@ def lift(mesh: SheetMesh) -> QuadraticMesh:
             triangle inside out (the mesh is too coarse for its curves).
     """
     plane_axes(mesh)
-    ends = mesh.points[mesh.topology.edges]
-    middle = ends.mean(axis=1)
+    try:
+        middle = _middles(mesh, mesh.points, NEAR * mesh.size)
+    except MeshError:
+        move = _moved(mesh)
+        if move is None:
+            raise
+        scale, turn, shift = move
+        assert mesh.drawn is not None
+        middle = scale * _middles(mesh, mesh.drawn, NEAR * mesh.size / scale) @ turn.T + shift
+    lifted = QuadraticMesh(mesh, np.vstack((mesh.points, middle)), _with_edges(mesh))
+    _check_orientation(lifted)
+    return lifted
+
+
+def _middles(mesh: SheetMesh, points: Array, near: float) -> Array:
+    """(e, 3) middles of the edges between points (n, 3), on their curves."""
+    ends = points[mesh.topology.edges]
+    middle: Array = ends.mean(axis=1)
     for name, curve in mesh.curves.items():
         if name not in mesh.edge_sets or isinstance(curve, Line):
             continue
         edges = mesh.topology.find_edges(mesh.edge_sets[name])
-        middle[edges, :2] = _middle(name, curve, ends[edges, :, :2], NEAR * mesh.size)
-    lifted = QuadraticMesh(mesh, np.vstack((mesh.points, middle)), _with_edges(mesh))
-    _check_orientation(lifted)
-    return lifted
+        middle[edges, :2] = _middle(name, curve, ends[edges, :, :2], near)
+    return middle
+
+
+def _moved(mesh: SheetMesh) -> tuple[float, Array, Array] | None:
+    """Scale, rotation (3, 3) and shift (3,) from where a mesh was drawn to where it is; None if it has another shape.
+
+    The best rotation of one set of points onto another is a polar decomposition (Kabsch 1976).
+    """
+    if mesh.drawn is None:
+        return None
+    from_, to = mesh.drawn.mean(axis=0), mesh.points.mean(axis=0)
+    a, b = mesh.drawn - from_, mesh.points - to
+    scale = float(np.linalg.norm(b) / np.linalg.norm(a))
+    left, _, right = np.linalg.svd(b.T @ a)
+    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    if float(np.abs(scale * a @ turn.T - b).max()) > NEAR * mesh.size:
+        return None
+    return scale, turn, to - scale * turn @ from_
 
 
 def _middle(name: str, curve: Curve, ends: Array, near: float) -> Array:

@@ -67,6 +67,8 @@ class SheetMesh:
         aspect_ratio: mean panel height across the crease over width along it (alpha = H / W), or nan.
         remarks: what was taken for granted when the pattern was read, one line each.
         origin: the pattern that it was made of, where there is one; see `pattern`.
+        drawn: (n, 3) where the nodes were when the mesh was made, mm, and where its curves are; a copy with other
+            points keeps them, so that a mesh that was moved still knows its curves. None: here.
 
     Raises:
         MeshError: indices out of range, degenerate triangles, non-manifold edges, sets that are no edges.
@@ -84,6 +86,7 @@ class SheetMesh:
     aspect_ratio: float = float("nan")
     remarks: tuple[str, ...] = ()
     origin: Origin | None = None
+    drawn: Array | None = None
 
     def __post_init__(self) -> None:
         """Check everything against everything else, and freeze the arrays."""
@@ -97,6 +100,8 @@ class SheetMesh:
             raise MeshError(f"node {node} is not finite; give three numbers in mm")
         set_ = object.__setattr__
         set_(self, "points", _frozen(points))
+        if self.drawn is None or np.shape(self.drawn) != points.shape:  # of a copy with other nodes
+            set_(self, "drawn", points)
         set_(self, "triangles", _frozen(_indices("triangles", self.triangles)))
         for name in ("edge_sets", "fold_angles"):
             whole = name == "edge_sets"

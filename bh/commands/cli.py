@@ -55,9 +55,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if debug:  # it may stand anywhere, also behind a command
         words.remove("--debug")
     try:
-        return _run(words, debug)
+        code = _run(words, debug)
     except KeyboardInterrupt:  # in the moment in which another end is told of
-        return _fail("interrupted", 130, debug)
+        code = _fail("interrupted", 130, debug)
+    if code == 130 and arguments is None:
+        _end_at_once(code)
+    return code
+
+
+def _end_at_once(code: int) -> None:
+    """End the process of an interrupted command.
+
+    Whoever interrupts need not wait until everything that was loaded is taken down. And `python -m` forgets the code
+    where the interrupt passed an `exec` on its way, as that of a dataclass that is being made: it ends by SIGINT.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _run(words: list[str], debug: bool) -> int:

@@ -44,6 +44,8 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
     """(data, arrays): everything a model consists of; `data` can be written as JSON."""
     mesh = model.mesh
     arrays: dict[str, AnyArray] = {"points": mesh.points, "triangles": mesh.triangles}
+    if mesh.drawn is not None and mesh.curves and not np.array_equal(mesh.drawn, mesh.points):
+        arrays["drawn"] = mesh.drawn
     if mesh.spans is not None:
         arrays["spans"] = mesh.spans
     if model.stiffness is not None:
@@ -97,7 +99,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             folds=flat["folds"], fold_angles=angles, spans=arrays.get("spans"), kind=flat["kind"],
             curves={name: _untagged(curve, CURVES) for name, curve in flat["curves"].items()},
             aspect_ratio=float("nan") if flat["aspect_ratio"] is None else flat["aspect_ratio"],
-            remarks=tuple(flat.get("remarks", ())),
+            remarks=tuple(flat.get("remarks", ())), drawn=arrays.get("drawn"),
         )  # fmt: skip
         return Model(
             mesh=mesh,

@@ -194,6 +194,20 @@ class System(Protocol):
 
 
 @runtime_checkable
+class Rounded(Protocol):
+    """Ability of a system: it knows what rounding of its unknowns does."""
+
+    def rounding(self, q: Array, lam: float) -> float:
+        """Largest residual that rounding makes at a state, over the typical force there; 0 where there is none.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        ...
+
+
+@runtime_checkable
 class Limited(Protocol):
     """Ability of a system: something can stand in the way of a step, which then has to be shorter."""
 

@@ -105,8 +105,10 @@ def _placed(se: Any, shape: Any) -> Any:
 
 def _parts(se: Any, path: Any) -> Iterator[tuple[int, list[Any]]]:
     """Numbers and segments of the connected parts of a path."""
-    for part, subpath in enumerate(path.as_subpaths()):
-        segments = [s for s in se.Path(subpath) if not isinstance(s, se.Move)]
+    subpaths = list(path.as_subpaths())
+    for part, subpath in enumerate(subpaths):
+        own = path if len(subpaths) == 1 else se.Path(subpath)  # which is a copy
+        segments = [s for s in own if not isinstance(s, se.Move)]
         segments = [s for s in segments if s.start is not None and s.end is not None and s.start != s.end]
         if segments:
             yield part, segments

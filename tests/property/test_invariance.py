@@ -272,3 +272,31 @@ def test_same_input_same_numbers() -> None:
     again = solve(free(sector()).fold("crease", to=2.0))
     assert np.array_equal(again.points, base_state("staggered", "held").points)
     assert again.energy == base_state("staggered", "held").energy
+
+
+FAR_FOLDS: dict[str, dict[str, Any]] = {**FOLDS, "pulled": {}}
+
+
+@pytest.mark.parametrize("formulation", ["bars-and-hinges", "consistent"])
+@pytest.mark.parametrize("how", FAR_FOLDS)
+def test_far_origins(formulation: str, how: str) -> None:
+    """A sheet at 1e8 mm, where coordinates are rounded to 1e-8 mm, folds like one at the origin."""
+
+    def model(shift: float) -> Model:
+        mesh = sector(along=6)
+        mesh = replace(mesh, points=mesh.points + shift * np.array([1.0, -1.0, 0.5]))
+        made = Model(mesh, SHEET, formulation=formulation)
+        if how != "pulled":
+            return made.fold("crease", **FAR_FOLDS[how])
+        made = made.support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
+        held = made.support("corner:inner-end", "z").fold("crease", by=0.3)
+        return held.step(Displace("corner:outer-end", "z", 1.0), Force([4], each=(0, 0, 1e-4)))
+
+    here, there = trace(model(0.0)), trace(model(1e8))
+    assert there.reached, there.reason
+    for number in range(len(here.model.steps)):
+        one = [s for s in here if s.step == number][-1]
+        other = [s for s in there if s.step == number][-1]
+        assert other.energy.total == pytest.approx(one.energy.total, rel=1e-6)
+        assert np.abs(other.dihedral_angles - one.dihedral_angles).max() < 1e-5
+    assert np.abs(there[-1].points - [1e8, -1e8, 5e7] - here[-1].points).max() < 1e-4

@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import bh
 import meshes
+from bh.model.serialise import describe, rebuild
 from meshes import Arc, MeshError, Polyline, SheetMesh
 from meshes.curved import lift
 from meshes.curves import Curve
@@ -101,3 +103,42 @@ def test_a_mesh_too_coarse_for_its_curve_is_refused() -> None:
     sheet = SheetMesh(points, np.array([[0, 2, 1], [1, 3, 0]]), crease, curves={"crease:c": arc})
     with pytest.raises(MeshError, match="turned inside out by its curved edge; use a finer mesh"):
         lift(sheet)
+
+
+SHAPES = {
+    "arcs": SECTOR,
+    "graphs": meshes.structured(meshes.sine_tessellation(creases=2), along=8, rows=2),
+    "gmsh": meshes.unstructured(meshes.annulus_sector(100.0, 10.0, 1.0), size=8.0),
+}
+
+
+def moved(mesh: SheetMesh, seed: int, far: float = 1e3, scale: float = 1.0) -> tuple[SheetMesh, np.ndarray]:
+    """A copy that was turned about any axis, and where its own nodes `p` go: scale * p @ turn.T + shift."""
+    random = np.random.default_rng(seed)
+    turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    shift = far * random.normal(size=3)
+    copy = replace(mesh, points=scale * mesh.points @ turn.T + shift)
+    return copy, scale * lift(mesh).nodes @ turn.T + shift
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(("far", "scale"), [(0.0, 1.0), (1e3, 1.0), (1e8, 1.0), (1e2, 1e-3), (1e3, 25.4)])
+def test_a_mesh_that_was_moved_keeps_its_curves(name: str, far: float, scale: float) -> None:
+    copy, nodes = moved(SHAPES[name], 1, far, scale)
+    size = copy.size
+    assert np.abs(lift(copy).nodes - nodes).max() < 1e-12 * size + 1e-15 * far
+
+
+def test_a_moved_mesh_keeps_its_curves_in_files() -> None:
+    copy, nodes = moved(SECTOR, 2)
+    model = bh.Model(copy, bh.Sheet(E=4000.0, t=0.1))
+    read = rebuild(*describe(model)).mesh
+    np.testing.assert_allclose(lift(read).nodes, nodes, atol=1e-9)
+    assert "drawn" not in describe(bh.Model(SECTOR, bh.Sheet(E=4000.0, t=0.1)))[1]
+
+
+def test_a_mesh_of_another_shape_has_lost_its_curves() -> None:
+    stretched = replace(SECTOR, points=SECTOR.points * [1.0, 1.01, 1.0])
+    with pytest.raises(MeshError, match="off its curve"):
+        lift(stretched)

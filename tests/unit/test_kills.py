@@ -177,6 +177,27 @@ def test_an_interrupt_while_another_end_is_told_of(
     assert capsys.readouterr().err == "bh: interrupted\n"
 
 
+INSIDE_EXEC = """
+import sys
+import bh.scene.load
+from bh.commands.cli import main
+def load_scene(*_):
+    exec("raise KeyboardInterrupt")
+bh.scene.load.load_scene = load_scene
+sys.argv[1:] = ["check", "scene.toml"]
+sys.exit(main())
+"""
+
+
+def test_an_interrupt_within_exec_keeps_its_exit_code(tmp_path: Path) -> None:
+    """Python itself would end a module by SIGINT: it remembers the interrupt of a string, though it was caught."""
+    (tmp_path / "inside.py").write_text(INSIDE_EXEC)
+    words = [sys.executable, "-m", "inside"]
+    env = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    done = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "bh: interrupted\n")
+
+
 def test_finished_cases_outlive_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Interrupted in the second case: the first is stored, and what was there before is `previous.json`."""
 

@@ -850,3 +850,28 @@ def test_a_file_of_version_0_1_is_refused_in_one_line(tmp_path: FilePath) -> Non
         assert "\n" not in str(told.value)
         assert "old.bh" in str(told.value)
     assert file.read_bytes() == before
+
+
+# --- loads that rounding hides -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("formulation", ["bars-and-hinges", "consistent"])
+def test_loads_that_rounding_hides_are_told(formulation: str) -> None:
+    """Under a tenth of a nanonewton the state is "reached" with an energy of nothing; a thousandfold one is right."""
+    model = replace(CORNERS, formulation=formulation)
+
+    def pushed(force: float) -> Path:
+        return trace(model.step(Force("corner:outer-end", total=(0.0, 0.0, force))))
+
+    right, lost = pushed(1e-5), pushed(1e-10)
+    assert lost[-1].energy.total / 1e-20 < 0.5 * right[-1].energy.total / 1e-10  # what there is to tell of
+    assert any("rounding hides" in line for line in lost.remarks)
+    assert not any("rounding hides" in line for line in right.remarks)
+
+
+def test_a_sheet_that_folds_without_forces_is_not_hidden_by_rounding() -> None:
+    strip = meshes.structured(meshes.strip(40.0, 8.0, creases=[4.0]), along=4)
+    path = trace(Model(strip, SHEET, formulation="bars-and-hinges").fold("all", by=1.0))
+    assert path.reached
+    assert path[-1].energy.total < 1e-12
+    assert not any("rounding hides" in line for line in path.remarks)

@@ -97,7 +97,7 @@ class BarsAndHinges:
     ) -> State:
         """Everything that can be read from the unknowns `q` at `lam`."""
         e, mesh = system.elements, system.mesh
-        x = system.positions(q, lam)
+        x = system.near(q, lam)
         _, _, f, forces, turn = system.internal_forces(x, q, lam)
         contact = 0.0 if system.barrier is None else system.barrier.forces(x, f)
         phi = dihedral_angles(x, e.hinges)
@@ -121,7 +121,7 @@ class BarsAndHinges:
         moments[e.source[crease]] = elastic[crease] / system.hinge_lengths[crease]
         reactions = system.displacements.reactions(f - system.force.at(lam))
         return State(
-            mesh=mesh, step=step, lam=lam, points=x,
+            mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(
                 float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum()), float(by_lock),
                 contact,

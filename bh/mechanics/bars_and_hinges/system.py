@@ -20,7 +20,7 @@ from bh.mechanics.shared.assembly import (
     tangent_times,
     tangent_values,
 )
-from bh.mechanics.shared.base_system import SupportedSheet
+from bh.mechanics.shared.base_system import SupportedSheet, typical_force
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.model.laws import PRESCRIBED
 from bh.model.model import Model
@@ -125,10 +125,10 @@ class BarsAndHingesSystem(SupportedSheet):
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         """Energy, residual (size,) and element forces at q (size,): forces of bars, N, then moments of hinges, N mm."""
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         energy, size, f, forces, turn = self.internal_forces(x, q, lam)
         load = (1.0 - lam) * self.force.start + lam * self.force.end
-        energy -= float(np.vdot(load, x - self.reference))
+        energy -= float(np.vdot(load, x - self.displacements.home))
         f -= load
         if self.rigid_contact is not None:
             energy += self.rigid_contact.forces(x, lam, f)
@@ -151,13 +151,17 @@ class BarsAndHingesSystem(SupportedSheet):
 
     def _imbalance(self, residual: Array, size: float, load: Array, x: Array, gap: float) -> float:
         largest = float(np.abs(residual[: self.primal]).max(initial=0.0))
-        # coordinates are rounded to eps |x| and angles to eps, which the stiffest elements turn into forces that
-        # nobody can balance
-        floor = ROUNDING * (self._stiffest_bar * float(np.abs(x).max()) + self._stiffest_hinge)
+        floor = self._floor(x)
         if largest <= floor:
             return gap
-        size = max(size, float(np.abs(load).max(initial=0.0)), 1e-300)
-        return max((largest - floor) / size, gap)
+        return max((largest - floor) / typical_force(size, load), gap)
+
+    def _floor(self, x: Array) -> float:
+        """Coordinates are rounded to eps |x| and angles to eps; the stiffest elements make forces of that."""
+        return ROUNDING * (self._stiffest_bar * float(np.abs(x).max()) + self._stiffest_hinge)
+
+    def _size(self, x: Array, q: Array, lam: float) -> float:
+        return self.internal_forces(x, q, lam)[1]
 
     @cached_property
     def _stiffest_bar(self) -> float:
@@ -205,7 +209,7 @@ class BarsAndHingesSystem(SupportedSheet):
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e = self.elements
         bars = len(e.bars)
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         touching = self._touching(x)
         pattern = self._pattern
         data = np.zeros(pattern.size)
@@ -250,7 +254,7 @@ class BarsAndHingesSystem(SupportedSheet):
     def control_rate(self, q: Array, lam: float) -> Array:
         """(size,) d residual / d lambda at fixed q: N for displacements, rad for multipliers."""
         e = self.elements
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         _, _, _, forces, _ = self.internal_forces(x, q, lam)
         g = dihedral_gradients(x, e.hinges)
         moment_rate = e.couple.rate - e.hinge_stiffness * e.rest.rate
@@ -273,11 +277,11 @@ class BarsAndHingesSystem(SupportedSheet):
     def power(self, q: Array, lam: float) -> float:
         """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
         e = self.elements
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         _, _, f, _, turn = self.internal_forces(x, q, lam)
         moment = e.hinge_stiffness * turn + self.couple(q, lam)  # without the lock, which knows no rest angle
         total = float(e.couple.rate @ turn - moment @ e.rest.rate)
-        total -= float(np.vdot(self.force.rate, x - self.reference))
+        total -= float(np.vdot(self.force.rate, x - self.displacements.home))
         if self.rigid_contact is not None:
             total += self.rigid_contact.power(x, lam)
             self.rigid_contact.forces(x, lam, f)
@@ -288,7 +292,7 @@ class BarsAndHingesSystem(SupportedSheet):
     def control_stiffness(self, q: Array, lam: float) -> float:
         """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         e = self.elements
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
         moving = self.displacements.prescribed_motion
         if moving.any():

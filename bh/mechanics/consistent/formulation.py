@@ -100,7 +100,7 @@ class Consistent:
         """
         e, mesh = system.elements, system.mesh
         topology = mesh.topology
-        x = system.positions(q, lam)
+        x = system.near(q, lam)
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
         contact = 0.0 if system.barrier is None else system.barrier.forces(x, now.f)
@@ -121,7 +121,7 @@ class Consistent:
         moments[prescribed] = (by_hinge / lengths)[prescribed]
         slopes, couples = read_slopes(mesh, e.patches, now.theta, M)
         return State(
-            mesh=mesh, step=step, lam=lam, points=x,
+            mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact),
             dihedral_angles=angles,
             energy_density={

@@ -19,7 +19,7 @@ from bh.mechanics.consistent.forces import ElementForces, Internal
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.sparsity import rotation_pattern
 from bh.mechanics.shared import penetration as closings
-from bh.mechanics.shared.base_system import SupportedSheet
+from bh.mechanics.shared.base_system import SupportedSheet, typical_force
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.mechanics.shared.sparsity import Pattern
@@ -219,7 +219,7 @@ class ConsistentSystem(SupportedSheet):
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         """Energy, residual (size,) and element forces (`split`) at q (size,)."""
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
         touched = 0.0 if self.rigid_contact is None else self.rigid_contact.forces(x, lam, now.f)
@@ -231,7 +231,7 @@ class ConsistentSystem(SupportedSheet):
             + now.springs
             + now.lock
             + touched
-            - float(np.vdot(load, x - self.mesh.points))
+            - float(np.vdot(load, x - self.displacements.home))
             + float(self.elements.let_go.at(lam) @ q[self.moving :])
         )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
@@ -241,12 +241,16 @@ class ConsistentSystem(SupportedSheet):
     def _imbalance(self, residual: Array, size: float, load: Array, x: Array) -> float:
         largest = float(np.abs(residual[: self.moving]).max(initial=0.0))
         turning = float(np.abs(residual[self.moving :] / self._heights).max(initial=0.0))
-        # coordinates are rounded to eps |x| and angles to eps, which the stiffest elements turn into forces that
-        # nobody can balance
+        floor = self._floor(x)
+        return max(largest - floor, turning - floor, 0.0) / typical_force(size, load)
+
+    def _floor(self, x: Array) -> float:
+        """Coordinates are rounded to eps |x| and angles to eps; the stiffest elements make forces of that."""
         stretch, bend = self._stiffest
-        floor = ROUNDING * (stretch * float(np.abs(x).max()) + bend)
-        size = max(size, float(np.abs(load).max(initial=0.0)), 1e-300)
-        return max(largest - floor, turning - floor, 0.0) / size
+        return ROUNDING * (stretch * float(np.abs(x).max()) + bend)
+
+    def _size(self, x: Array, q: Array, lam: float) -> float:
+        return self.internal(x, q[self.moving :], lam).size
 
     @cached_property
     def _heights(self) -> Array:
@@ -270,7 +274,7 @@ class ConsistentSystem(SupportedSheet):
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, joined = self.elements, self.elements.patches
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         touching = self._touching(x)
         pattern = self._pattern
         N, M, S, L = self.split(forces)
@@ -373,7 +377,7 @@ class ConsistentSystem(SupportedSheet):
         All of elements only, without dead forces.
         """
         e = self.elements
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         v = self.displacements.prescribed_motion
         B = e.bending.stiffness(now.theta)
@@ -405,11 +409,11 @@ class ConsistentSystem(SupportedSheet):
 
     def power(self, q: Array, lam: float) -> float:
         """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
-        x = self.positions(q, lam)
+        x = self.near(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         _, M, S, _ = self.split(now.forces)
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
-        total -= float(np.vdot(self.force.rate, x - self.mesh.points))
+        total -= float(np.vdot(self.force.rate, x - self.displacements.home))
         total += float(self.elements.let_go.rate @ q[self.moving :])
         if self.rigid_contact is not None:
             total += self.rigid_contact.power(x, lam)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bh.mechanics.contact.barrier import SheetBarrier
 
 Array = NDArray[np.float64]
+TINIEST = 1e-300  # N; less is nothing
 
 
 class SupportedSheet:
@@ -65,6 +66,8 @@ class SupportedSheet:
         if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
             let_go = start.reactions - self.displacements.reactions(start.reactions)
             self.force = Ramp(self.force.start + let_go, self.force.end)
+        if not load_step.bodies:
+            self.displacements.bring_home()
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
         if self.constraints.rigid_body and (start is None or not load_step.releases):
@@ -123,6 +126,29 @@ class SupportedSheet:
         """(n, 3) node positions, mm."""
         return self.displacements.positions(q[: self.moving], lam)
 
+    def near(self, q: Array, lam: float) -> Array:
+        """(n, 3) positions, mm, from an origin that is not far from the sheet, for all that is of differences only.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        return self.displacements.near(q[: self.moving], lam)
+
+    def rounding(self, q: Array, lam: float) -> float:
+        """Largest force of rounding over the typical force of the state, see `bh.solvers.system.Rounded`."""
+        x = self.near(q, lam)
+        typical = typical_force(self._size(x, q, lam), self.force.at(lam))
+        return self._floor(x) / typical if typical > TINIEST else 0.0
+
+    def _floor(self, x: Array) -> float:
+        """Largest force of rounding, N, at positions x (n, 3), that nobody can balance."""
+        raise NotImplementedError
+
+    def _size(self, x: Array, q: Array, lam: float) -> float:
+        """Typical force of the elements, N, at positions x (n, 3) of unknowns q (size,)."""
+        raise NotImplementedError
+
     def vectors(self, dq: Array) -> Array:
         """(n, 3) changes of positions, mm, for changes dq (size,) of the unknowns."""
         return self.displacements.vectors(dq[: self.moving])
@@ -140,7 +166,7 @@ class SupportedSheet:
             q: (n,) unknowns.
             lam: load parameter of the step, 0 to 1.
         """
-        return dihedral_angles(self.positions(q, lam), self.mesh.topology.hinges)
+        return dihedral_angles(self.near(q, lam), self.mesh.topology.hinges)
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Why an increment between two states is not to be trusted, or an empty string."""
@@ -185,11 +211,21 @@ class SupportedSheet:
         return (Outcome.MECHANISM, TURNED) if turned else None
 
     def _unbalanced(self, q: Array, lam: float) -> float:
-        return self.displacements.unbalanced(self.positions(q, lam), self.force.at(lam))
+        return self.displacements.unbalanced(self.near(q, lam), self.force.at(lam))
 
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         """A motion (size,) of the unknowns in words."""
         return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))
+
+
+def typical_force(size: float, load: Array) -> float:
+    """The larger of the elements' typical force and the largest component of the loads, N, never 0.
+
+    Args:
+        size: typical force of the elements, N.
+        load: (n, 3) on the nodes, N.
+    """
+    return max(size, float(np.abs(load).max(initial=0.0)), TINIEST)
 
 
 def describe_motion(mesh: SheetMesh, x: Array, motion: Array) -> str:

@@ -15,6 +15,7 @@ from meshes import SheetMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
+FAR = 1e4  # times the size of a sheet
 
 
 class Displacements:
@@ -29,6 +30,7 @@ class Displacements:
     """
 
     weight: Array | None = None  # (k,) how many nodes an unknown stands for, if not one each
+    home: Array  # (n, 3) `reference`, or the same with the middle of the sheet as origin where that is far away, mm
 
     def __init__(self, mesh: SheetMesh, constraints: Constraints, start_points: Array) -> None:
         """Number the unknowns.
@@ -42,7 +44,7 @@ class Displacements:
             ModelError: supports hold every node.
         """
         self.mesh = mesh
-        self.reference = mesh.points
+        self.reference = self.home = mesh.points
         self.turned = np.flatnonzero(constraints.frame_of >= 0)
         self.turned_axes = constraints.frames[constraints.frame_of[self.turned]]
         self._start = self.to_local(start_points - mesh.points)
@@ -57,6 +59,15 @@ class Displacements:
             raise ModelError("the supports hold every node; nothing can move, so remove some of them")
         self.prescribed_rate = (self.constraints.end - self.constraints.start) * self.constraints.fixed
         self.prescribed_motion = self.to_global(self.prescribed_rate)
+
+    def bring_home(self) -> None:
+        """Give a sheet that lies far away an origin of its own: coordinates of 1e8 mm are rounded to 1e-8 mm.
+
+        Only differences of positions count, but for bodies that stand somewhere.
+        """
+        middle = self.reference.mean(axis=0)
+        if float(np.abs(middle).max()) > FAR * self.mesh.size:
+            self.home = self.reference - middle
 
     def start(self) -> Array:
         """(k,) unknowns of the positions that the step begins with."""
@@ -77,9 +88,25 @@ class Displacements:
             u: (k,) displacements, mm.
             lam: load parameter of the step, 0 to 1.
         """
+        return self.reference + self._moves(u, lam)
+
+    def near(self, u: Array, lam: float) -> Array:
+        """The same from the origin of `home`; as unrounded as that is.
+
+        Args:
+            u: (k,) displacements, mm.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            (n, 3) positions, mm.
+        """
+        return self.home + self._moves(u, lam)
+
+    def _moves(self, u: Array, lam: float) -> Array:
+        """(n, 3) displacements, mm, in global axes."""
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
         local.ravel()[self.free] = u
-        return self.reference + self.to_global(local)
+        return self.to_global(local)
 
     def vectors(self, u: Array) -> Array:
         """(n, 3) changes of positions for changes u (k,) of the unknowns."""
@@ -163,5 +190,5 @@ class Displacements:
             ModelError: the forces push the sheet as a whole.
         """
         for load in (force.start, force.end):
-            if self.unbalanced(self.reference, load) > 1e-9:
+            if self.unbalanced(self.home, load) > 1e-9:
                 raise ModelError(UNBALANCED)

@@ -68,17 +68,12 @@ class MirroredDisplacements(Displacements):
             np.where(group < n, self.original[np.minimum(group, n - 1)], group) for group in groups
         )
 
-    def positions(self, u: Array, lam: float) -> Array:
-        """(n, 3) positions of all nodes, images too, mm, for unknowns u (k,).
-
-        Args:
-            u: (k,) displacements of the half, mm.
-            lam: load parameter of the step, 0 to 1.
-        """
+    def _moves(self, u: Array, lam: float) -> Array:
+        """(n, 3) displacements of all nodes, images too, mm, in global axes."""
         local = (1.0 - lam) * self.constraints.start + lam * self.constraints.end
         local.ravel()[self.free] = u
         local.ravel()[self._images] = u[self._of]
-        return np.asarray(self.reference + self.to_global(local))
+        return np.asarray(self.to_global(local))
 
     def vectors(self, u: Array) -> Array:
         """(n, 3) changes of positions for changes u (k,) of the unknowns, in the axes of each side."""

@@ -1,0 +1,86 @@
+"""The case `attack`: its judges can see, and docs/reliability.md has the counts of its record."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from verification.framework.checks import CaseResult, Context
+from verification.studies.solver import attack
+from verification.studies.solver.attack import page
+from verification.studies.solver.attack.attempts import Found, Kind
+from verification.studies.solver.attack.kills import _judged
+from verification.studies.solver.attack.programs import Ended, play
+
+ROOT = Path(__file__).resolve().parents[2]
+linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
+LEAVES_A_CHILD = (
+    "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)'])"
+)
+
+
+def test_the_page_has_the_counts_of_the_record() -> None:
+    record = json.loads((ROOT / "verification" / "records" / "attack.json").read_text(encoding="utf-8"))
+    result = CaseResult("attack", "", "", "")
+    for check in record["checks"]:
+        result.check(check["quantity"], check["value"], params=check["params"])
+    text = (ROOT / "docs" / "reliability.md").read_text(encoding="utf-8")
+    assert page.table(result.checks) in text
+
+
+@linux
+def test_a_process_that_is_left_behind_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("verification.studies.solver.attack.programs.GONE_S", 0.3)
+    ended = play((sys.executable, "-c", LEAVES_A_CHILD), tmp_path)
+    assert (ended.code, ended.left) == (0, 1)
+    assert play((sys.executable, "-c", "raise SystemExit('why')"), tmp_path).said == "why\n"
+
+
+@linux
+def test_signals_reach_the_program(tmp_path: Path) -> None:
+    words = (sys.executable, "-c", "import time; time.sleep(60)")
+    assert play(words, tmp_path, send=signal.SIGKILL, after_s=0.2).code == -signal.SIGKILL
+    assert "KeyboardInterrupt" in play(words, tmp_path, send=signal.SIGINT, after_s=1.0).said
+
+
+def test_ends_are_judged() -> None:
+    good = Ended(130, "bh: interrupted\n", 0.2, 0.1, 50.0, 0)
+    assert not _judged(good, signal.SIGINT)
+    assert not _judged(Ended(-9, "", 0.0, 0.1, 50.0, 0), signal.SIGKILL)
+    assert len(_judged(Ended(-2, "Traceback\n  more\n", 3.0, 0.1, 50.0, 1), signal.SIGINT)) == 4
+    assert not _judged(Ended(130, "bh: interrupted\n", 3.0, 0.1, 50.0, 0, crowd=4.0), signal.SIGINT)
+
+
+@linux
+def test_attempts_are_kept_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that was interrupted goes on, and what did not hold is told."""
+    played: list[int] = []
+
+    def one(folder: Path, random: np.random.Generator) -> Found:
+        assert folder.is_dir()
+        played.append(int(random.integers(1000)))
+        if len(played) == 2:
+            raise KeyboardInterrupt
+        return Found(5, ["it broke"] if len(played) == 1 else [], 0.5)
+
+    monkeypatch.setattr(attack, "KINDS", (Kind("a kind", "a promise", one, 3, 3, "s"),))
+    context = Context(tmp_path, True, lambda _text: None)
+    with pytest.raises(KeyboardInterrupt):
+        attack.run(context)
+    result = attack.run(context)
+    assert len(played) == 4  # the second twice
+    assert played[1] == played[2]
+    [check] = result.checks
+    assert (check.value, check.passed, check.params["attacks"], check.params["worst"]) == (
+        1.0,
+        False,
+        15,
+        0.5,
+    )
+    assert result.notes == ["a kind: it broke"]
+    assert "| a kind | a promise | 15 | 1 | 0.5 s |" in (tmp_path / "reliability.md").read_text()
