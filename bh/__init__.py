@@ -82,6 +82,7 @@ _SUBMODULES = {
     "interactive": "bh.plotting.interactive",
     "isometric": "bh.analysis.isometric",
     "live": "bh.live",
+    "materials": "bh.materials",
     "node_sensitivities": "bh.analysis.node_sensitivities",
     "pinching": "bh.applications.pinching",
     "plotting": "bh.plotting",
