@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from bh.model.step import Actuation, Body, Step, StepBuilder, Zone
     from bh.model.supports import Constraint, RigidBody, Support
     from bh.model.until import Until, depth
+    from bh.model.weight import Weight
     from bh.paths.estimate import Accuracy
     from bh.paths.path import Path
     from bh.runtime.consent import allow_outside, allow_plugins
@@ -62,6 +63,7 @@ _NAMES = {
     "bh.model.step": "Actuation Body Step StepBuilder Zone",
     "bh.model.supports": "Constraint RigidBody Support",
     "bh.model.until": "Until depth",
+    "bh.model.weight": "Weight",
     "bh.paths.estimate": "Accuracy",
     "bh.paths.path": "Path",
     "bh.runtime.consent": "allow_outside allow_plugins",
@@ -136,6 +138,7 @@ __all__ = [
     "Support",
     "Tether",
     "Until",
+    "Weight",
     "Zone",
     "allow_outside",
     "allow_plugins",

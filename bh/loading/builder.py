@@ -30,7 +30,8 @@ OVERLAP = 1e-9  # rad or N mm / mm: two zones that differ by less ask for the sa
 class _Asked:
     """What hinges (m,) and nodes (n,) are asked for at the end of a step; the next step begins with it.
 
-    For the fields see `LoadStep`. `pinched` marks hinges whose prescribed angle follows from a solved state.
+    For the fields see `LoadStep`; `borne` are forces beside `force`. `pinched` marks hinges whose prescribed angle
+    follows from a solved state.
     """
 
     law: NDArray[np.int64]
@@ -40,6 +41,7 @@ class _Asked:
     prescribed: Array
     moment: Array
     force: Array
+    borne: Array
     pinched: NDArray[np.bool_]
     displaced: dict[tuple[int, Direction], float]
 
@@ -55,6 +57,7 @@ class _Asked:
             prescribed=np.full(hinges, np.nan),
             moment=np.zeros(hinges),
             force=np.zeros((nodes, 3)),
+            borne=np.zeros((nodes, 3)),
             pinched=np.zeros(hinges, dtype=bool),
             displaced={},
         )
@@ -118,6 +121,7 @@ class LoadStepBuilder:
         self._asked = _Asked.nothing(model.mesh)
         self._rest_of_laws = self._asked.rest.copy()  # they come in during the first step
         self._step = _Step.after(self._asked)
+        self._begun = self._asked  # the beginning of the last step
         for name, crease in model.creases.items():
             self.spring(self._hinges(name), crease.Lstar, crease.stiffness)
             self._rest_of_laws[self._hinges(name)] = crease.rest
@@ -230,6 +234,10 @@ class LoadStepBuilder:
         """Dead forces (k, 3) or (3,), N, in place of what pulled there."""
         self._asked.force[nodes] = force
 
+    def bear(self, force: Array) -> None:
+        """Dead forces (n, 3) beside those of `pull`, N, in place of what was borne before."""
+        self._asked.borne = np.asarray(force, dtype=float)
+
     def displace(self, nodes: Ints, direction: Sequence[float], by: float) -> None:
         """Prescribe the displacement of nodes (k,) along a unit vector, mm from the stress-free position.
 
@@ -254,7 +262,7 @@ class LoadStepBuilder:
 
     def build(self, step: Step) -> LoadStep:
         """The load step of the next step of the model."""
-        start = self._asked.copy()
+        start = self._begun = self._asked.copy()
         asked = self._asked
         self._number += 1
         if self._number == 1:
@@ -279,7 +287,7 @@ class LoadStepBuilder:
             prescribed=Ramp(start.prescribed, end.prescribed),
             pinch=now.pinch,
             moment=Ramp(start.moment, end.moment),
-            force=Ramp(start.force, end.force),
+            force=Ramp(start.force + start.borne, end.force + end.borne),
             constraints=resolve(
                 self.mesh, self._supports, self._displacements(start), in_contact=bool(now.bodies)
             ),
@@ -297,9 +305,11 @@ class LoadStepBuilder:
             ModelError: a prescribed crease was released in it, whose rest angle is not known on the way.
         """
         asked = self._asked
-        asked.rest, asked.rest_ends, asked.moment, asked.force = (
+        asked.rest, asked.rest_ends, asked.moment, force = (
             ramp.at(end.lam) for ramp in (step.rest, step.rest_ends, step.moment, step.force)
         )
+        asked.borne = Ramp(self._begun.borne, asked.borne).at(end.lam)
+        asked.force = force - asked.borne
         if np.isnan(asked.rest).any():
             raise ModelError(
                 "a prescribed crease is released in a step that ends early (until); release it in a step before"

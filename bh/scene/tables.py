@@ -296,6 +296,15 @@ class PullTable(Table):
     )
 
 
+class WeightTable(Table):
+    """Keys of `bh.Weight`."""
+
+    g: Vector = Field(
+        [0.0, 0.0, -9.81], description=VECTOR + " in m/s^2, gravity; [0, 0, 0] takes the weight away"
+    )
+    density: Positive | None = Field(None, description="a density in kg/m^3, that of the sheet unless given")
+
+
 class UntilTable(Table):
     """What ends a step before its actuations are complete."""
 
@@ -319,11 +328,12 @@ class UntilTable(Table):
         return self
 
 
-ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable | PullTable]] = {
+ACTUATIONS: dict[str, type[Table]] = {
     "fold": FoldTable,
     "pinch": PinchTable,
     "moment": MomentTable,
     "force": ForceTable,
     "displace": DisplaceTable,
     "pull": PullTable,
+    "weight": WeightTable,
 }
