@@ -140,7 +140,7 @@ class Desk:
         frame = self.session.rest(20.0)
         if not any(step.actuations for step in self.session.scene().steps):
             return _line("there is nothing to check yet")
-        path = trace(self.session.scene(), estimate=True)
+        path = trace(self.session.scene(), estimate=True, warn=False)
         off = float(np.abs(path[-1].points - frame.points).max())
         error = path.accuracy
         estimate = (
