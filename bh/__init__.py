@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from bh.model.step import Actuation, Body, Step, StepBuilder, Zone
     from bh.model.supports import Constraint, Hold, RigidBody, Support
     from bh.model.until import Until, depth
+    from bh.model.weight import Weight
     from bh.paths.estimate import Accuracy
     from bh.paths.path import Path
     from bh.runtime.consent import allow_outside, allow_plugins
@@ -71,6 +72,7 @@ _NAMES = {
     "bh.model.step": "Actuation Body Step StepBuilder Zone",
     "bh.model.supports": "Constraint Hold RigidBody Support",
     "bh.model.until": "Until depth",
+    "bh.model.weight": "Weight",
     "bh.paths.estimate": "Accuracy",
     "bh.paths.path": "Path",
     "bh.runtime.consent": "allow_outside allow_plugins",
@@ -91,6 +93,7 @@ _SUBMODULES = {
     "interactive": "bh.plotting.interactive",
     "isometric": "bh.analysis.isometric",
     "live": "bh.live",
+    "materials": "bh.materials",
     "node_sensitivities": "bh.analysis.node_sensitivities",
     "pinching": "bh.applications.pinching",
     "plotting": "bh.plotting",
@@ -148,6 +151,7 @@ __all__ = [
     "Support",
     "Tether",
     "Until",
+    "Weight",
     "Zone",
     "allow_outside",
     "allow_plugins",

@@ -16,12 +16,15 @@ from bh.model.model import Model
 from bh.model.ramp import Ramp
 from bh.model.step import Actuation
 from bh.model.supports import select
+from bh.model.weight import Weight
 from fem.components import edge_set
 from fem.shell import ShellElements
 from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
+LATE = (Force, Displace, Weight)
+WEIGHT = "the weight"  # no set of edges is called that
 
 
 @dataclass(frozen=True)
@@ -70,18 +73,17 @@ def _plain(item: Actuation) -> Actuation:
     return item
 
 
-def forces(mesh: ElementMesh, model: Model, step: int, acting: Ramp, lengths: Array) -> Ramp:
+def forces(elements: ShellElements, model: Model, step: int, acting: Ramp) -> Ramp:
     """Dead forces (n, 3) on all nodes, N, at the start and the end of step `step`.
 
     They are those of `acting` (corners, 3), what the steps ask for, but that a `total` on a named set of edges is a
-    uniform line load a length of edge instead of equal shares.
+    uniform line load a length of edge instead of equal shares, and that of a weight every node has its own part.
 
     Args:
-        mesh: elements.
+        elements: of the sheet.
         model: has the steps.
         step: number of the step.
         acting: (corners, 3) forces that the steps ask for, N.
-        lengths: (e,) of the edges of the flat sheet, mm.
 
     Raises:
         ModelError: a total on a named set that is no set of edges.
@@ -89,8 +91,11 @@ def forces(mesh: ElementMesh, model: Model, step: int, acting: Ramp, lengths: Ar
     for each in model.steps[
         :step
     ]:  # which part of a line load acted where such a step ended is not known here
-        if each.until is not None and any(isinstance(item, Force | Displace) for item in each.actuations):
-            raise ModelError("the shell cannot go on after a force or displacement that `until` ended early")
+        if each.until is not None and any(isinstance(item, LATE) for item in each.actuations):
+            raise ModelError(
+                "the shell cannot go on after a force, weight or displacement that `until` ended early"
+            )
+    mesh, lengths = elements.mesh, elements.lengths
     lines: dict[str, Array] = {}
     before: dict[str, Array] = {}
     for each in model.steps[: step + 1]:
@@ -98,6 +103,8 @@ def forces(mesh: ElementMesh, model: Model, step: int, acting: Ramp, lengths: Ar
         for item in each.actuations:
             if isinstance(item, Force) and isinstance(item.at, str) and item.at in mesh.sheet.edge_sets:
                 lines[item.at] = _line(mesh, item, lengths)
+            elif isinstance(item, Weight):
+                lines[WEIGHT] = _weight(elements, item, model)
 
     def whole(corners: Array, instead: dict[str, Array]) -> Array:
         out = np.zeros_like(mesh.nodes)
@@ -105,6 +112,21 @@ def forces(mesh: ElementMesh, model: Model, step: int, acting: Ramp, lengths: Ar
         return sum(instead.values(), out)
 
     return Ramp(whole(acting.start, before), whole(acting.end, lines))
+
+
+def _weight(elements: ShellElements, item: Weight, model: Model) -> Array:
+    """(n, 3) what is different where a weight acts on quadratic triangles, not on their corners alone, N."""
+    mesh = elements.mesh
+    out = np.zeros_like(mesh.nodes)
+    if mesh.degree == 1:
+        return out
+    force = item.per_area(model.sheet)
+    for triangles, areas in (
+        (mesh.triangles[:, 3:], elements.areas),
+        (mesh.sheet.triangles, -mesh.sheet.areas),
+    ):
+        np.add.at(out, triangles, (areas / 3.0)[:, None, None] * force)
+    return out
 
 
 def _line(mesh: ElementMesh, item: Force, lengths: Array) -> Array:

@@ -126,7 +126,7 @@ class ShellSystem:
 
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
-        force = loads.forces(self.mesh, model, step, self.load_step.force, self.elements.lengths)
+        force = loads.forces(self.elements, model, step, self.load_step.force)
         couple = loads.edge_moments(self.elements, moments)
         none = np.zeros(self.elements.tables.rotations * len(self.creases))
         ends = [

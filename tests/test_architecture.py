@@ -54,7 +54,7 @@ RULES: dict[str, tuple[str, ...]] = {
     "bh.formulations": (*GROUND, "bh.model", "bh.loading"),
     "bh.materials": ("bh.errors", "bh.model"),
     "bh.mechanics": (*DESCRIPTION, "bh.materials"),
-    "bh.scene": DESCRIPTION,
+    "bh.scene": (*DESCRIPTION, "bh.materials"),
     "bh.paths": DESCRIPTION,
     "bh.analysis": (*DESCRIPTION, "bh.paths"),
     "bh.plotting": (*ANALYSIS, "bh.scene"),

@@ -18,6 +18,7 @@ from bh.analysis.situation import Situation
 from bh.errors import ModelError
 from bh.formulations.protocols import Data
 from bh.loading.builder import load_steps
+from bh.model.weight import Weight
 from bh.paths.path import Path
 from bh.runtime.threads import one_blas_thread
 
@@ -54,8 +55,8 @@ def of_nodes(path: Path, observables: Sequence[Observable], index: int = -1) -> 
         one for each observable.
 
     Raises:
-        ModelError: a sheet that is not flat, a pinch (whose zone depends on the whole crease), or a state that has no
-            sensitivities.
+        ModelError: a sheet that is not flat, a weight, a pinch (whose zone depends on the whole crease), or a state
+            that has no sensitivities.
     """
     with one_blas_thread():
         at = Situation(path, index)
@@ -64,6 +65,8 @@ def of_nodes(path: Path, observables: Sequence[Observable], index: int = -1) -> 
             raise ModelError("sensitivities to nodes are those of flat sheets; this one is made curved")
         if any(not np.isnan(step.pinch.toward).all() for step in load_steps(at.model)[: at.step + 1]):
             raise ModelError("a pinched zone depends on all nodes of its crease; take bh.sensitivities.of")
+        if any(isinstance(item, Weight) for step in at.model.steps for item in step.actuations):
+            raise ModelError("a weight depends on all nodes of a triangle; take bh.sensitivities.of")
         slopes = [(observable.value(at), observable.slope(at)) for observable in observables]
         weights = [derivatives_to_data(at, slope, value) for value, slope in slopes]
         support = at.derivatives.support()

@@ -22,7 +22,8 @@ Direction = tuple[float, float, float]
 class Asked:
     """What hinges (m,) and nodes (n,) are asked for at the end of a step; the next step begins with it.
 
-    For the fields see `LoadStep`. `pinched` marks hinges whose prescribed angle follows from a solved state.
+    For the fields see `LoadStep`; `borne` are forces beside `force`. `pinched` marks hinges whose prescribed angle
+    follows from a solved state.
     """
 
     law: NDArray[np.int64]
@@ -32,6 +33,7 @@ class Asked:
     prescribed: Array
     moment: Array
     force: Array
+    borne: Array
     pinched: NDArray[np.bool_]
     displaced: dict[tuple[int, Direction], float]  # nan where it is not known yet
 
@@ -47,6 +49,7 @@ class Asked:
             prescribed=np.full(hinges, np.nan),
             moment=np.zeros(hinges),
             force=np.zeros((nodes, 3)),
+            borne=np.zeros((nodes, 3)),
             pinched=np.zeros(hinges, dtype=bool),
             displaced={},
         )

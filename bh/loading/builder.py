@@ -42,6 +42,7 @@ class LoadStepBuilder:
         self._asked = Asked.nothing(model.mesh)
         self._rest_of_laws = self._asked.rest.copy()  # they come in during the first step
         self._step = StepInHand.after(self._asked)
+        self._begun = self._asked  # the beginning of the last step
         for name, crease in model.creases.items():
             self.spring(self._hinges(name), crease.Lstar, crease.stiffness)
             self._rest_of_laws[self._hinges(name)] = crease.rest
@@ -154,6 +155,10 @@ class LoadStepBuilder:
         """Dead forces (k, 3) or (3,), N, in place of what pulled there."""
         self._asked.force[nodes] = force
 
+    def bear(self, force: Array) -> None:
+        """Dead forces (n, 3) beside those of `pull`, N, in place of what was borne before."""
+        self._asked.borne = np.asarray(force, dtype=float)
+
     def displace(self, nodes: Ints, direction: Sequence[float], by: float, further: bool = False) -> None:
         """Prescribe the displacement of nodes (k,) along a unit vector, mm; see `StepBuilder.displace`.
 
@@ -179,7 +184,7 @@ class LoadStepBuilder:
 
     def build(self, step: Step) -> LoadStep:
         """The load step of the next step of the model."""
-        start = self._asked.copy()
+        start = self._begun = self._asked.copy()
         asked = self._asked
         self._number += 1
         self._supports.change(step, asked.displaced)
@@ -206,7 +211,7 @@ class LoadStepBuilder:
             prescribed=Ramp(start.prescribed, end.prescribed),
             pinch=now.pinch,
             moment=Ramp(start.moment, end.moment),
-            force=Ramp(start.force, end.force),
+            force=Ramp(start.force + start.borne, end.force + end.borne),
             constraints=self._constraints(start, bool(now.bodies), bool(step.release)),
             bodies=tuple(now.bodies),
             releases=bool(step.release),
@@ -231,9 +236,11 @@ class LoadStepBuilder:
             ModelError: a prescribed crease was released in it, whose rest angle is not known on the way.
         """
         asked = self._asked
-        asked.rest, asked.rest_ends, asked.moment, asked.force = (
+        asked.rest, asked.rest_ends, asked.moment, force = (
             ramp.at(end.lam) for ramp in (step.rest, step.rest_ends, step.moment, step.force)
         )
+        asked.borne = Ramp(self._begun.borne, asked.borne).at(end.lam)
+        asked.force = force - asked.borne
         if np.isnan(asked.rest).any():
             raise ModelError(
                 "a prescribed crease is released in a step that ends early (until); release it in a step before"

@@ -21,6 +21,7 @@ from bh.model.sheet import ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
+from bh.model.weight import Weight
 from bh.runtime.consent import said
 from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
@@ -33,6 +34,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "force": Force,
     "displace": Displace,
     "pull": Pull,
+    "weight": Weight,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 SUPPORTS: dict[str, type[Constraint]] = {"hold": Hold}

@@ -30,6 +30,7 @@ class Sheet:
         E2: Young's modulus across the grain, MPa; None for a sheet that is alike in all directions.
         G12: shear modulus in the plane of the sheet, MPa; with a grain.
         grain: direction of the grain in the drawing, rad from its x axis towards its y axis, or with a unit ("30deg").
+        density: kg / m^3, of a sheet that is to have a weight; None where it does not matter.
     """
 
     E: float
@@ -38,6 +39,7 @@ class Sheet:
     E2: float | None = None
     G12: float | None = None
     grain: float | None = None
+    density: float | None = None
 
     if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
 
@@ -50,6 +52,7 @@ class Sheet:
             E2: float | str | None = None,
             G12: float | str | None = None,
             grain: float | str | None = None,
+            density: float | None = None,
         ) -> None:
             """See the attributes."""
 
@@ -60,9 +63,9 @@ class Sheet:
             ModelError: one line that names the value and what to give.
         """
         take_units(self, "sheet", E="modulus", t="length", E2="modulus", G12="modulus", grain="angle")
-        for name, unit in (("E", "MPa"), ("t", "mm"), ("E2", "MPa"), ("G12", "MPa")):
+        for name, unit in (("E", "MPa"), ("t", "mm"), ("E2", "MPa"), ("G12", "MPa"), ("density", "kg/m^3")):
             value = getattr(self, name)
-            if value is None and name in ("E2", "G12"):
+            if value is None and name in ("E2", "G12", "density"):
                 continue
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
                 raise ModelError(f"sheet {name} = {value!r} cannot be; give a positive number in {unit}")
@@ -81,6 +84,7 @@ class Sheet:
         nu12: float,
         grain: float | str,
         t: float | str,
+        density: float | None = None,
     ) -> Sheet:
         """A sheet with a grain, by the names of its moduli.
 
@@ -91,11 +95,12 @@ class Sheet:
             nu12: what a pull along the grain contracts across it; nu12 / E1 = nu21 / E2.
             grain: direction of the grain in the drawing, rad from its x axis towards its y axis.
             t: thickness, mm.
+            density: kg / m^3, or None.
 
         Raises:
             ModelError: moduli that are not definite: a sheet that gives energy when it is strained.
         """
-        return cls(E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t)
+        return cls(E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t, density=density)
 
     @property
     def nu_squared(self) -> float:

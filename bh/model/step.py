@@ -127,6 +127,14 @@ class StepBuilder(Protocol):
         """
         ...
 
+    def bear(self, force: Array) -> None:
+        """Dead forces (n, 3) on all nodes beside those of `pull`, N, in place of what was borne before.
+
+        Args:
+            force: (n, 3), such as the weight of what belongs to each node.
+        """
+        ...
+
     def displace(self, nodes: Ints, direction: Sequence[float], by: float, further: bool = False) -> None:
         """Prescribe the displacement of nodes (k,) along a unit vector (3,), mm from the stress-free position.
 

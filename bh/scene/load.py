@@ -14,6 +14,7 @@ from bh.errors import InputError, SceneError
 from bh.formulations.registry import formulation, names
 from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
+from bh.materials.table import material as material_of
 from bh.model.actuations import Displace, Force
 from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model, Place
@@ -258,10 +259,19 @@ def _formulation(name: str) -> str:
 
 
 def _sheet(table: SheetTable) -> Sheet:
-    E, nu = (table.E1, table.nu12) if table.E is None else (table.E, table.nu)
+    if table.material is not None:
+        with within("sheet"):
+            made_of = material_of(table.material).sheet(table.t, table.grain)
+            return made_of if table.density is None else replace(made_of, density=table.density)
+    if table.t is None:
+        raise SceneError("sheet.t is missing; give the thickness in mm, a positive number")
+    E = table.E1 if table.E is None else table.E
+    nu = table.nu12 if table.nu is None else table.nu
     assert E is not None
     with within("sheet"):
-        return Sheet(E=E, t=table.t, nu=nu or 0.0, E2=table.E2, G12=table.G12, grain=table.grain)
+        return Sheet(
+            E=E, t=table.t, nu=nu or 0.0, E2=table.E2, G12=table.G12, grain=table.grain, density=table.density
+        )
 
 
 def _support(item: object, at: str) -> Constraint:

@@ -12,6 +12,7 @@ import numpy as np
 from bh.errors import InputError
 from bh.formulations.registry import remarks
 from bh.model.refinement import Goal
+from bh.model.sheet import Sheet
 from bh.model.supports import Support, select
 from bh.scene.load import Scene
 from meshes import SheetMesh
@@ -27,6 +28,12 @@ if TYPE_CHECKING:
 SHOWN = 12  # creases or places in a list
 
 
+def _grain(sheet: Sheet) -> str:
+    if sheet.grain is None:
+        return ""
+    return f", grain at {degrees(sheet.grain):.4g} degrees (E {sheet.E:.4g} along, {sheet.E2:.4g} MPa across)"
+
+
 def report(scene: Scene) -> list[str]:
     """The scene in lines: sheet, mesh, creases, places, supports, steps, and what to know of them.
 
@@ -36,7 +43,8 @@ def report(scene: Scene) -> list[str]:
     model, mesh = scene.model, scene.model.mesh
     size = np.ptp(mesh.points, axis=0)
     lines = [
-        f"sheet: {size[0]:.5g} x {size[1]:.5g} mm, {mesh.areas.sum():.6g} mm^2, t = {model.sheet.t:g} mm",
+        f"sheet: {size[0]:.5g} x {size[1]:.5g} mm, {mesh.areas.sum():.6g} mm^2, t = {model.sheet.t:g} mm"
+        f"{_grain(model.sheet)}",
         f"mesh: {mesh!r}; {model.formulation}" if scene.accuracy is None else _chosen(scene.accuracy),
     ]
     for name in mesh.creases[:SHOWN]:

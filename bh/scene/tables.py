@@ -53,7 +53,7 @@ class SheetTable(Table):
     nu: Annotated[float, Field(gt=-1.0, le=0.5)] | None = Field(
         None, description="Poisson's ratio in (-1, 0.5]"
     )
-    t: Length = Field(description="the thickness in mm, a positive number")
+    t: Length | None = Field(None, description="the thickness in mm, a positive number")
     E1: Modulus | None = Field(None, description="Young's modulus along the grain in MPa, a positive number")
     E2: Modulus | None = Field(None, description="Young's modulus across the grain in MPa, a positive number")
     G12: Modulus | None = Field(
@@ -67,9 +67,22 @@ class SheetTable(Table):
         description="the direction of the grain in the drawing in rad from its x axis, from -2 pi to 2 pi",
     )
 
+    density: Positive | None = Field(
+        None, description="the density in kg/m^3 of a sheet with a weight, positive"
+    )
+    material: str | None = Field(
+        None,
+        description='a name of the table of materials (docs/materials.md), such as "card-300", in place of moduli',
+    )
+
     @model_validator(mode="after")
     def one_name(self) -> SheetTable:
         """Check that the modulus is there, and that nothing is given by two names."""
+        if self.material is not None:
+            for name in ("E", "E1", "E2", "G12", "nu", "nu12"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"has material and {name}, which the material gives; remove one of them")
+            return self
         for name, other in (("E", "E1"), ("nu", "nu12")):
             if getattr(self, name) is not None and getattr(self, other) is not None:
                 raise ValueError(f"has both {name} and {other}, which are one value; remove one of them")
@@ -288,6 +301,15 @@ class PullTable(Table):
     )
 
 
+class WeightTable(Table):
+    """Keys of `bh.Weight`."""
+
+    g: Vector = Field(
+        [0.0, 0.0, -9.81], description=VECTOR + " in m/s^2, gravity; [0, 0, 0] takes the weight away"
+    )
+    density: Positive | None = Field(None, description="a density in kg/m^3, that of the sheet unless given")
+
+
 class UntilTable(Table):
     """What ends a step before its actuations are complete."""
 
@@ -311,11 +333,12 @@ class UntilTable(Table):
         return self
 
 
-ACTUATIONS: dict[str, type[FoldTable | PinchTable | MomentTable | ForceTable | DisplaceTable | PullTable]] = {
+ACTUATIONS: dict[str, type[Table]] = {
     "fold": FoldTable,
     "pinch": PinchTable,
     "moment": MomentTable,
     "force": ForceTable,
     "displace": DisplaceTable,
     "pull": PullTable,
+    "weight": WeightTable,
 }

@@ -38,6 +38,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: force": schema.ForceTable,
     "steps: displace": schema.DisplaceTable,
     "steps: pull": schema.PullTable,
+    "steps: weight": schema.WeightTable,
     "steps: until": schema.UntilTable,
     "outputs": schema.OutputsTable,
     "accuracy": schema.AccuracyTable,
