@@ -16,7 +16,16 @@ from bh.solvers.modes import GAP, KNOWN_GAP, count_negative, neutral_mode
 from bh.solvers.newton import INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
 from bh.solvers.phase import settle
-from bh.solvers.points import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point, power_rate
+from bh.solvers.points import (
+    CriticalPoint,
+    Increment,
+    Point,
+    extrapolate,
+    fold_ahead,
+    lambda_after,
+    point,
+    power_rate,
+)
 from bh.solvers.stability import leave_saddle, locate
 from bh.solvers.system import System, limited
 
@@ -119,9 +128,7 @@ class LoadControl:
         held: Array | None = None  # the neutral mode, once the path has one
         while points[-1].lam < 1.0:
             here = points[-1]
-            left = 1.0 - here.lam
-            # do not leave a crumb for the end
-            lam = 1.0 if step > 0.999 * left else here.lam + (0.5 * left if step > 0.7 * left else step)
+            lam = lambda_after(here.lam, step)
             fold = fold_ahead(points, system.primal)
             if self.foresee and fold <= lam and len(cuts) > 2:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"

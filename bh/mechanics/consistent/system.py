@@ -268,9 +268,7 @@ class ConsistentSystem(SupportedSheet):
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, joined = self.elements, self.elements.patches
         x = self.positions(q, lam)
-        touching = None if self.barrier is None else self.barrier.blocks(x)
-        if touching is not None and not self.contact_blocks.known(touching[0]):
-            vars(self).pop("_pattern", None)
+        touching = self._touching(x)
         pattern = self._pattern
         N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)
