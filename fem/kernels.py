@@ -100,10 +100,10 @@ def measures(x, gamma, loops, frames, strain, curvature):  # type: ignore[no-unt
             strain[e, k] = 0.5 * total
             curvature[e, k] = 0.0
         for b in range(3):
-            combine(loops.bend[:, b], xe, second[b])
+            combine(loops.bend[b], xe, second[b])
         for q in range(loops.inside.shape[1]):
-            combine(loops.slopes[q, :, 0], xe, p)
-            combine(loops.slopes[q, :, 1], xe, r)
+            combine(loops.slopes[q, 0], xe, p)
+            combine(loops.slopes[q, 1], xe, r)
             cross(p, r, N)
             scale = loops.inside[e, q] / math.sqrt(dot(N, N))
             for j in range(3):
@@ -141,10 +141,10 @@ def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
                     for b in range(3):
                         B[e, k, 3 * i + b] += loops.Q[k, i, j] * xe[j, b]
         for b in range(3):
-            combine(loops.bend[:, b], xe, second[b])
+            combine(loops.bend[b], xe, second[b])
         for q in range(loops.inside.shape[1]):
-            combine(loops.slopes[q, :, 0], xe, p)
-            combine(loops.slopes[q, :, 1], xe, r)
+            combine(loops.slopes[q, 0], xe, p)
+            combine(loops.slopes[q, 1], xe, r)
             cross(p, r, N)
             size = math.sqrt(dot(N, N))
             for b in range(3):
@@ -156,9 +156,9 @@ def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
                 for i in range(n):
                     for k in range(3):
                         rate[b, 3 * i + k] = loops.inside[e, q] * (
-                            loops.bend[i, b] * N[k] / size
-                            + loops.slopes[q, i, 0] * by_p[k]
-                            + loops.slopes[q, i, 1] * by_r[k]
+                            loops.bend[b, i] * N[k] / size
+                            + loops.slopes[q, 0, i] * by_p[k]
+                            + loops.slopes[q, 1, i] * by_r[k]
                         )
             for j in range(3):
                 for i in range(3 * n):
@@ -182,7 +182,7 @@ def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
                         B[e, first + own * j + k, 3 * n + turns * j + m] += part * loops.turn[m, q]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(**OPTIONS)
 def _add_block(K, a, b, H, symmetric_pair):  # type: ignore[no-untyped-def]
     """K (3 n, 3 n) += a_i b_j H, and its transposed if the pair of arguments is not the same."""
     for i in range(len(a)):
@@ -217,8 +217,8 @@ def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
                 for b in range(3):
                     block[3 * i + b, 3 * j + b] += total
         for q in range(loops.inside.shape[1]):
-            combine(loops.slopes[q, :, 0], xe, p)
-            combine(loops.slopes[q, :, 1], xe, r)
+            combine(loops.slopes[q, 0], xe, p)
+            combine(loops.slopes[q, 1], xe, r)
             for i in range(n):
                 weights[i] = 0.0
             for j in range(3):
@@ -227,10 +227,10 @@ def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
                     moment += forces[e, (3 + j) * own + k] * loops.factors[q, j, k]
                 for b in range(3):
                     for i in range(n):
-                        weights[i] += loops.inside[e, q] * moment * loops.S[j, b] * loops.bend[i, b]
+                        weights[i] += loops.inside[e, q] * moment * loops.S[j, b] * loops.bend[b, i]
             combine(weights, xe, y)
             curvature_hessian(p, r, y, H)
-            first, second = loops.slopes[q, :, 0], loops.slopes[q, :, 1]
+            first, second = loops.slopes[q, 0], loops.slopes[q, 1]
             _add_block(block, first, first, H[0, 0], False)
             _add_block(block, second, second, H[1, 1], False)
             _add_block(block, first, second, H[0, 1], True)

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@njit(inline="always", **OPTIONS)
+@njit(**OPTIONS)
 def cross(a, b, out):  # type: ignore[no-untyped-def]
     """Write the cross product a x b of two vectors (3,) into `out`."""
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -39,13 +39,13 @@ def cross(a, b, out):  # type: ignore[no-untyped-def]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(**OPTIONS)
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Scalar product a . b of two vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(**OPTIONS)
 def combine(weights, x, out):  # type: ignore[no-untyped-def]
     """Write sum_i weights[i] x[i] into `out` (3,); weights (n,), x (n, 3)."""
     for c in range(3):
@@ -55,7 +55,7 @@ def combine(weights, x, out):  # type: ignore[no-untyped-def]
         out[c] = total
 
 
-@njit(inline="always", **OPTIONS)
+@njit(**OPTIONS)
 def skew_times(v, A, sign, out):  # type: ignore[no-untyped-def]
     """Write sign A [v]x into `out`, with ([v]x w) = v x w, so that row i of it is sign (row i of A) x v."""
     for i in range(3):

@@ -213,7 +213,7 @@ class ShellSystem:
     def side_rotations(self, components: Array) -> Array:
         """(t, 3, r) rotations gamma of every triangle's side of its edges, rad."""
         gamma = self.components.gather(components)[:, self.elements.moves :]
-        return gamma.reshape(len(gamma), 3, -1)
+        return np.ascontiguousarray(gamma).reshape(len(gamma), 3, -1)
 
     def gradient(self, here: Here) -> Array:
         """Derivative of the potential by all components; at prescribed ones the reactions.

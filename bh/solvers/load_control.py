@@ -15,6 +15,7 @@ from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import GAP, KNOWN_GAP, count_negative, neutral_mode
 from bh.solvers.newton import INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
+from bh.solvers.phase import settle
 from bh.solvers.points import (
     CriticalPoint,
     Increment,
@@ -201,15 +202,18 @@ class LoadControl:
         method = replace(newton, globalised=0, hasty=True) if brisk or look else newton
         q, forces = extrapolate(points, lam)
         q, forces = _as_far_as_clear(system, here, lam, q, forces)
-        primary = found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
+        found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
+        primary = found = found if held is None else settle(system, found, lam, newton)
         iterations, note, branch = found.iterations, "", NO_BRANCH
         downhill = look and not brisk and not found.converged
         if downhill and self.guess is not None and (near := self.guess(system, lam)) is not None:
             # no element forces go with it: the strain of interpolated positions is large, and none of the sheet's
-            primary = found = newton.solve_full(system, near, lam, np.zeros_like(here.forces))
+            found = newton.solve_full(system, near, lam, np.zeros_like(here.forces))
+            primary = found = settle(system, found, lam, newton)
             iterations += found.iterations
         if downhill and not found.converged:
-            primary = found = replace(newton, full=0, transient=None).solve(system, q, lam)
+            found = replace(newton, full=0, transient=None).solve(system, q, lam)
+            primary = found = settle(system, found, lam, newton)
             iterations += found.iterations
         # with one state only the increments are still large, and cutting them costs less than looking
         if look and (not found.converged if downhill else _lost(found) and len(points) > 1):

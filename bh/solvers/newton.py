@@ -27,6 +27,9 @@ from bh.solvers.system import Evaluation, System, limited
 
 Array = NDArray[np.float64]
 INDEFINITE = "indefinite tangent"  # why full Newton gave up
+ALONG = "out of balance along the neutral mode"
+NEUTRAL_IMBALANCE = 100.0  # of the tolerance: what a neutral mode may have
+NO_STEP = 1e-10  # of the unknowns: a step that changes nothing
 ENDLESS = 1e100  # size of a step that a singular tangent has made
 NEAR_SADDLE = 1e-3  # imbalance below which an indefinite tangent is that of a saddle
 
@@ -101,12 +104,14 @@ class Newton:
             second_guess: makes unknowns and forces of another guess.
         """
         first = self.solve_full(system, q, lam, forces)
+        if first.reason == ALONG:
+            return first
         if not first.converged and second_guess is not None:
             spent = first.iterations
             other, other_forces = second_guess()
             first = self.solve_full(system, other, lam, other_forces)
             first = replace(first, iterations=first.iterations + spent)
-        if first.converged or self.globalised == 0 or self.unstable:
+        if first.converged or first.reason == ALONG or self.globalised == 0 or self.unstable:
             return first
         second = self.solve_globalised(system, q, lam)
         second = replace(second, iterations=first.iterations + second.iterations)
@@ -158,13 +163,13 @@ class Newton:
             factor = self._full_factor(tangent.matrix)
             if factor is None:
                 return Solution(q, now, iteration, False, INDEFINITE)
-            dq = -factor.solve(now.residual)
-            if self.held is not None:
-                dq = without(factor, dq, self.held)
+            dq = self._full_step(factor, now.residual)
             if not float(np.abs(dq).max(initial=0.0)) < ENDLESS:
                 return Solution(q, now, iteration, False, "singular tangent")
-            if self._exhausted(system, now, before, dq):
-                return self._finish(system, q, lam, now, iteration, globalised=False)
+            if self._exhausted(system, now, before, dq) or self._is_no_step(q, dq):
+                if now.imbalance <= NEUTRAL_IMBALANCE * self.tolerance:
+                    return self._finish(system, q, lam, now, iteration, globalised=False)
+                return Solution(q, now, iteration, False, ALONG)
             dq = limited(system, q, dq, lam)
             sizes.append(float(np.linalg.norm(dq[: system.primal])))
             if self.hasty and now.imbalance > NEAR_SADDLE and slow(sizes):
@@ -179,6 +184,14 @@ class Newton:
         if now.imbalance <= self.tolerance:
             return self._finish(system, q, lam, now, self.full, globalised=False)
         return Solution(q, now, self.full, False, "iteration limit")
+
+    def _full_step(self, factor: Factor, residual: Array) -> Array:
+        dq = -factor.solve(residual)
+        return dq if self.held is None else without(factor, dq, self.held)
+
+    def _is_no_step(self, q: Array, dq: Array) -> bool:
+        """Whether all but the neutral mode that is left alone is in balance."""
+        return self.held is not None and float(np.linalg.norm(dq)) < NO_STEP * float(np.linalg.norm(q))
 
     def _full_factor(self, matrix: Matrix) -> Factor | None:
         if not self.unstable:
@@ -257,7 +270,7 @@ class Newton:
         """
         p = system.primal
         gain = abs(float(now.residual[:p] @ dq[:p]))
-        stuck = 0.5 * before <= now.imbalance <= 100.0 * self.tolerance
+        stuck = 0.5 * before <= now.imbalance <= NEUTRAL_IMBALANCE * self.tolerance
         return stuck and gain <= 1e-13 * abs(now.energy)
 
     def _finish(
