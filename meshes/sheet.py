@@ -20,6 +20,7 @@ from meshes.mesh import count
 from meshes.pattern import Crease, CreasePattern, FoldKind
 from meshes.planar import RIM, DrawnLine, Graph, corners
 from meshes.rails import curve_through, find_rails
+from meshes.separate import several
 from meshes.topology import Ints
 
 CREASES: dict[str, tuple[str, FoldKind]] = {
@@ -134,10 +135,7 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
     sides = [e for at, kept in zip(around, keep, strict=True) if kept for e in at]
     used = np.bincount(sides, minlength=len(graph.edges))
     if polygon.geom_type != "Polygon":
-        spots = ", ".join(_at(part.representative_point().coords[0]) for part in polygon.geoms)
-        raise PatternError(
-            f"the drawing holds {len(polygon.geoms)} separate sheets (at {spots}); keep one of them"
-        )
+        raise PatternError(several(list(polygon.geoms)))
     rim = np.flatnonzero(used == 1)
     inside = np.setdiff1d(np.arange(len(graph.edges)), rim)
     lost = [face for face, was, kept in zip(faces, solid, keep, strict=True) if was and not kept]

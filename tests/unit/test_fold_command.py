@@ -140,6 +140,25 @@ class TestOneCommand:
         mesh = parse_scene(first.text, tmp_path).model.mesh
         assert mesh.points[mesh.crease_edges("m1")][..., 0].max() == pytest.approx(40.0)
 
+    def test_without_an_outline_the_hull_is_taken(self, tmp_path: Path) -> None:
+        lines = '<path d="M0 30 H80" stroke="red"/><path d="M0 0 L30 10 L80 0" stroke="blue"/>'
+        first = proposals(svg(tmp_path, lines))[0]
+        assert 'outline = "hull"' in first.text
+        assert any("the convex hull of all lines is taken" in line for line in first.assumed)
+        mesh = parse_scene(first.text, tmp_path).model.mesh
+        assert mesh.areas.sum() == pytest.approx(80.0 * 30.0)
+
+    def test_one_of_two_sheets_is_folded(self, tmp_path: Path) -> None:
+        other = RIM.replace("<rect", '<rect x="100"') + '<path d="M100 20 H180" stroke="blue"/>'
+        file = svg(tmp_path, RIM + '<path d="M0 30 H80" stroke="red"/>' + other)
+        first = proposals(file)[0]
+        assert any("the drawing holds 2 sheets: the first" in line for line in first.assumed)
+        assert "mountain" in parse_scene(first.text, tmp_path).model.mesh.folds
+        assert main(["fold", str(file), "-o", str(tmp_path / "out"), "-q", "--sheet", "2"]) == 0
+        mesh = load_scene(tmp_path / "out" / "sheet.toml").model.mesh
+        assert "mountain" not in mesh.folds
+        assert folds(tmp_path / "out", "valley") == pytest.approx(144.0, abs=0.01)
+
     def test_paper_is_taken_where_card_is_thick(self, tmp_path: Path) -> None:
         narrow = "".join(
             f'<path d="M{x} 0 V60" stroke="{"red" if x % 4 else "blue"}"/>' for x in range(2, 80, 2)

@@ -70,6 +70,7 @@ STUDIES = (
     Study("speed_error", "solver", long=True),
     Study("honesty", "solver", long=True),
     Study("campaign", "solver", long=True),
+    Study("drawings", "solver", long=True),
     Study("gradients", "solver"),
     Study("top_down", "4"),
     Study("bottom_up", "4"),
