@@ -232,6 +232,8 @@ def _check_inside(
         mend = (
             f", or cut off what stands out by gap = {1.05 * out:.2g}" if out < 0.05 * polygon.length else ""
         )
+        if not len(graph.select(RIM)):
+            mend += '; no line is drawn as one: outline = "hull" takes the hull of what is drawn'
         raise PatternError(
             f"{_name(graph, lines, e)} ({graph.kinds[e]}) leaves the sheet at {_middle(graph, e)}; "
             f"end it at the outline{mend}"

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 KINDS = ("stretching", "bending", "folding")
 BLANK_SHEET, COLOURS = "#b9c4cf", "viridis"
+NOISE = 1e-18  # N mm / mm^2: rounding of a sheet that folds rigidly; bent paper has 1e-9 and more
 
 
 class Colouring(NamedTuple):
@@ -52,7 +53,7 @@ def colouring_of(state: State, colour: str | None, top: float | None) -> Colouri
         top = float(values.max(initial=0.0))
     if not (np.isfinite(top) and top >= 0.0):
         raise PlotError(f"top = {top} cannot be; give an energy density in N mm / mm^2")
-    if top == 0.0:
+    if top <= NOISE:
         return None
     return Colouring(values, top, bool(values.max(initial=0.0) > top * (1.0 + 1e-9)))
 

@@ -187,6 +187,8 @@ def test_hull_of_a_drawing_without_outline(tmp_path: Path) -> None:
     pattern = read_pattern(file, outline="hull")
     assert area(pattern) == pytest.approx(3000.0)
     assert "hull" in " ".join(pattern.remarks)
+    loops = '<path d="M0,20L50,0L100,20L50,40L0,20M50,40V60" stroke="red"/>'  # closed lines, and one that stands out
+    assert 'outline = "hull"' in refused(lambda: read_pattern(svg(tmp_path, loops, name="loops.svg")))
     assert "outline = 'box' is not known" in refused(lambda: read_pattern(file, outline="box"))
 
 

@@ -36,6 +36,9 @@ RIGHT = {
         (170.0 - 60.0 * math.cos(math.radians(70.0))) * PX,
     ),
     "cone_pleat.svg": (200.0 * PX, 160.0 * PX),
+    "four_sheets.svg": (60.0, 40.0),
+    "no_outline.svg": (100.0, 60.0),
+    "steps_popup.svg": (100.0, 80.0),
 }
 SIZE = 1e-3  # how far a side may be off: they were written with two decimals
 
