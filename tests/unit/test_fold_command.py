@@ -192,9 +192,29 @@ class TestOneCommand:
             proposals(svg(tmp_path, RIM))
 
     def test_a_clock_ends_a_run(self) -> None:
-        clock = _Clock(Silent(), -1.0)
+        clock = _Clock(Silent(), -1.0, -1.0)
         with pytest.raises(TimeUpError, match=r"lambda = 0\.50"):
             clock.update(0, 1, 0.5, 3, 1.0)
+
+    def test_a_run_that_will_end_in_time_goes_on_beyond_its_share(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        now = 0.0
+        monkeypatch.setattr("time.process_time", lambda: now)
+        clock = _Clock(Silent(), 10.0, 20.0)
+        now = 8.0
+        clock.update(0, 1, 0.8, 3, 1.0)
+        now = 14.0
+        clock.check(0.9)  # at its pace it needs 2.8 s to 3.5 s more of the 6 s that are left
+        now = 16.5
+        with pytest.raises(TimeUpError, match=r"its 16 s were over at lambda = 0\.90"):
+            clock.check(0.9)
+        now = 8.0
+        clock.update(0, 1, 1.0, 3, 1.0)
+        clock.update(0, 1, 0.1, 3, 1.0)  # another mesh
+        now = 10.5
+        with pytest.raises(TimeUpError):
+            clock.check(0.2)
 
     def test_angles(self) -> None:
         assert spoken("90deg", "angle") == pytest.approx(math.pi / 2)
