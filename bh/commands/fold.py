@@ -73,7 +73,7 @@ class Folded:
 class _Clock:
     """A meter that hands on to another one and ends a run whose time is over.
 
-    A run that would end in time at the pace that it had until now goes on beyond its share.
+    A run that would end in time at the pace of the last third of what it took goes on beyond its share.
 
     Args:
         inner: the meter.
@@ -85,21 +85,22 @@ class _Clock:
         self._inner = inner
         self._share, self._most = seconds, most
         self._start = time.process_time()
-        self._begin()  # of the pace: when, and how much of the way there is behind the last state
+        self._begin()
 
     def stage(self, words: str) -> None:
         stage(self._inner, words)
         self._begin()
 
     def _begin(self) -> None:
-        self._pace_from, self._way = time.process_time(), 0.0
+        """The way begins: time and way of states, 0 to 1."""
+        self._states = [(time.process_time(), 0.0)]
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
         self._inner.update(step, steps, lam, iterations, energy)
         way = (step + lam) / steps
-        if way < self._way:  # on another mesh
+        if way < self._states[-1][1]:  # on another mesh
             self._begin()
-        self._way = way
+        self._states.append((time.process_time(), way))
         self.check(lam)
 
     def check(self, lam: float) -> None:
@@ -108,8 +109,10 @@ class _Clock:
         spent = now - self._start
         if spent <= self._share:
             return
-        needed = (now - self._pace_from) * (1.0 - self._way)
-        if spent >= self._most or needed > (self._most - spent) * self._way:
+        third = (now - self._states[0][0]) / 3.0
+        way = self._states[-1][1]
+        lately = way - next(before for at, before in reversed(self._states) if at <= now - third)
+        if spent >= self._most or third * (1.0 - way) >= (self._most - spent) * lately:
             raise TimeUpError(f"its {spent:.0f} s were over at lambda = {lam:.2f}")
 
     def timed(self, strategy: Strategy) -> Strategy:

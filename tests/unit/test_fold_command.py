@@ -202,17 +202,19 @@ class TestOneCommand:
         now = 0.0
         monkeypatch.setattr("time.process_time", lambda: now)
         clock = _Clock(Silent(), 10.0, 20.0)
-        now = 8.0
+        now = 5.0
+        clock.update(0, 1, 0.6, 3, 1.0)
+        now = 10.5
         clock.update(0, 1, 0.8, 3, 1.0)
-        now = 14.0
-        clock.check(0.9)  # at its pace it needs 2.8 s to 3.5 s more of the 6 s that are left
+        now = 12.0
+        clock.check(0.9)  # 0.2 in the last 4 s: 4 s more of the 8 s that are left
         now = 16.5
         with pytest.raises(TimeUpError, match=r"its 16 s were over at lambda = 0\.90"):
-            clock.check(0.9)
+            clock.check(0.9)  # nothing in the last 5.5 s
         now = 8.0
         clock.update(0, 1, 1.0, 3, 1.0)
         clock.update(0, 1, 0.1, 3, 1.0)  # another mesh
-        now = 10.5
+        now = 14.0
         with pytest.raises(TimeUpError):
             clock.check(0.2)
 
