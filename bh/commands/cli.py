@@ -53,6 +53,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in (words[: words.index("--")] if "--" in words else words)
     if debug:  # it may stand anywhere, also behind a command
         words.remove("--debug")
+    try:
+        return _run(words, debug)
+    except KeyboardInterrupt:  # in the moment in which another end is told of
+        return _fail("interrupted", 130, debug)
+
+
+def _run(words: list[str], debug: bool) -> int:
     take_back = take_options(words)
     try:
         code = app(args=words, prog_name="bh", standalone_mode=False)

@@ -270,5 +270,5 @@ def _kept(
     with replacing(folder / FINISHED[1]) as draft:
         draft.write_text(json.dumps(text, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     written = [target, *(folder / name for name in FINISHED)]
-    written += write_extras(path, scene, folder, fast=True)
+    written += write_extras(path, scene, folder)
     return Folded(path, scene, offer, tuple(written), notes, time.process_time() - began)

@@ -361,7 +361,7 @@ def remove_extras(folder: Path, mark: str) -> None:
 
 
 def write_extras(
-    path: Trace, scene: Scene, folder: Path, pictures: bool = False, vtu: bool = False, *, fast: bool = False
+    path: Trace, scene: Scene, folder: Path, pictures: bool = False, vtu: bool = False
 ) -> list[Path]:
     """Write what is wished for beside the result, and return the files.
 
@@ -371,7 +371,6 @@ def write_extras(
         folder: for the files.
         pictures: also draw the folded sheet.
         vtu: also write all states for ParaView.
-        fast: draw small meshes without VTK.
 
     Returns:
         the files.
@@ -380,7 +379,7 @@ def write_extras(
         InputError: one of them cannot be written; the result is.
     """
     written = []
-    for name, write in extras(path, scene, folder, pictures, vtu, fast=fast).items():
+    for name, write in extras(path, scene, folder, pictures, vtu).items():
         try:
             write()
         except (InputError, ImportError, OSError) as error:
@@ -392,7 +391,7 @@ def write_extras(
 
 
 def extras(
-    path: Trace, scene: Scene, folder: Path, pictures: bool, vtu: bool, *, fast: bool = False
+    path: Trace, scene: Scene, folder: Path, pictures: bool, vtu: bool
 ) -> dict[str, Callable[[], object]]:
     """What is written on request beside the result, by name (marked where a finished result is kept).
 
@@ -402,7 +401,6 @@ def extras(
         folder: for the files.
         pictures: also draw the folded sheet.
         vtu: also write all states for ParaView.
-        fast: draw small meshes without VTK.
 
     Returns:
         By the name of the file what writes it.
@@ -412,7 +410,7 @@ def extras(
     def draw() -> None:
         from bh.plotting import picture
 
-        picture(path[-1], folder / f"folded{mark}.png", fast=fast)
+        picture(path[-1], folder / f"folded{mark}.png")
 
     def series() -> None:
         from bh.plotting import export_series

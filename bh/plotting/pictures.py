@@ -8,19 +8,19 @@ import tempfile
 import uuid
 from collections.abc import Sequence
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.plotting.camera import Camera, camera_of
 from bh.plotting.charts import INK
-from bh.plotting.colouring import BLANK_SHEET, COLOURS, KINDS, Colouring, colouring_of, shades_of_edges
 from bh.plotting.offscreen import PlotError, has_display, render
 from bh.plotting.panels import cut_open
 from meshes.io.export import replacing, write_mesh
 
 if TYPE_CHECKING:
+    from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
     from pyvista import Actor, Plotter, PolyData
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+KINDS = ("stretching", "bending", "folding")
 # of a collection of VTU files
 HEAD = (
     '<?xml version="1.0"?>',
@@ -36,9 +37,16 @@ HEAD = (
     "  <Collection>",
 )
 FOOT = ("  </Collection>", "</VTKFile>", "")
-PAPER = "white"
-MOST_PAINTED = 5_000  # triangles that are painted as fast as VTK is loaded
+PAPER, BLANK_SHEET, COLOURS = "white", "#b9c4cf", "viridis"
 MOST_EDGES = 20_000  # triangles of a mesh whose edges can still be told apart in a picture
+
+
+class Colouring(NamedTuple):
+    """Values (n,) at nodes, N mm / mm^2; colours end at `top` > 0; `cut` if some lie above it."""
+
+    values: Array
+    top: float
+    cut: bool
 
 
 def picture(
@@ -50,7 +58,6 @@ def picture(
     caption: str | bool = True,
     camera: tuple[float, float] | None = None,
     top: float | None = None,
-    fast: bool = False,
 ) -> FilePath:
     """Write a picture of the folded sheet, coloured by energy density, without a window.
 
@@ -63,7 +70,6 @@ def picture(
         caption: a line of text; True for lambda and the energies, False for none.
         camera: azimuth and elevation that it looks from, rad; None for where most of the sheet is seen.
         top: energy density where the colours end, to compare pictures; None for the largest there is.
-        fast: paint meshes of up to 5,000 triangles without VTK, which takes 3 s to load and draw one.
 
     Returns:
         The absolute path of the file.
@@ -76,18 +82,12 @@ def picture(
     if target.suffix.lower() != ".png":
         raise PlotError(f"picture '{target}' is not a .png file; name it so")
     width, height = _possible(size)
-    colouring = colouring_of(state, colour, top)
+    colouring = _colouring(state, colour, top)
     title = _energies(state) if caption is True else (caption or "")
     unit = _unit(width, height)
     head, foot = int(64 * unit) if title else 0, int(118 * unit) if colouring is not None else 0
     inner = height - head - foot
-    view = camera_of(state, width / inner, camera)
-    if fast and len(state.mesh.triangles) <= MOST_PAINTED:
-        from bh.plotting.painter import painted
-
-        image = painted(state, colouring, (width, inner), view)
-    else:
-        image = _render(state, colouring, (width, inner), view)
+    image = _render(state, colouring, (width, inner), camera_of(state, width / inner, camera))
     figure = _frame(image, (width, height), foot, title, f"{colour} energy density", colouring)
     with replacing(target) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
@@ -110,7 +110,7 @@ def moving_pictures(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     width, height = _possible(size)
-    whole = [colouring_of(state, colour, None) for state in states]
+    whole = [_colouring(state, colour, None) for state in states]
     top = max((found.top for found in whole if found is not None), default=0.0)
     unit = _unit(width, height)
     head, foot = int(64 * unit), int(118 * unit) if top else 0
@@ -118,7 +118,7 @@ def moving_pictures(
     camera = camera_of(states[-1], width / inner, None, np.concatenate([state.points for state in states]))
     found = []
     for state in states:
-        colouring = colouring_of(state, colour, top or None)
+        colouring = _colouring(state, colour, top or None)
         image = _render(state, colouring, (width, inner), camera)
         figure = _frame(image, (width, height), foot, _energies(state), f"{colour} energy density", colouring)
         canvas = FigureCanvasAgg(figure)
@@ -146,7 +146,7 @@ def show(state: State, colour: str | None = "bending", **options: object) -> obj
     import pyvista as pv
     from matplotlib.font_manager import findfont
 
-    colouring = colouring_of(state, colour, None)
+    colouring = _colouring(state, colour, None)
     plotter = pv.Plotter(window_size=[1200, 900], title="bh")
     near = camera_of(state, 4 / 3, None)
     # room for the texts
@@ -231,6 +231,26 @@ def _possible(size: tuple[int, int]) -> tuple[int, int]:
 # --- what is drawn -----------------------------------------------------------------------------------------
 
 
+def _colouring(state: State, colour: str | None, top: float | None) -> Colouring | None:
+    if not hasattr(state, "nodal_energy_density"):
+        raise PlotError(f"{type(state).__name__} is not a state; give one of a path, such as path[-1]")
+    if colour is None:
+        return None
+    if colour == "total":
+        values = np.sum([state.nodal_energy_density(kind) for kind in KINDS], axis=0)
+    elif colour in KINDS:
+        values = state.nodal_energy_density(colour)
+    else:
+        raise PlotError(f"colour '{colour}' is not known; use one of {', '.join(KINDS)}, total")
+    if top is None:
+        top = float(values.max(initial=0.0))
+    if not (np.isfinite(top) and top >= 0.0):
+        raise PlotError(f"top = {top} cannot be; give an energy density in N mm / mm^2")
+    if top == 0.0:
+        return None
+    return Colouring(values, top, bool(values.max(initial=0.0) > top * (1.0 + 1e-9)))
+
+
 def _energies(state: State) -> str:
     energy = state.energy
     parts = [f"{kind} {_number(getattr(energy, kind))}" for kind in KINDS if getattr(energy, kind) != 0.0]
@@ -274,7 +294,7 @@ def _draw(plotter: Plotter, state: State, colouring: Colouring | None, pixel: fl
     else:
         scale = {"clim": (0.0, colouring.top), "show_scalar_bar": False, "interpolate_before_map": True}
         look |= {"scalars": colouring.values[surface.point_data["node"]], "cmap": COLOURS, **scale}
-        faint |= {"scalars": colouring.values, "cmap": shades_of_edges(), **scale}
+        faint |= {"scalars": colouring.values, "cmap": _shades_of_edges(), **scale}
     drawn = plotter.add_mesh(surface, smooth_shading=True, **look)
     # pushed back a little, so that the edges in the surface win over it
     drawn.mapper.SetResolveCoincidentTopologyToPolygonOffset()
@@ -286,6 +306,16 @@ def _draw(plotter: Plotter, state: State, colouring: Colouring | None, pixel: fl
         _tubes(plotter, _lines(state, state.mesh.crease_edges(crease)), 2.3 * pixel)
     plotter.set_background(PAPER)
     return drawn
+
+
+def _shades_of_edges() -> ListedColormap:
+    """The colour map, a shade lighter where it is dark and a shade darker where it is light."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    colours = colormaps[COLOURS](np.linspace(0.0, 1.0, 256))[:, :3]
+    dark = colours @ (0.30, 0.59, 0.11) < 0.36
+    return ListedColormap(np.where(dark[:, None], 0.72 * colours + 0.28, 0.78 * colours))
 
 
 def _lines(state: State, pairs: NDArray[np.int64]) -> PolyData:

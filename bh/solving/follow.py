@@ -23,6 +23,7 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import LOAD, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
+from bh.solving.coarser import Coarser
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def follow(
     file: str | FilePath | None = None,
     resume: bool = False,
     after: Path | None = None,
+    coarser: Path | None = None,
 ) -> Path:
     """Follow the equilibrium of a model on its own mesh through all its steps; arguments as of `bh.trace`.
 
@@ -50,6 +52,7 @@ def follow(
         file: path file that every state is written to.
         resume: go on from what the file has.
         after: path whose end this one begins at.
+        coarser: path of the same sheet and formulation on a coarser mesh (`bh.solving.coarser`).
 
     Returns:
         the path up to where it got.
@@ -62,17 +65,20 @@ def follow(
     report = meter(progress)
     with nullcontext() if file is None else only_writer(FilePath(file)):
         path, target = _opened(model, symmetry, file, resume, after)
-        _walk(path, target, strategy, report)
+        _walk(path, target, strategy, report, None if coarser is None else Coarser(coarser))
     return path
 
 
-def _walk(path: Path, target: PathFile | None, strategy: Strategy, report: ProgressMeter) -> None:
+def _walk(
+    path: Path, target: PathFile | None, strategy: Strategy, report: ProgressMeter, coarser: Coarser | None
+) -> None:
     """Solve the steps that are left."""
     model = path.model
     try:
         for step in range(len(path.steps), len(model.steps)):
             with one_blas_thread():
-                end = _run_step(path, step, strategy, report, target)
+                way = strategy if coarser is None else coarser.guiding(strategy, model.mesh, step)
+                end = _run_step(path, step, way, report, target)
                 if end.reached and step == len(model.steps) - 1:
                     end = _stable_end(path, strategy)
             path.steps.append(end)

@@ -99,7 +99,10 @@ def fold_here(file: Path, name: str, folder: Path, limit: float = LIMIT) -> Row:
 
 def _row(name: str, done: Folded) -> Row:
     path, mesh = done.path, done.path.model.mesh
-    width, height = np.sort(np.ptp(mesh.points, axis=0))[:0:-1].tolist()
+    flat = (
+        mesh.points if mesh.pattern is None else mesh.pattern.rings[0]
+    )  # chords of a coarse mesh cut curves short
+    height, width = np.sort(np.ptp(flat, axis=0))[-2:].tolist()
     chains = [
         crease
         for crease in mesh.creases
