@@ -18,6 +18,9 @@ def in_reading_order(sheets: Sequence[Any]) -> list[Any]:
 
     Args:
         sheets: shapely's polygons; one whose middle lies above the lower edge of the first of a row is in that row.
+
+    Returns:
+        the same polygons.
     """
     rows: list[list[Any]] = []
     for sheet in sorted(sheets, key=lambda each: -each.bounds[3]):
