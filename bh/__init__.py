@@ -20,7 +20,15 @@ except KeyboardInterrupt:  # of the command `bh` alone; of a user's own program 
     raise SystemExit(130) from None
 
 if TYPE_CHECKING:
-    from bh.errors import InputError, ModelError, PathFileError, SceneError
+    from bh.commands.read import Run, read
+    from bh.errors import (
+        InputError,
+        ModelError,
+        NotReachedError,
+        NotReachedWarning,
+        PathFileError,
+        SceneError,
+    )
     from bh.formulations.protocols import Formulation, SheetSystem
     from bh.formulations.registry import remarks
     from bh.formulations.remarks import Remark
@@ -48,7 +56,8 @@ if TYPE_CHECKING:
 
 # where a name is; `tests/test_architecture.py` holds it against the imports above
 _NAMES = {
-    "bh.errors": "InputError ModelError PathFileError SceneError",
+    "bh.commands.read": "Run read",
+    "bh.errors": "InputError ModelError NotReachedError NotReachedWarning PathFileError SceneError",
     "bh.formulations.protocols": "Formulation SheetSystem",
     "bh.formulations.registry": "remarks",
     "bh.formulations.remarks": "Remark",
@@ -117,6 +126,8 @@ __all__ = [
     "ModelError",
     "Moment",
     "Newton",
+    "NotReachedError",
+    "NotReachedWarning",
     "Outcome",
     "Path",
     "PathFileError",
@@ -125,6 +136,7 @@ __all__ = [
     "Refinement",
     "Remark",
     "RigidBody",
+    "Run",
     "SceneError",
     "Settling",
     "Sheet",
@@ -140,6 +152,7 @@ __all__ = [
     "allow_plugins",
     "depth",
     "load_scene",
+    "read",
     "remarks",
     "trace",
 ]
