@@ -20,6 +20,7 @@ from meshes.mesh import count
 from meshes.pattern import Crease, CreasePattern, FoldKind
 from meshes.planar import RIM, DrawnLine, Graph, corners
 from meshes.rails import curve_through, find_rails
+from meshes.separate import several
 from meshes.topology import Ints
 
 CREASES: dict[str, tuple[str, FoldKind]] = {
@@ -134,10 +135,7 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
     sides = [e for at, kept in zip(around, keep, strict=True) if kept for e in at]
     used = np.bincount(sides, minlength=len(graph.edges))
     if polygon.geom_type != "Polygon":
-        spots = ", ".join(_at(part.representative_point().coords[0]) for part in polygon.geoms)
-        raise PatternError(
-            f"the drawing holds {len(polygon.geoms)} separate sheets (at {spots}); keep one of them"
-        )
+        raise PatternError(several(list(polygon.geoms)))
     rim = np.flatnonzero(used == 1)
     inside = np.setdiff1d(np.arange(len(graph.edges)), rim)
     lost = [face for face, was, kept in zip(faces, solid, keep, strict=True) if was and not kept]
@@ -234,6 +232,8 @@ def _check_inside(
         mend = (
             f", or cut off what stands out by gap = {1.05 * out:.2g}" if out < 0.05 * polygon.length else ""
         )
+        if not len(graph.select(RIM)):
+            mend += '; no line is drawn as one: outline = "hull" takes the hull of what is drawn'
         raise PatternError(
             f"{_name(graph, lines, e)} ({graph.kinds[e]}) leaves the sheet at {_middle(graph, e)}; "
             f"end it at the outline{mend}"

@@ -64,24 +64,49 @@ class Folded:
 
 
 class _Clock:
-    """A meter that hands on to another one and ends a run whose time is over."""
+    """A meter that hands on to another one and ends a run whose time is over.
 
-    def __init__(self, inner: ProgressMeter, seconds: float) -> None:
+    A run that would end in time at the pace of the last third of what it took goes on beyond its share.
+
+    Args:
+        inner: the meter.
+        seconds: processor time that is the run's share.
+        most: processor time that is left for everything.
+    """
+
+    def __init__(self, inner: ProgressMeter, seconds: float, most: float) -> None:
         self._inner = inner
-        self._until = time.process_time() + seconds
-        self._seconds = seconds
+        self._share, self._most = seconds, most
+        self._start = time.process_time()
+        self._begin()
 
     def stage(self, words: str) -> None:
         stage(self._inner, words)
+        self._begin()
+
+    def _begin(self) -> None:
+        """The way begins: time and way of states, 0 to 1."""
+        self._states = [(time.process_time(), 0.0)]
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
         self._inner.update(step, steps, lam, iterations, energy)
+        way = (step + lam) / steps
+        if way < self._states[-1][1]:  # on another mesh
+            self._begin()
+        self._states.append((time.process_time(), way))
         self.check(lam)
 
     def check(self, lam: float) -> None:
         """Raise `TimeUpError` if the time is over."""
-        if time.process_time() > self._until:
-            raise TimeUpError(f"its {self._seconds:.0f} s were over at lambda = {lam:.2f}")
+        now = time.process_time()
+        spent = now - self._start
+        if spent <= self._share:
+            return
+        third = (now - self._states[0][0]) / 3.0
+        way = self._states[-1][1]
+        lately = way - next(before for at, before in reversed(self._states) if at <= now - third)
+        if spent >= self._most or third * (1.0 - way) >= (self._most - spent) * lately:
+            raise TimeUpError(f"its {spent:.0f} s were over at lambda = {lam:.2f}")
 
     def timed(self, strategy: Strategy) -> Strategy:
         """The strategy, which ends where the time is over in the middle of an increment, too."""
@@ -175,7 +200,7 @@ def fold_file(
             scene = replace(parse_scene(offer.text, folder, file.stem), source=target)
             report = meter(progress)
             stage(report, offer.mesh)
-            path, why = _solved(scene, place, _Clock(report, max(share, 1.0)))
+            path, why = _solved(scene, place, _Clock(report, max(share, 1.0), max(left, 1.0)))
         except InputError as error:
             failed = failed or error
             notes.append(f"{offer.mesh}: {error}")

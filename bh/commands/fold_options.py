@@ -41,6 +41,10 @@ def fold(  # noqa: PLR0913 - the options of a command line
     frame: Annotated[
         str | None, typer.Option("--frame", help="Of a FOLD file: number (0 is the key frame) or title.")
     ] = None,
+    sheet: Annotated[
+        int | None,
+        typer.Option("--sheet", min=1, help="Which of several sheets, in rows from the top left."),
+    ] = None,
     write: Annotated[
         list[str] | None,
         typer.Option("--write", metavar="glb", help="Also glb, stl, obj, ...; may be repeated."),
@@ -65,6 +69,7 @@ def fold(  # noqa: PLR0913 - the options of a command line
         fit,
         scale,
         number,
+        sheet,
         tuple(write or ()),
     )
     folder = Path(f"{file.stem}-folded") if output is None else output

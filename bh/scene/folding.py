@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bh.errors import InputError
+from bh.scene.foldable import Found, understood
 from meshes import CreasePattern, MeshError, SheetMesh
 from meshes.cells import RuledCells
 from meshes.choices import choices, cut, panel_width
-from meshes.planar import CORNER
 
 PERCENT = 80.0  # of the way, where neither the user nor the file says how far
 FULLY = math.radians(170.0)  # drawn angles beyond that mean folded flat: then 80 % of them, too
@@ -30,10 +29,6 @@ THIN = 0.05  # thickness over the width of a panel, at most, of the sheet that i
 CREASES = 12  # curved creases of which an accuracy can be afforded
 ROWS = 4.0  # of cells in a panel between curved creases
 SECONDS = 15.0  # of a run to an accuracy
-FIT = 200.0  # mm, the longer side of a sheet whose file says no unit and whose numbers make an absurd size
-STRAIGHT = 0.02  # rad that a crease turns between its ends, by which it is still straight
-JOINING = re.compile(r"to join them: gap = ([0-9.e+-]+)")  # as remarks of readers advise
-KINDS = ("mountain", "valley", "flat")  # names of all creases of a kind
 COARSE = 2e-3  # of the diagonal: chords of curves of which the drawing's own faces are made
 MATERIALS: Mapping[str, tuple[float, float, float, str]] = {
     "paper": (4000.0, 0.3, 0.1, "paper, 80 g/m2"),
@@ -57,6 +52,7 @@ class Wish:
         fit: longer side of the sheet, mm.
         scale: mm a unit of the drawing.
         frame: of a FOLD file.
+        sheet: which of several sheets that are drawn, from 1.
         write: formats of the folded sheet, such as "glb".
     """
 
@@ -66,6 +62,7 @@ class Wish:
     fit: float | None = None
     scale: float | None = None
     frame: int | str | None = None
+    sheet: int | None = None
     write: tuple[str, ...] = ()
 
 
@@ -82,15 +79,6 @@ class Proposal:
     text: str
     mesh: str
     assumed: tuple[str, ...]
-
-
-@dataclass
-class _Found:
-    """What a file holds: its own faces as a mesh and its pattern, or why not."""
-
-    faces: SheetMesh | None = None
-    pattern: CreasePattern | None = None
-    why: list[InputError] = field(default_factory=list)
 
 
 def proposals(file: str | os.PathLike[str], wish: Wish | None = None) -> list[Proposal]:
@@ -110,19 +98,15 @@ def proposals(file: str | os.PathLike[str], wish: Wish | None = None) -> list[Pr
     _check(wish)
     options: dict[str, object] = {
         key: value
-        for key, value in (("fit", wish.fit), ("scale", wish.scale), ("frame", wish.frame))
-        if value
+        for key, value in (
+            ("fit", wish.fit),
+            ("scale", wish.scale),
+            ("frame", wish.frame),
+            ("sheet", wish.sheet),
+        )
+        if value is not None
     }
-    assumed: list[str] = []
-    found = _read(Path(file), options)
-    sheet = found.faces or found.pattern
-    if sheet is None:
-        raise found.why[0]
-    if not options.keys() & {"fit", "scale"} and any("states no unit" in text for text in sheet.remarks):
-        assumed.append(f"the file states no unit and would be absurdly small or large: fitted to {FIT:g} mm")
-        options["fit"] = FIT
-        found = _read(Path(file), options)
-    found = _joined(Path(file), found, options, assumed)
+    found, assumed = understood(Path(file), options)
     return _proposed(Path(file), wish, found, options, assumed)
 
 
@@ -139,64 +123,10 @@ def _check(wish: Wish) -> None:
         raise InputError(f"{wish.percent:g} percent cannot be; give more than 0, up to 100")
 
 
-def _read(file: Path, options: Mapping[str, object]) -> _Found:
-    """Own faces first, a pattern where these will not do: creases that bend, lines that end inside, no faces."""
-    from meshes.io import read_drawn, read_fold, read_pattern
-
-    found = _Found()
-    given = dict(options)
-    try:
-        if file.suffix.lower() == ".fold":
-            frame = given.pop("frame", None)
-            found.faces = read_fold(file, frame, **given)  # type: ignore[arg-type]
-        else:
-            found.faces = read_drawn(file, outline="drawn", **given)  # type: ignore[arg-type]
-    except InputError as error:
-        found.why.append(error)
-    if found.faces is None or (_bent(found.faces) and found.faces.flat):
-        try:
-            found.pattern = read_pattern(file, **dict(options))  # type: ignore[arg-type]
-        except InputError as error:
-            found.why.append(error)
-    return found
-
-
-def _joined(file: Path, found: _Found, options: dict[str, object], assumed: list[str]) -> _Found:
-    """The file read once more with the gap that joins lines which nearly meet, where its remarks advise one."""
-    sheet = found.faces or found.pattern
-    gaps = [float(gap) for text in (sheet.remarks if sheet else ()) for gap in JOINING.findall(text)]
-    if not gaps or "gap" in options:
-        return found
-    joined = _read(file, options | {"gap": max(gaps)})
-    if joined.faces is None and joined.pattern is None:
-        return found
-    assumed.append(f"lines that end close to others ({len(gaps)}) are joined by gap = {max(gaps):g} mm")
-    options["gap"] = max(gaps)
-    return joined
-
-
-def _bent(mesh: SheetMesh) -> bool:
-    """True if a crease turns on its way, by less than a corner and where it meets no other line: a curve."""
-    drawn = [mesh.topology.boundary, *(mesh.crease_edges(name) for name in mesh.folds if name in KINDS)]
-    drawn += [mesh.edge_sets["edge:flat"]] if "edge:flat" in mesh.edge_sets else []
-    degree = np.bincount(
-        np.concatenate([np.asarray(pairs).ravel() for pairs in drawn]), minlength=len(mesh.points)
-    )
-    for name in mesh.creases:
-        pairs = mesh.crease_edges(name)
-        if name in KINDS or len(pairs) < 4:
-            continue
-        steps = mesh.points[pairs[:, 1], :2] - mesh.points[pairs[:, 0], :2]
-        turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
-        if turns[(turns <= CORNER) & (degree[pairs[1:, 0]] == 2)].sum() > STRAIGHT:
-            return True
-    return False
-
-
 def _proposed(
     file: Path,
     wish: Wish,
-    found: _Found,
+    found: Found,
     options: Mapping[str, object],
     assumed: list[str],
 ) -> list[Proposal]:
@@ -306,7 +236,7 @@ def _drawn_angles(sheet: SheetMesh | CreasePattern) -> np.ndarray[tuple[int], np
     return np.concatenate([np.asarray(part) for part in parts])
 
 
-def _meshes(found: _Found, width: float) -> list[tuple[str, str, str]]:
+def _meshes(found: Found, width: float) -> list[tuple[str, str, str]]:
     """(tables of the mesh, the same in words, formulation or "" for the program's own choice), the best first."""
     drawn = [
         ('kind = "drawn"', "the faces of the drawing", "bars-and-hinges"),
@@ -351,7 +281,7 @@ def _ruled(pattern: CreasePattern) -> list[tuple[str, str, str]]:
     return []
 
 
-def _width(found: _Found) -> float:
+def _width(found: Found) -> float:
     """Width of a typical panel, mm."""
     if found.pattern is not None:
         return panel_width(found.pattern)
@@ -367,7 +297,7 @@ def _width(found: _Found) -> float:
     return max(area / float(lengths.sum() - 0.5 * lengths[-half:].sum()), 2e-3 * math.sqrt(area))
 
 
-def _narrowest(found: _Found, width: float) -> float:
+def _narrowest(found: Found, width: float) -> float:
     """Height of the narrowest face that is no sliver, mm; where faces are not known a third of a panel's width."""
     if found.faces is None:
         return width / 3.0
@@ -383,7 +313,7 @@ def _area(pattern: CreasePattern) -> float:
     return float(shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).area)
 
 
-def _tolerance(found: _Found) -> float:
+def _tolerance(found: Found) -> float:
     sheet = found.faces.points if found.faces is not None else found.pattern.rings[0]  # type: ignore[union-attr]
     return COARSE * float(np.linalg.norm(np.ptp(sheet, axis=0)))
 

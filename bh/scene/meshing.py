@@ -106,13 +106,14 @@ def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: 
         "outline": given.outline,
         "lines": given.lines,
         "frame": given.frame,
+        "sheet": given.sheet,
     }
     how = None if mesh is None else _mesh_table(as_table(mesh, "mesh"))
     own_faces = isinstance(how, DrawnTable) or (mesh is None and not anew)
     with within("pattern.file"):
-        if suffix == ".fold" and own_faces:
+        if suffix == ".fold" and own_faces and given.sheet is None:
             return read_fold(file, given.frame, scale=given.scale, fit=given.fit)
-        if isinstance(how, DrawnTable):
+        if isinstance(how, DrawnTable) or (suffix == ".fold" and own_faces):
             return read_drawn(file, **options)
         drawn = read_pattern(file, **options)
         if how is None:

@@ -21,6 +21,7 @@ from meshes.limits import check_limit
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.planar import RIM, DrawnLine, Graph, check_crossings, heal
+from meshes.separate import one_sheet
 from meshes.sheet import pattern_of, region_of
 
 OUTLINES = ("drawn", "hull")
@@ -48,6 +49,8 @@ class DrawingOptions(TypedDict, total=False):
         lines: what colours, layers and dashes stand for, in front of the defaults (see `meshes.io.strokes`).
         outline: "hull" takes the convex hull of what is drawn as the outline.
         frame: of a FOLD file, see `meshes.io.read_fold`.
+        sheet: which of several sheets that the drawing holds, counted from 1 in rows from the top left; None where it
+            holds one. `fit` is of that sheet then.
     """
 
     scale: float | None
@@ -57,6 +60,7 @@ class DrawingOptions(TypedDict, total=False):
     lines: Mapping[str, str] | None
     outline: str
     frame: int | str | None
+    sheet: int | None
 
 
 def read_pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> CreasePattern:
@@ -138,27 +142,13 @@ def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> S
 
 
 def read_graph(
-    path: str | os.PathLike[str],
-    *,
-    scale: float | None = None,
-    fit: float | None = None,
-    tolerance: float | None = None,
-    gap: float | None = None,
-    lines: Mapping[str, str] | None = None,
-    outline: str = "drawn",
-    frame: int | str | None = None,
+    path: str | os.PathLike[str], **options: Unpack[DrawingOptions]
 ) -> tuple[Graph, list[DrawnLine], list[str]]:
     """The healed plane graph of a drawing.
 
     Args:
         path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
-        scale: mm a unit of the drawing; None for the unit that the file states.
-        fit: length of the longer side of the sheet's bounding box, mm, in place of a scale.
-        tolerance: how far chords may stay off curves, mm; None for a part of the diagonal.
-        gap: lines that miss each other by up to so much are joined, mm; None for a part of the diagonal.
-        lines: what colours, layers and dashes stand for, in front of the defaults.
-        outline: "drawn", or "hull" for the convex hull of what is drawn.
-        frame: of a FOLD file.
+        **options: see `DrawingOptions`.
 
     Returns:
         The graph, the lines that its edges belong to, and one remark for each thing that was taken for
@@ -169,10 +159,12 @@ def read_graph(
             the file.
         PatternError: lines that cannot be healed, see `meshes.planar.heal`.
     """
+    scale, fit, sheet = options.get("scale"), options.get("fit"), options.get("sheet")
+    tolerance, gap, outline = options.get("tolerance"), options.get("gap"), options.get("outline", "drawn")
     _check({"scale": scale, "fit": fit, "tolerance": tolerance, "gap": gap}, outline)
-    found = _read(path, frame)
+    found = _read(path, options.get("frame"))
     strokes, unit, remarks = found.strokes, found.unit, list(found.remarks)
-    rules = Rules(lines)
+    rules = Rules(options.get("lines"))
     kept = [(stroke, kind) for stroke in strokes if (kind := rules.kind(stroke)) != "ignore"]
     if not kept:
         raise FileFormatError(
@@ -215,6 +207,8 @@ def read_graph(
         drawn.append(_hull(drawn))
         remarks.append("the outline is the convex hull of what is drawn")
     graph = heal(drawn, gap)
+    if sheet is not None:
+        graph = one_sheet(graph, sheet, fit, Path(path).suffix.lower() not in UPWARDS or fit is not None)
     return graph, drawn, [*remarks, *rules.remarks, *joined, *graph.remarks]
 
 

@@ -19,7 +19,7 @@ from ezdxf.filemanagement import new
 from meshes import CreasePattern
 from meshes.curves import sample
 from meshes.errors import FileFormatError
-from meshes.io import read_pattern
+from meshes.io import read_drawn, read_pattern
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
 PAGE = HEAD + 'width="120mm" height="80mm" viewBox="0 0 120 80" fill="none">'
@@ -187,7 +187,65 @@ def test_hull_of_a_drawing_without_outline(tmp_path: Path) -> None:
     pattern = read_pattern(file, outline="hull")
     assert area(pattern) == pytest.approx(3000.0)
     assert "hull" in " ".join(pattern.remarks)
+    loops = '<path d="M0,20L50,0L100,20L50,40L0,20M50,40V60" stroke="red"/>'  # closed lines, and one that stands out
+    assert 'outline = "hull"' in refused(lambda: read_pattern(svg(tmp_path, loops, name="loops.svg")))
+    out = svg(tmp_path, RIM + '<path d="M0,20H190" stroke="red"/>', name="out.svg")
+    assert 'outline = "hull"' not in refused(lambda: read_pattern(out))
     assert "outline = 'box' is not known" in refused(lambda: read_pattern(file, outline="box"))
+
+
+SIX = "".join(
+    f'<g transform="translate({50 * i} {40 * j})"><rect width="40" height="30" stroke="black"/>'
+    f'<path d="M0,{5 + 5 * i}h{40}" stroke="{"red" if (i + j) % 2 == 0 else "blue"}"/></g>'
+    for j in range(2)
+    for i in range(3)
+)
+
+
+def test_one_of_several_sheets(tmp_path: Path) -> None:
+    file = svg(tmp_path, SIX)
+    message = refused(lambda: read_pattern(file))
+    assert "holds 6 separate sheets (at (20, " in message
+    assert "sheet = 1 to 6" in message
+    for number in range(1, 7):
+        pattern = read_pattern(file, sheet=number)
+        column, row = (number - 1) % 3, (number - 1) // 3
+        assert list(lengths(pattern)) == ["mountain" if (column + row) % 2 == 0 else "valley"]
+        assert pattern.rings[0].min(axis=0) == pytest.approx([0.0, 0.0], abs=1e-9)
+        (crease,) = pattern.creases
+        assert sample(crease.curve)[:, 1] == pytest.approx(25.0 - 5.0 * column)
+    assert size(read_pattern(file, sheet=2, fit=120.0)) == pytest.approx((120.0, 90.0))
+    mesh = read_drawn(file, sheet=5)
+    assert mesh.areas.sum() == pytest.approx(1200.0)
+    assert "sheet = 7 cannot be; the drawing holds the sheets 1 to 6" in refused(
+        lambda: read_pattern(file, sheet=7)
+    )
+
+
+def test_a_sheet_keeps_its_place_in_a_dxf_file(tmp_path: Path) -> None:
+    def two(drawing: Drawing) -> None:
+        red_line(drawing)
+        space = drawing.modelspace()
+        space.add_lwpolyline([(200, 10), (260, 10), (260, 50), (200, 50)], close=True)
+        space.add_line((200, 30), (260, 30), dxfattribs={"color": 5})
+
+    pattern = read_pattern(dxf(tmp_path, two), sheet=2)
+    assert pattern.rings[0].min(axis=0) == pytest.approx([200.0, 10.0])
+    assert lengths(pattern) == {"valley": pytest.approx(60.0)}
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["M30,40 Q60,55 90,40", "M0,40 Q40,60 80,40", "M30,20 C30,60 90,60 90,20", "M20,40 h40 v20"],
+)
+def test_lines_that_end_inside_are_tied_to_others(tmp_path: Path, line: str) -> None:
+    """Faces of the drawing are made where a crease floats in a face, or bends back to itself."""
+    mesh = read_drawn(svg(tmp_path, f'{RIM}<path d="{line}" stroke="red"/>'), tolerance=0.3)
+    assert mesh.areas.sum() == pytest.approx(9600.0)
+    assert any("facet lines" in remark for remark in mesh.remarks)
+    corners = mesh.points[mesh.triangles]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    assert (2.0 * mesh.areas / sides.max(axis=1)).min() > 0.1  # mm, no slivers along the curve
 
 
 def test_perforated_creases_are_joined_with_one_remark(tmp_path: Path) -> None:

@@ -140,6 +140,25 @@ class TestOneCommand:
         mesh = parse_scene(first.text, tmp_path).model.mesh
         assert mesh.points[mesh.crease_edges("m1")][..., 0].max() == pytest.approx(40.0)
 
+    def test_without_an_outline_the_hull_is_taken(self, tmp_path: Path) -> None:
+        lines = '<path d="M0 30 H80" stroke="red"/><path d="M0 0 L30 10 L80 0" stroke="blue"/>'
+        first = proposals(svg(tmp_path, lines))[0]
+        assert 'outline = "hull"' in first.text
+        assert any("the convex hull of all lines is taken" in line for line in first.assumed)
+        mesh = parse_scene(first.text, tmp_path).model.mesh
+        assert mesh.areas.sum() == pytest.approx(80.0 * 30.0)
+
+    def test_one_of_two_sheets_is_folded(self, tmp_path: Path) -> None:
+        other = RIM.replace("<rect", '<rect x="100"') + '<path d="M100 20 H180" stroke="blue"/>'
+        file = svg(tmp_path, RIM + '<path d="M0 30 H80" stroke="red"/>' + other)
+        first = proposals(file)[0]
+        assert any("the drawing holds 2 sheets: the first" in line for line in first.assumed)
+        assert "mountain" in parse_scene(first.text, tmp_path).model.mesh.folds
+        assert main(["fold", str(file), "-o", str(tmp_path / "out"), "-q", "--sheet", "2"]) == 0
+        mesh = load_scene(tmp_path / "out" / "sheet.toml").model.mesh
+        assert "mountain" not in mesh.folds
+        assert folds(tmp_path / "out", "valley") == pytest.approx(144.0, abs=0.01)
+
     def test_paper_is_taken_where_card_is_thick(self, tmp_path: Path) -> None:
         narrow = "".join(
             f'<path d="M{x} 0 V60" stroke="{"red" if x % 4 else "blue"}"/>' for x in range(2, 80, 2)
@@ -173,9 +192,31 @@ class TestOneCommand:
             proposals(svg(tmp_path, RIM))
 
     def test_a_clock_ends_a_run(self) -> None:
-        clock = _Clock(Silent(), -1.0)
+        clock = _Clock(Silent(), -1.0, -1.0)
         with pytest.raises(TimeUpError, match=r"lambda = 0\.50"):
             clock.update(0, 1, 0.5, 3, 1.0)
+
+    def test_a_run_that_will_end_in_time_goes_on_beyond_its_share(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        now = 0.0
+        monkeypatch.setattr("time.process_time", lambda: now)
+        clock = _Clock(Silent(), 10.0, 20.0)
+        now = 5.0
+        clock.update(0, 1, 0.6, 3, 1.0)
+        now = 10.5
+        clock.update(0, 1, 0.8, 3, 1.0)
+        now = 12.0
+        clock.check(0.9)  # 0.2 in the last 4 s: 4 s more of the 8 s that are left
+        now = 16.5
+        with pytest.raises(TimeUpError, match=r"its 16 s were over at lambda = 0\.90"):
+            clock.check(0.9)  # nothing in the last 5.5 s
+        now = 8.0
+        clock.update(0, 1, 1.0, 3, 1.0)
+        clock.update(0, 1, 0.1, 3, 1.0)  # another mesh
+        now = 14.0
+        with pytest.raises(TimeUpError):
+            clock.check(0.2)
 
     def test_angles(self) -> None:
         assert spoken("90deg", "angle") == pytest.approx(math.pi / 2)
