@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
+from bh.applications.inverse.pieces import CONVERGING, PIECES, PieceTask
+from bh.applications.inverse.pieces import table as piece_table
 from bh.applications.inverse.segments import Domain, beyond, grid
 from bh.applications.inverse.simulate import SETTING, SegmentTask, Setting
 from bh.applications.inverse.surrogate import FORMAT, Surrogate
@@ -38,6 +40,19 @@ LABELS = {
     "energy": Label("N mm", "elastic energy"),
     "stable": Label("", "1: the state is stable"),
     "critical_points": Label("", "limit and bifurcation points on the way"),
+}
+PIECE_LABELS = {
+    "kind": Label("", "arc, pinch or joint"),
+    "before": Label("1/mm", "curvature of the crease before folding, positive to the left"),
+    "after": Label("1/mm", "the same behind a joint"),
+    "edge": Label("mm", "cells of the mesh along the crease"),
+    "rows": Label("", "rows of cells a panel"),
+    "t": Label("mm", "from the free end to the first section, and from there to the second", ("way", "xyz")),
+    "r": Label("", "the same, rotations", ("way", "row", "column")),
+    "to_middle": Label("mm", "from the free end to the first section, and from there to the middle", ("way",)),
+    "energy": LABELS["energy"],
+    "stable": LABELS["stable"],
+    "critical_points": LABELS["critical_points"],
 }
 
 
@@ -89,6 +104,43 @@ def build(
         resume=resume,
         progress=progress,
         labels=LABELS,
+        attributes=about,
+    )
+
+
+def build_pieces(
+    file: str | Path,
+    setting: Setting = CONVERGING,
+    *,
+    pool: Pool | Executor | int | None = None,
+    resume: bool = False,
+    progress: bool | Meter = False,
+) -> Dataset:
+    """Simulate all pieces of strips (`bh.applications.inverse.pieces`) and write the data set.
+
+    Args:
+        file: of the data set (netCDF-4).
+        setting: sheet, fold and pinch; the levels have their own meshes.
+        pool: see `bh.sweep.run`.
+        resume: see `bh.sweep.run`.
+        progress: see `bh.sweep.run`.
+
+    Raises:
+        SweepError: see `bh.sweep.run`.
+    """
+    about = {
+        "title": "Pieces of folded strips: arcs, free ends, pinches and joints",
+        "format": PIECES,
+        "setting": json.dumps(asdict(setting)),
+    }
+    return run(
+        PieceTask(setting),
+        table(piece_table()),
+        file,
+        pool=pool,
+        resume=resume,
+        progress=progress,
+        labels=PIECE_LABELS,
         attributes=about,
     )
 
