@@ -1,4 +1,4 @@
-"""The data set of pinched segments that inverse design interpolates in (source 6.2.4): a sweep of its own kind.
+"""Data sets that inverse design interpolates in: pieces of strips, or the segments of the source (6.2.4).
 
 bh segments -o mine.nc --zone 12
 """
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
+from bh.applications.inverse.models import Name
 from bh.applications.inverse.pieces import CONVERGING, PIECES, PieceTask
 from bh.applications.inverse.pieces import table as piece_table
 from bh.applications.inverse.segments import Domain, beyond, grid
@@ -49,7 +50,9 @@ PIECE_LABELS = {
     "rows": Label("", "rows of cells a panel"),
     "t": Label("mm", "from the free end to the first section, and from there to the second", ("way", "xyz")),
     "r": Label("", "the same, rotations", ("way", "row", "column")),
-    "to_middle": Label("mm", "from the free end to the first section, and from there to the middle", ("way",)),
+    "to_middle": Label(
+        "mm", "from the free end to the first section, and from there to the middle", ("way",)
+    ),
     "energy": LABELS["energy"],
     "stable": LABELS["stable"],
     "critical_points": LABELS["critical_points"],
@@ -201,15 +204,22 @@ def segments(
     zone: Annotated[
         float, typer.Option("--zone", metavar="40mm", parser=a_length, help="Length of the pinched zone.")
     ] = SETTING.zone,
+    model: Annotated[
+        Name, typer.Option("--model", help="converged, or source for one row of bars and hinges.")
+    ] = "converged",
     workers: Annotated[int | None, typer.Option("--workers", "-w", min=0, help="Local processes.")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the points that are finished.")
     ] = False,
 ) -> int:
-    """Make the data set of pinched segments for inverse design."""
+    """Make a data set of folded and pinched strips for inverse design."""
     from dataclasses import replace
 
-    data = build(output, replace(SETTING, zone=zone), pool=workers, resume=resume, progress=True)
+    if model == "source":
+        what, setting, make = "segments", SETTING, build
+    else:
+        what, setting, make = "pieces", CONVERGING, build_pieces
+    data = make(output, replace(setting, zone=zone), pool=workers, resume=resume, progress=True)
     failed = int((data["outcome"] != Outcome.REACHED).sum())
-    say(f"{data.sizes['point'] - failed:,} of {data.sizes['point']:,} segments; wrote {output}")
+    say(f"{data.sizes['point'] - failed:,} of {data.sizes['point']:,} {what}; wrote {output}")
     return 1 if failed else 0
