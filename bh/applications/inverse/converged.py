@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.applications.inverse.levels import Series
+from bh.applications.inverse.levels import Limit, Series
 from bh.applications.inverse.motions import ALONG, exponential
 from bh.applications.inverse.piece_data import PieceData
 from bh.applications.inverse.pieces import LARGEST, LEVELS, PIECES
@@ -47,7 +47,7 @@ class Converged:
         self,
         series: Mapping[str, Series],
         setting: Setting,
-        doubts: Mapping[str, Series] | None = None,
+        limits: Mapping[str, Limit] | None = None,
         same: Converged | None = None,
     ) -> None:
         """Take functions "arc" (rate of its motion), "end", "pinch" and "joint" of the curvatures.
@@ -55,12 +55,12 @@ class Converged:
         Args:
             series: the functions.
             setting: sheet, fold and pinch.
-            doubts: their error bars, of either sign; none where the functions are those of one mesh.
+            limits: what they are limits of, with error bars; None where they are those of one mesh.
             same: the model of one mesh, on which whole strips are simulated.
         """
         self.setting, self.domain = setting, Domain(k0=LARGEST, fold=setting.fold)
         self.mesh = LEVELS["pinch"][STRIP]
-        self._series, self._doubts, self._same = series, doubts or {}, same or self
+        self._series, self._limits, self._same = series, limits or {}, same or self
 
     @classmethod
     def of(cls, data: Dataset) -> Converged:
@@ -77,8 +77,7 @@ class Converged:
             setting = Setting(**json.loads(data.attrs["setting"]))
             read = PieceData(data)
             values = {name: limit.value for name, limit in read.limits.items()}
-            doubts = {name: limit.doubt for name, limit in read.limits.items()}
-            return cls(values, setting, doubts, cls(read.series(STRIP), setting))
+            return cls(values, setting, read.limits, cls(read.series(STRIP), setting))
         except (KeyError, TypeError, ValueError) as error:
             raise DesignError(f"the data set is incomplete ({error}); {ANEW}") from error
 
@@ -201,9 +200,9 @@ class Converged:
         """(..., 4 n + 1, 6) error bars of the vectors of all pieces."""
 
         def of(name: str, *k: Array) -> Array:
-            doubt = self._doubts.get(name)
+            limit = self._limits.get(name)
             at = [np.clip(each / LARGEST, -1.0, 1.0) for each in k]
-            return np.zeros((*k[0].shape, 6)) if doubt is None else np.abs(doubt(*at))
+            return np.zeros((*k[0].shape, 6)) if limit is None else limit.bar(*at)
 
         n = k0.shape[-1]
         found = np.zeros((*k0.shape[:-1], 4 * n + 1, 6))

@@ -3,8 +3,8 @@
 Arguments are curvatures over the largest, in [-1, 1]; values are vectors of motions (..., 6). A level is interpolated
 as the level before plus a polynomial through the differences, which are smoother than the values: so it may have fewer
 points. Errors of the formulation go with the square of the width of the cells once the layers along the crease and the
-edges are resolved, so the limit is f + (f - f') / 3 of the last two levels. Its error bar is the distance to the limit
-that the levels before the last would have given, which was four times as far off or more.
+edges are resolved, so the limit is f + (f - f') / 3 of the last two levels. Its error bar is all of what is added there, and the distance to
+the limit that the levels before the last would have given.
 """
 
 from __future__ import annotations
@@ -79,12 +79,13 @@ class Limit:
     Attributes:
         levels: the function on each of them, coarse first, three or more.
         value: the limit.
-        doubt: its distance to the limit of the levels before the last.
+        doubts: what error bars are made of: the step from the last level to the limit, and that from the limit
+            of the levels before.
     """
 
     levels: tuple[Series, ...]
     value: Series
-    doubt: Series
+    doubts: tuple[Series, ...]
 
     @classmethod
     def of(cls, values: list[Array]) -> Limit:
@@ -99,8 +100,10 @@ class Limit:
             fine + (fine + coarse.times(-1.0)).times(1.0 / 3.0)
             for coarse, fine in ((levels[-2], levels[-1]), (levels[-3], levels[-2]))
         )
-        return cls(tuple(levels), last, last + other.times(-1.0))
+        return cls(
+            tuple(levels), last, (last + levels[-1].times(-1.0), last + other.times(-1.0))
+        )
 
-    def at(self, level: int | None) -> Series:
-        """The function on a level (from 0), or its limit for None."""
-        return self.value if level is None else self.levels[level]
+    def bar(self, *x: Array) -> Array:
+        """(..., 6) error bars at one or two arguments (...) in [-1, 1], not negative."""
+        return np.asarray(sum(np.abs(doubt(*x)) for doubt in self.doubts))

@@ -33,6 +33,7 @@ REACH = {
     2: 20.0,
     3: 40.0,
 }  # mm from a random design of so many segments; one segment has two variables only
+SAME = 0.1  # mm between chain and simulation, below which aiming again changes nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,6 +231,8 @@ class Reach:
             if best is None or reached.missed_at_most < best.missed_at_most:
                 best = reached
             if best.missed_simulated <= self.aim and best.missed_at_most <= self.tolerance:
+                break
+            if np.linalg.norm(landing.end - end) < SAME:  # the chain was right: its nearest design is this one
                 break
             problem = replace(problem, target=problem.target + point - landing.end)
             found = polish(problem, found.x, found.on)
