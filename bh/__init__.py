@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from bh.solvers.load_control import LoadControl
     from bh.solvers.newton import Newton
     from bh.solvers.outcome import Outcome
+    from bh.solvers.settling import Settling
     from bh.solving.trace import trace
 
 # where a name is; `tests/test_architecture.py` holds it against the imports above
@@ -62,6 +63,7 @@ _NAMES = {
     "bh.solvers.load_control": "LoadControl",
     "bh.solvers.newton": "Newton",
     "bh.solvers.outcome": "Outcome",
+    "bh.solvers.settling": "Settling",
     "bh.solving.trace": "trace",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
@@ -116,6 +118,7 @@ __all__ = [
     "Remark",
     "RigidBody",
     "SceneError",
+    "Settling",
     "Sheet",
     "SheetSystem",
     "State",

@@ -25,7 +25,7 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
 PAGES = {
-    "Use": ("installation", "drawing", "studio", "scenes", "plots", "report"),
+    "Use": ("installation", "drawing", "studio", "scenes", "plots", "testing", "report"),
     "Studies": (
         "stiffness", "corrugations", "pinching", "inverse_design", "isometric", "sensitivities", "scaling", "scan",
         "performance",
@@ -37,7 +37,7 @@ PAGES = {
 # (USE), the classes that a pattern, a support, an actuation or a formulation of one's own is made from (EXTENSION;
 # extending.md), and all modules of `fem` and `meshes`.
 PUBLIC = ("bh", "meshes")
-USE = ("meshes.io",)
+USE = ("meshes.io", "bh.testing")
 EXTENSION = (
     "bh.model.step", "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
     "bh.formulations.protocols", "bh.formulations.registry", "bh.solvers.system",
@@ -85,7 +85,7 @@ def write_index(source: Path, gallery: bool) -> None:
     trees = {caption: [f"docs/{name}" for name in names] for caption, names in PAGES.items()}
     trees["Studies"] += [f"docs/{name}" for name in rest]
     trees["Use"].insert(1, "gallery/index" if gallery else "examples/README")
-    trees["Use"] += ["examples/README"] if gallery else []
+    trees["Use"] += [*(["examples/README"] if gallery else []), "examples/own_project/README"]
     trees["Project"] = ["CONTRIBUTING", *trees["Project"], "SECURITY", "CHANGELOG"]
     trees["Reference"] = ["reference/index"]
     for caption, pages in trees.items():

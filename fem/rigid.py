@@ -55,8 +55,8 @@ def ground_triangle(components: Components, elements: ShellElements) -> int:
     """
     centres = elements.mesh.nodes[elements.mesh.triangles].mean(axis=1)
     distance = np.linalg.norm(centres - elements.mesh.nodes.mean(axis=0), axis=1)
-    held = (components.number[components.of_element[:, : elements.moves]] < 0).sum(axis=1)
-    return int(np.lexsort((distance, held))[0])
+    supported = (components.number[components.of_element[:, : elements.moves]] < 0).sum(axis=1)
+    return int(np.lexsort((distance, supported))[0])
 
 
 def ground_stiffness(

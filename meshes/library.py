@@ -9,6 +9,7 @@ import numpy as np
 
 from meshes.curves import Arc, Array, Curve, Line, Polyline, sample
 from meshes.errors import PatternError
+from meshes.limits import check_limit
 from meshes.pattern import Crease, CreasePattern, FoldKind
 from meshes.quantities import QuantityError, Typed, degrees_meant, number, numbers
 
@@ -36,6 +37,7 @@ def strip(
     length = _positive("length", length)
     width = _positive("width", width)
     heights = [float(number(y, "length")) for y in creases]
+    check_limit("creases", len(heights), "this pattern", PatternError)
     if any(not 0.0 < y < width for y in heights) or sorted(set(heights)) != heights:
         raise PatternError(
             f"strip creases {heights} leave the sheet or are not in order; give rising heights between 0 and {width:g}"
@@ -235,6 +237,7 @@ def alternating(count: int) -> list[FoldKind]:
 def _count(name: str, value: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise PatternError(f"{name} = {value!r} cannot be; give a whole number from 1")
+    check_limit("creases", int(value), "this pattern", PatternError)
     return int(value)
 
 
@@ -246,6 +249,7 @@ def _radii(radius: Typed | Sequence[Typed], width: Typed) -> list[float]:
         raise PatternError(f"radius = {error}") from error
     except (TypeError, ValueError) as error:
         raise PatternError(f"radius = {radius!r} is not a number; give radii in mm") from error
+    check_limit("creases", len(creases), "this pattern", PatternError)
     for r in creases:
         _positive("radius", r)
     width = _positive("width", width)
@@ -274,6 +278,7 @@ def between_rails(rails: Sequence[Curve], folds: Folds) -> CreasePattern:
         PatternError: folds that are not one a crease, or creases that leave the sheet or cross.
     """
     count = len(rails) - 2
+    check_limit("creases", count, "this pattern", PatternError)
     kinds: list[FoldKind] = [folds] * count if isinstance(folds, str) else list(folds)
     if len(kinds) != count:
         raise PatternError(f"{len(kinds)} folds for {count} creases; give one word a crease, or one for all")

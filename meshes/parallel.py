@@ -10,6 +10,7 @@ import numpy as np
 from meshes.curves import Arc, ArcChain, Curve, Line
 from meshes.errors import PatternError
 from meshes.library import Folds, between_rails
+from meshes.limits import check_limit
 from meshes.pattern import CreasePattern, FoldKind
 from meshes.quantities import Typed, number, numbers
 
@@ -43,6 +44,7 @@ def parallel_creases(
     curvatures = [float(k) for k in np.atleast_1d(np.asarray(numbers(curvature, "curvature"), dtype=float))]
     lengths = [float(each) for each in np.atleast_1d(np.asarray(numbers(length, "length"), dtype=float))]
     spacing = number(spacing, "length")
+    check_limit("pieces", len(curvatures), "this crease", PatternError)
     if len(lengths) != len(curvatures):
         raise PatternError(
             f"{len(curvatures)} curvatures for {len(lengths)} lengths; give one of each a piece"
@@ -51,6 +53,7 @@ def parallel_creases(
         raise PatternError(f"lengths {lengths} and spacing {spacing:g} must be positive, in mm")
     if isinstance(creases, bool) or not isinstance(creases, int | np.integer) or creases < 1:
         raise PatternError(f"creases = {creases!r} cannot be; give a whole number from 1")
+    check_limit("creases", creases, "this pattern", PatternError)
     offsets = [spacing * i for i in range(-1, creases + 1)]
     for k in curvatures:
         if not math.isfinite(k):

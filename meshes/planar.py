@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 
 from meshes.curves import Array, arc_lengths
 from meshes.errors import PatternError
+from meshes.limits import check_limit
 from meshes.topology import Ints
 
 CORNER = 0.35  # rad; a line that turns by more at a vertex has a corner there
+CHUNK = 8  # segments whose crossings are counted at a time: the first ones of a scribble decide
 ROUNDS = 4  # of crossings that show when lines have been moved
 # what wins where lines are drawn over each other
 RANK = ("boundary", "cut", "mountain", "valley", "flat", "facet")
@@ -117,6 +119,25 @@ def heal(lines: Sequence[DrawnLine], gap: float) -> Graph:
         f"lines near ({x:.6g}, {y:.6g}) run together and cross within gap = {gap:.3g} mm; "
         "draw them once, or choose a smaller gap"
     )
+
+
+def check_crossings(ends: Array) -> None:
+    """Refuse a scribble before anything is made of it; counts no further than the limit.
+
+    Args:
+        ends: (n, 4) of segments, x and y of the first and of the second point, in any unit.
+
+    Raises:
+        PatternError: more of them cross than may; segments that only touch do not.
+    """
+    import shapely
+
+    segments = shapely.linestrings(ends.reshape(-1, 2, 2))
+    tree = shapely.STRtree(segments)
+    found = 0.0
+    for first in range(0, len(segments), CHUNK):
+        found += 0.5 * len(tree.query(segments[first : first + CHUNK], predicate="crosses")[0])
+        check_limit("crossings", found, "this drawing", PatternError)
 
 
 class _Web:

@@ -144,8 +144,8 @@ def region_of(graph: Graph, lines: Sequence[DrawnLine]) -> Region:
     if lost:  # what is drawn on pieces that fell out goes with them
         gone = shapely.union_all([shapely.Polygon(graph.points[face[0]]) for face in lost])
         inside = inside[~shapely.contains_xy(gone, graph.points[graph.edges[inside]].mean(axis=1))]
-    inside, stubs, told = _check_inside(graph, lines, polygon, inside)
-    remarks = fallen + told + _rim_remarks(graph, lines, rim, inside) + _remarks(graph, lines, inside)
+    inside, stubs, cut_off = _check_inside(graph, lines, polygon, inside)
+    remarks = fallen + cut_off + _rim_remarks(graph, lines, rim, inside) + _remarks(graph, lines, inside)
     return Region(polygon, _rings(graph, rim), inside, remarks, stubs)
 
 
@@ -238,13 +238,13 @@ def _check_inside(
             f"{_name(graph, lines, e)} ({graph.kinds[e]}) leaves the sheet at {_middle(graph, e)}; "
             f"end it at the outline{mend}"
         )
-    told = []
+    cut_off = []
     if stubs:
-        told.append(
+        cut_off.append(
             f"{len(stubs)} lines stick out of the sheet by up to {longest:.2g} mm (first "
             f"{_name(graph, lines, stubs[0])} at {_middle(graph, stubs[0])}): cut off at the outline"
         )
-    return inside[within], np.array(stubs, dtype=np.int64), told
+    return inside[within], np.array(stubs, dtype=np.int64), cut_off
 
 
 def _rim_remarks(graph: Graph, lines: Sequence[DrawnLine], rim: Ints, inside: Ints) -> list[str]:

@@ -22,6 +22,7 @@ from meshes.cells import Kind, RuledCells
 from meshes.curves import Array, Curve
 from meshes.cuts import cut_along
 from meshes.errors import MeshError
+from meshes.limits import check_limit
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
 from meshes.tapered import tapered_mesh, tapers
@@ -70,10 +71,7 @@ def structured(
             raise MeshError(f"aspect_ratio = {aspect_ratio} cannot be; use a positive number, best 5 to 12")
         along = max(least, round(min(aspect_ratio / float(np.mean(heights / rows / widths)), 1e9)))
     assert along is not None
-    if along > 1e6:
-        raise MeshError(
-            f"{along} cells along the crease cannot be meshed; use a smaller aspect_ratio or along"
-        )
+    check_limit("triangles", 2.0 * along * rows * (len(pattern.rails) - 1), "this mesh", MeshError)
     if along < least or int(along) != along:
         raise MeshError(f"along = {along} cells cannot be; use a whole number from {least}")
 

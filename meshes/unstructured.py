@@ -17,17 +17,20 @@ from typing import Any
 import numpy as np
 
 from meshes.cells import GmshCells
-from meshes.curves import Array, Curve, Polyline
+from meshes.curves import Array, Curve
 from meshes.cuts import open_cuts
 from meshes.errors import MeshError
+from meshes.limits import check_limit
+from meshes.meetings import breaks
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
-from meshes.planar import corners
 from meshes.quantities import Typed, number
 from meshes.topology import Ints
 
 # of every face: its loops of nodes, and edges inside
 Faces = list[tuple[list[list[int]], list[tuple[int, int]]]]
+
+EQUILATERAL = math.sqrt(3.0) / 4.0  # area of such a triangle over the square of its edge
 
 # gmsh is silent, gives the same mesh on every machine, and meshes fronts by the algorithm Frontal-Delaunay
 OPTIONS = (("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.Algorithm", 6))
@@ -111,11 +114,9 @@ def unstructured(
     finer = {name: float(number(edge, "length")) for name, edge in (near or {}).items()}
     if not math.isfinite(size) or size <= 0.0:
         raise MeshError(f"size = {size} cannot be; use a positive edge length in mm")
-    area = sheet_area(pattern)
-    if area / (0.43 * size**2) > 1e6:
-        raise MeshError(
-            f"size = {size} would make some {area / (0.43 * size**2):.1g} triangles; use a larger size"
-        )
+    check_limit(
+        "triangles", sheet_area(pattern) / (EQUILATERAL * size**2), f"this mesh of size = {size:g}", MeshError
+    )
     curves = {f"edge:{name}": curve for name, curve in pattern.edges}
     if not curves:
         raise MeshError("this pattern names no boundary curves; an unstructured mesh needs them")
@@ -123,6 +124,7 @@ def unstructured(
     cuts = {f"edge:{name}": curve for name, curve in pattern.cuts}
     curves |= cuts
     sizes = _sizes(curves, size, finer, growth)
+    check_limit("triangles", _expected(pattern, curves, sizes), "this mesh", MeshError)
     facets = {f"facet:{i}": curve for i, curve in enumerate(pattern.facets)}
     points, chains = _chains(curves | facets, sizes, cuts)
     segments = np.vstack(list(chains.values()))
@@ -161,6 +163,23 @@ def _sizes(curves: dict[str, Curve], size: float, near: dict[str, float], growth
     return Sizes(size, near, {name: shapely.LineString(curves[name].point(u)) for name in near}, growth)
 
 
+def _expected(pattern: CreasePattern, curves: Mapping[str, Curve], sizes: Sizes) -> float:
+    """How many triangles to expect: those of the even mesh, and at every line of shorter edges those that it adds.
+
+    Edges of the length s + g x at the distance x from a line of the length L make 2 L dx / (0.433 (s + g x)^2)
+    triangles each side together, down to where they are as long as everywhere; never more than edges of the
+    length s all over the sheet.
+    """
+    area = sheet_area(pattern)
+    total = area / (EQUILATERAL * sizes.largest**2)
+    for name, short in sizes.near.items():
+        graded = (
+            2.0 * curves[name].length / (EQUILATERAL * sizes.growth) * (1.0 / short - 1.0 / sizes.largest)
+        )
+        total += min(graded, area / (EQUILATERAL * short**2))
+    return total
+
+
 def sheet_area(pattern: CreasePattern) -> float:
     """Area of the flat sheet inside its outline, without its holes, mm^2."""
     import shapely
@@ -176,18 +195,19 @@ def _chains(
     A curve of `cuts` has two edges at least, without which it could not open.
     """
     ends = np.vstack([curve.point(np.array([0.0, 1.0])) for curve in curves.values()])
+    ends = np.unique(ends, axis=0)
     near = 1e-6 * float(np.ptp(ends, axis=0).max() + sizes.largest)
     points: list[Array] = []
     joints: Joints = {}
     chains: dict[str, Ints] = {}
     for name, curve in curves.items():
-        breaks = _breaks(curve, ends, near)
-        u = [breaks[0]]
-        for a, b in pairwise(breaks):
-            whole = len(breaks) == 2
+        cuts_at = breaks(curve, ends, near)
+        u = [cuts_at[0]]
+        for a, b in pairwise(cuts_at):
+            whole = len(cuts_at) == 2
             least = 3 if curve.closed and whole else 2 if name in cuts and whole else 1
             u += sizes.divide(curve, a, b, least=least)
-        fixed = set(breaks)
+        fixed = set(cuts_at)
         nodes = [
             _node(points, joints, at, near) if value in fixed else _new(points, at)
             for value, at in zip(u, curve.point(np.array(u)), strict=True)
@@ -195,38 +215,6 @@ def _chains(
         # a crease shorter than two nodes can be apart has no edge
         chains[name] = np.array([nodes[:-1], nodes[1:]], dtype=np.int64).T
     return np.array(points), chains
-
-
-def _breaks(curve: Curve, ends: Array, near: float) -> list[float]:
-    """Parameters where the curve begins, ends, has a corner, or another curve meets it."""
-    u = np.linspace(0.0, 1.0, 2049)
-    samples = curve.point(u)
-    found = [0.0, 1.0]
-    if isinstance(curve, Polyline):
-        steps = np.linalg.norm(np.diff(curve.vertices, axis=0), axis=1)
-        found += (np.cumsum(steps)[:-1][corners(curve.vertices)[1:-1]] / steps.sum()).tolist()
-    reach = 2.0 * curve.length / 2048.0
-    close = (ends > samples.min(axis=0) - reach).all(axis=1) & (ends < samples.max(axis=0) + reach).all(
-        axis=1
-    )
-    for end in np.unique(ends[close], axis=0):
-        distance = np.linalg.norm(samples - end, axis=1)
-        k = int(distance.argmin())
-        if distance[k] > reach:
-            continue
-        low, high = u[max(k - 1, 0)], u[min(k + 1, 2048)]
-        for _ in range(60):  # the distance has one minimum between neighbouring samples
-            third = (high - low) / 3.0
-            one, two = np.linalg.norm(curve.point(np.array([low + third, high - third])) - end, axis=1)
-            low, high = (low, high - third) if one < two else (low + third, high)
-        middle = 0.5 * (low + high)
-        if np.linalg.norm(curve.point(np.array([middle]))[0] - end) < near:
-            found.append(middle)
-    found.sort()
-    apart = 2.0 * near / curve.length
-    kept = [value for i, value in enumerate(found) if i == 0 or value - found[i - 1] > apart]
-    kept[-1] = 1.0  # itself, not a break found next to it
-    return kept
 
 
 Joints = dict[tuple[int, int], int]  # where curves may meet: the node in each square of a grid

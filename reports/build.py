@@ -225,12 +225,12 @@ def _others(results: Results) -> list[tuple[str, str]]:
     for info in results.cases:
         if info.date in (None, results.date):
             continue
-        told = [formatting.date(info.date or "")]
+        differences = [formatting.date(info.date or "")]
         versions = results.versions if info.versions is None else info.versions
         for key, value in versions.items():
             if results.versions.get(key, value) != value:
-                told.append(f"{key} {value}")
-        found.append((info.name, "; ".join(told)))
+                differences.append(f"{key} {value}")
+        found.append((info.name, "; ".join(differences)))
     return found
 
 

@@ -58,9 +58,9 @@ def print_report(results_folder: Path, out_file: Path) -> Path:
                 check=False,
             )
             if not pdf.is_file():
-                told = done.stderr.strip().splitlines()
+                messages = done.stderr.strip().splitlines()
                 raise ReportError(
-                    f"'{program}' did not print the report ({told[-1] if told else 'no reason given'})"
+                    f"'{program}' did not print the report ({messages[-1] if messages else 'no reason given'})"
                 )
             shutil.copyfile(pdf, temporary)
     except subprocess.TimeoutExpired as error:

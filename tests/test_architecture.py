@@ -37,6 +37,7 @@ HEAVY = {
     "trimesh",
     "tornado",
 }
+FORBIDDEN_AT_IMPORT = {*HEAVY, "numpy", "numba", "scipy", "meshio", "pydantic", "typer", "rich"}
 
 # Whom a folder may import beside itself. A folder that is not here has no rule, and so fails.
 GROUND = ("meshes", "bh.errors", "bh.runtime", "bh.solvers")
@@ -62,6 +63,7 @@ RULES: dict[str, tuple[str, ...]] = {
     "bh.studio": (*USERS, "bh.live"),
     "bh.applications": (*ANALYSIS, "bh.plotting", "bh.solving"),
     "bh.sweep": USERS,
+    "bh.testing": USERS,
     "bh.commands": (*USERS, "bh.sweep"),
     "bh": ("meshes", "bh"),  # the facade
     "fem": (*DESCRIPTION, "bh.paths"),  # the judge shares no mechanics with the judged
@@ -343,7 +345,14 @@ def loaded_after(code: str) -> set[str]:
 def test_import_bh_is_light() -> None:
     loaded = loaded_after("import bh")
     assert "bh" in loaded
-    assert not loaded & {*HEAVY, "numpy", "numba", "scipy", "meshio", "pydantic", "typer", "rich"}
+    assert not loaded & FORBIDDEN_AT_IMPORT
+
+
+@pytest.mark.parametrize("name", ["svgelements", "numpy"])
+def test_a_heavy_import_is_found(name: str) -> None:
+    """What is loaded is seen, also within a function that is called."""
+    loaded = loaded_after(f"import bh\ndef f():\n    import {name}\nf()")
+    assert name in loaded & FORBIDDEN_AT_IMPORT
 
 
 def test_folding_loads_no_heavy_library() -> None:
@@ -372,12 +381,7 @@ def test_facade() -> None:
     }
     assert for_checkers == bh._HOME
     assert sorted(bh.__all__) == sorted(bh._HOME)
-    at_once = {
-        name
-        for node in tree("bh").body
-        if not isinstance(node, ast.If | ast.FunctionDef)
-        for name in imported(node, "bh", True)
-    }
+    at_once = loaded_at_once(tree("bh"), "bh")
     assert at_once == {"bh.runtime.kernel_cache", "bh.runtime.viewer"}
     for name in at_once:
         outside = {n.split(".")[0] for n in imported_all(tree(name))}
@@ -388,6 +392,23 @@ def test_facade() -> None:
         assert name in bh.__all__
     with pytest.raises(AttributeError, match="nonsense"):
         _ = bh.nonsense
+
+
+def loaded_at_once(source: ast.Module, package: str) -> set[str]:
+    """Modules of the house that a package loads when it is imported: not those for type checkers or in functions."""
+    return {
+        name
+        for node in source.body
+        if not isinstance(node, ast.If | ast.FunctionDef)
+        for name in imported(node, package, True)
+    }
+
+
+def test_what_a_facade_loads_at_once_is_found() -> None:
+    late = "if TYPE_CHECKING:\n    import bh.model.sheet\ndef f():\n    import bh.model.until\n"
+    assert loaded_at_once(ast.parse(late), "bh") == set()
+    early = "from bh.solving.trace import trace\ntry:\n    import fem.state\nexcept ImportError:\n    pass\n"
+    assert loaded_at_once(ast.parse(late + early), "bh") == {"bh.solving.trace", "fem.state"}
 
 
 def imported_all(source: ast.Module) -> set[str]:
@@ -408,9 +429,16 @@ def too_long(source: ast.Module, most: int = LONGEST_FUNCTION) -> list[str]:
     ]
 
 
+def long_modules(texts: Mapping[str, str], most: int = LONGEST_MODULE) -> dict[str, int]:
+    """Modules of more lines than `most`, and how many they have."""
+    lengths = {name: len(text.splitlines()) for name, text in texts.items()}
+    return {name: lines for name, lines in lengths.items() if lines > most}
+
+
 def test_length_of_modules() -> None:
-    lengths = {name: len(text_of(name).splitlines()) for name in FILES}
-    assert not {name: lines for name, lines in lengths.items() if lines > LONGEST_MODULE}
+    assert not long_modules({name: text_of(name) for name in FILES})
+    texts = {"a": "x = 1\n" * LONGEST_MODULE, "b": "x = 1\n" * (LONGEST_MODULE + 1)}
+    assert long_modules(texts) == {"b": LONGEST_MODULE + 1}
 
 
 def test_length_of_functions() -> None:
@@ -418,33 +446,61 @@ def test_length_of_functions() -> None:
     assert too_long(ast.parse("def f():\n" + "    x = 1\n" * LONGEST_FUNCTION)) == ["f (81 lines)"]
 
 
+def crowd(files: Iterable[str]) -> list[str]:
+    """What is wrong with the listing of `bh/` (paths in it): modules beside the facade, folders without a rule."""
+    parts = [Path(file).parts for file in files]
+    beside = [p[0] for p in parts if len(p) == 1 and p[0].endswith(".py") and p[0] != "__init__.py"]
+    packages = {f"bh.{p[0]}" for p in parts if len(p) == 2 and p[1] == "__init__.py"}
+    ruled = {part for part in RULES if within(part, "bh")} - {"bh", "bh.errors"}
+    bare = {p[:-1] for p in parts} - {p[:-1] for p in parts if p[-1] == "__init__.py"}
+    return [
+        *(sorted(beside) if len(beside) > 2 else ()),
+        *(f"{name} has no rule" for name in sorted(packages - ruled)),
+        *(f"{name} is not there" for name in sorted(ruled - packages)),
+        *(f"{'/'.join(folder)} has no __init__.py, so setuptools leaves it out" for folder in sorted(bare)),
+    ]
+
+
 def test_few_modules_beside_the_facade() -> None:
     """A newcomer sees folders: at most two modules lie directly in `bh/`, whose folders are packages with a rule."""
-    assert len([f for f in (ROOT / "bh").glob("*.py") if f.name != "__init__.py"]) <= 2
-    folders = {f"bh.{f.parent.name}" for f in (ROOT / "bh").glob("*/__init__.py")}
-    assert folders == {part for part in RULES if within(part, "bh")} - {"bh", "bh.errors"}
+    files = [str(f.relative_to(ROOT / "bh")) for f in FILES.values() if f.is_relative_to(ROOT / "bh")]
+    assert crowd(files) == []
+    assert crowd([*files, "one.py", "two.py"]) == ["errors.py", "one.py", "two.py"]
+    assert crowd([*files, "new/__init__.py"]) == ["bh.new has no rule"]
+    assert crowd([*files, "model/deep/a.py"]) == [
+        "model/deep has no __init__.py, so setuptools leaves it out"
+    ]
     bare = {f.parent for f in FILES.values() if not (f.parent / "__init__.py").is_file()}
     assert not bare, "setuptools leaves out folders without __init__.py"
 
 
-def words(pattern: str, files: Iterable[Path]) -> int:
-    """How often a pattern occurs in files."""
-    return sum(len(re.findall(pattern, file.read_text(encoding="utf-8"))) for file in files)
+def count(pattern: str, texts: Iterable[str]) -> int:
+    """How often a pattern occurs in texts."""
+    return sum(len(re.findall(pattern, text)) for text in texts)
+
+
+def texts_in(*places: str) -> Iterable[str]:
+    """The modules below folders of the repository."""
+    return (f.read_text(encoding="utf-8") for place in places for f in (ROOT / place).rglob("*.py"))
+
+
+ANY, SKIP = r"\bAny\b", "fmt" + ": skip"
 
 
 def test_few_any() -> None:
-    assert words(r"\bAny\b", (ROOT / "bh").rglob("*.py")) <= MOST_ANY
+    assert count(ANY, texts_in("bh")) <= MOST_ANY
 
 
 def test_no_any_in_the_seam() -> None:
     """Load steps, formulations and mechanics speak to each other in types."""
-    seam = [
-        f for part in ("formulations", "mechanics", "loading") for f in (ROOT / "bh" / part).rglob("*.py")
-    ]
-    assert words(r"\bAny\b", seam) == 0
-    assert words(r"\bdef\b", [Path(__file__)]) > 20  # the count can count
+    assert count(ANY, texts_in("bh/formulations", "bh/mechanics", "bh/loading")) == 0
 
 
 def test_few_unformatted_lines() -> None:
-    places = [*HOUSE, "tests", "benchmarks", "docs", "examples"]
-    assert words("fmt" + ": skip", (f for p in places for f in (ROOT / p).rglob("*.py"))) <= MOST_SKIPS
+    assert count(SKIP, texts_in(*HOUSE, "tests", "benchmarks", "docs", "examples")) <= MOST_SKIPS
+
+
+def test_counts_can_count() -> None:
+    assert count(ANY, ["def f(x: Any) -> dict[str, Any]: ...", "Anything = typing.Any\n"]) == 3
+    assert count(SKIP, ["x = [1,\n2]  # fmt: " + "skip\n"] * 2) == 2
+    assert count(r"\bdef\b", texts_in("bh/model", "bh/loading")) > 100  # the files are read

@@ -1,4 +1,4 @@
-"""Lowest modes K u = eigenvalue M u of a factorised tangent, with free motions, held directions, unknowns without mass.
+"""Lowest modes K u = eigenvalue M u of a factorised tangent, with free motions, fixed directions, massless unknowns.
 
 The eigenvalues are those of W R W, inverted, where R is the response to loads and W the root of the mass: unknowns
 without mass (rotations, multipliers) follow statically, and the spectral transformation is at zero (Ericsson and Ruhe
@@ -39,33 +39,33 @@ class Mode:
 
 
 class Response:
-    """Displacements that loads cause while some directions are held.
+    """Displacements that loads cause while some directions are fixed.
 
     Args:
         solve: response (size, m) to loads (size, m) in equilibrium, the pseudo-inverse of the tangent.
-        held: (size, h) unit loads along held directions.
+        fixed: (size, h) unit loads along fixed directions.
         rigid: (size, r) orthonormal motions that cost nothing.
     """
 
-    def __init__(self, solve: Callable[[Array], Array], held: Array, rigid: Array) -> None:
+    def __init__(self, solve: Callable[[Array], Array], fixed: Array, rigid: Array) -> None:
         """Take over what the tangent and the supports say.
 
         Args:
             solve: response (size, m) to loads (size, m) in equilibrium.
-            held: (size, h) unit loads along held directions.
+            fixed: (size, h) unit loads along fixed directions.
             rigid: (size, r) orthonormal motions that cost nothing.
         """
-        self._solve, self._held, self._rigid = solve, held, rigid
-        h, r = held.shape[1], rigid.shape[1]
+        self._solve, self._fixed, self._rigid = solve, fixed, rigid
+        h, r = fixed.shape[1], rigid.shape[1]
         self.free = rigid
         if not h:
             return
-        A = rigid.T @ held
+        A = rigid.T @ fixed
         if r:
             left, sizes, _ = np.linalg.svd(A)
             self.free = rigid @ left[:, int((sizes > 1e-9).sum()) :]
-        self._influence = solve(held)
-        C = held.T @ self._influence
+        self._influence = solve(fixed)
+        C = fixed.T @ self._influence
         self._unit = float(np.abs(C).max())  # both kinds of rows alike
         saddle = np.block([[C / self._unit, A.T], [A, np.zeros((r, r))]])
         self._inverse = np.linalg.pinv(saddle, rcond=1e-14, hermitian=True)
@@ -73,10 +73,10 @@ class Response:
     def __call__(self, load: Array) -> Array:
         """(size,) u = K^+ (b - H g) + Z a with H.u = 0 and Z.(b - H g) = 0; any part along `free` may be in it."""
         u = self._solve(load[:, None])[:, 0]
-        h = self._held.shape[1]
+        h = self._fixed.shape[1]
         if not h:
             return u
-        found = self._inverse @ np.concatenate((self._held.T @ u / self._unit, self._rigid.T @ load))
+        found = self._inverse @ np.concatenate((self._fixed.T @ u / self._unit, self._rigid.T @ load))
         return np.asarray(u - self._influence @ found[:h] - self._unit * (self._rigid @ found[h:]))
 
 

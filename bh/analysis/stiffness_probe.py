@@ -2,7 +2,7 @@
 
 The tangent of the state is factorised once; everything is read from its responses to unit forces at the probed
 components (the compliance C), so a whole sphere of directions costs three solves. Rotations at edges and the moments of
-held creases follow (static condensation); supports and prescribed displacements stay as they are. What is probed may be
+prescribed creases follow (static condensation); supports and prescribed displacements stay. What is probed may be
 a body that is free to move: its rigid motions cost nothing, exactly.
 
 Two stiffnesses in a direction n belong to the 3 x 3 matrix K of a place (source 3.5.1: K = F / Delta, the force along
@@ -51,25 +51,25 @@ class Stiffness:
     """Stiffness of a place against translation.
 
     Attributes:
-        matrix: (3, 3) forces (N) for unit translations (mm), symmetric; zero along `held`.
-        held: (3, h) orthonormal directions in which supports hold the place: infinitely stiff.
+        matrix: (3, 3) forces (N) for unit translations (mm), symmetric; zero along `fixed`.
+        fixed: (3, h) orthonormal directions along which supports fix the place: infinitely stiff.
     """
 
     matrix: Array
-    held: Array
+    fixed: Array
 
     def guided(self, direction: ArrayLike) -> Array:
-        """n.K.n (...,) for directions n (..., 3) of any length: the place moves along n only, N/mm; inf where held.
+        """n.K.n (...,) for directions n (..., 3) of any length: the place moves along n only, N/mm; inf where fixed.
 
         Returns:
             of the shape of `direction` without its last axis.
         """
         n = _units(direction)
         out = np.einsum("...i,ij,...j->...", n, self.matrix, n)
-        return np.where(self._held_share(n) > RANK, np.inf, out)
+        return np.where(self._fixed_share(n) > RANK, np.inf, out)
 
     def loaded(self, direction: ArrayLike) -> Array:
-        """1 / (n.K^-1.n) (...,) for directions n (..., 3): a force along n, free to move across, N/mm; inf where held.
+        """1 / (n.K^-1.n) (...,) for directions n (..., 3): a force along n, free to move across, N/mm; inf where fixed.
 
         Zero where the force meets a motion that costs nothing.
 
@@ -79,25 +79,25 @@ class Stiffness:
         n = _units(direction)
         values, vectors = np.linalg.eigh(self.matrix)
         along = (n @ vectors) ** 2
-        kept = 1.0 - np.einsum("ik,ik->k", self.held.T @ vectors, self.held.T @ vectors) > 0.5
+        kept = 1.0 - np.einsum("ik,ik->k", self.fixed.T @ vectors, self.fixed.T @ vectors) > 0.5
         largest = np.abs(values).max()
         zero = kept & (np.abs(values) <= NONE * largest)
         firm = kept & ~zero
         compliance = (along[..., firm] / values[firm]).sum(axis=-1)
         with np.errstate(divide="ignore"):
             out = np.where(np.abs(compliance) > 0.0, 1.0 / compliance, np.inf)
-        # what is left of n in held directions only
+        # what is left of n in fixed directions only
         out = np.where(along[..., firm | zero].sum(axis=-1) <= RANK**2, np.inf, out)
         return np.where(along[..., zero].sum(axis=-1) > RANK, 0.0, out)
 
-    def _held_share(self, n: Array) -> Array:
-        return np.asarray(((n @ self.held) ** 2).sum(axis=-1))
+    def _fixed_share(self, n: Array) -> Array:
+        return np.asarray(((n @ self.fixed) ** 2).sum(axis=-1))
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:
-        """Principal stiffnesses (3,), rising, and their directions (3, 3) in columns; held ones are last and inf."""
+        """Principal stiffnesses (3,), rising, and their directions (3, 3) in columns; fixed ones are last and inf."""
         values, vectors = np.linalg.eigh(self.matrix)
-        share = self._held_share(vectors.T) > 0.5
+        share = self._fixed_share(vectors.T) > 0.5
         values = np.where(share, np.inf, values)
         order = np.argsort(values)
         return values[order], vectors[:, order]
@@ -109,7 +109,7 @@ class Probe:
     Args:
         path: a solved path, of any formulation.
         index: of the state; the last one by default.
-        hold: places whose nodes are held in all directions while probing, besides the supports.
+        hold: places whose nodes are fixed in all directions while probing, besides the supports.
 
     Raises:
         ModelError: there is no such state, or it has more motions without stiffness than can be told apart.
@@ -121,7 +121,7 @@ class Probe:
         Args:
             path: solved.
             index: of the state.
-            hold: places that are held besides the supports.
+            hold: places that are fixed besides the supports.
         """
         if not isinstance(path, Path):
             raise ModelError(
@@ -134,7 +134,7 @@ class Probe:
         self.thickness = path.model.sheet.t
         self.q, self.lam = record.q, record.lam
         self.points: Array = self.system.positions(self.q, self.lam)
-        self._held = self._places(hold)
+        self._fixed = self._places(hold)
         with one_blas_thread():
             forces = self.system.evaluate(self.q, self.lam).forces
             self.matrix: Matrix = self.system.tangent(self.q, self.lam, forces).matrix
@@ -164,14 +164,14 @@ class Probe:
             turning: several nodes turn as they like, about their mean position (False: they only translate).
 
         Raises:
-            ModelError: one of several nodes is held by a support.
+            ModelError: one of several nodes is fixed by a support.
         """
         nodes = select(self.mesh, place)
         if len(nodes) == 1:
             node = int(nodes[0])
-            free, held = self._axes(node)
+            free, fixed = self._axes(node)
             block = self._condensed([(node, axis) for axis in free])
-            return Stiffness(free.T @ block @ free, held.T)
+            return Stiffness(free.T @ block @ free, fixed.T)
         block = self._condensed(self._components([(nodes.tolist(), "xyz")]))
         shift = np.tile(np.eye(3), (len(nodes), 1))
         K = shift.T @ block @ shift
@@ -194,7 +194,7 @@ class Probe:
                 the parts, in each node by node, for each node in the order of the directions.
 
         Raises:
-            ModelError: a component is held, or named twice.
+            ModelError: a component is fixed, or named twice.
         """
         if not parts:
             raise ModelError(
@@ -237,7 +237,7 @@ class Probe:
         """
         if density is not None and not (math.isfinite(density) and density > 0.0):
             raise ModelError(f"density = {density} cannot be; give a positive number in kg / m^3")
-        H = self._held_columns
+        H = self._fixed_columns
         everywhere = self.system.loads(np.ones_like(self.points))
         most = int(np.count_nonzero(everywhere)) - H.shape[1]
         if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= most:
@@ -274,17 +274,17 @@ class Probe:
     # ------------------------------------------------------------------------------- condensation
 
     def _condensed(self, components: list[tuple[int, Array]]) -> Array:
-        """(m, m) least energy for given displacements of components; held nodes among all others stay."""
-        clash = {node for node, _ in components} & set(self._held.tolist())
+        """(m, m) least energy for given displacements of components; fixed nodes among all others stay."""
+        clash = {node for node, _ in components} & set(self._fixed.tolist())
         if clash:
-            raise ModelError(f"node {min(clash)} is held while it is probed; leave it out of one of them")
+            raise ModelError(f"node {min(clash)} is fixed while it is probed; leave it out of one of them")
         if not components:
             return np.zeros((0, 0))
         return self._against(self._columns(components))
 
     def _against(self, columns: Array) -> Array:
-        """(m, m) stiffness against unit loads (size, m); held nodes stay."""
-        B, m = np.column_stack((columns, self._held_columns)), columns.shape[1]
+        """(m, m) stiffness against unit loads (size, m); fixed nodes stay."""
+        B, m = np.column_stack((columns, self._fixed_columns)), columns.shape[1]
         with one_blas_thread():
             C = B.T @ self._solve(B)
         C = 0.5 * (C + C.T)
@@ -310,11 +310,11 @@ class Probe:
         for place, fix in parts:
             axes = directions(fix)
             for node in select(self.mesh, place).tolist():
-                held = self._axes(node)[1]
+                fixed = self._axes(node)[1]
                 for axis in axes:
-                    if np.abs(held @ axis).max(initial=0.0) > RANK:
+                    if np.abs(fixed @ axis).max(initial=0.0) > RANK:
                         raise ModelError(
-                            f"node {node} is held along {_letters(axis)} by a support or a prescribed displacement; "
+                            f"node {node} is fixed along {_letters(axis)} by a support or a prescribed displacement; "
                             "leave it out"
                         )
                     seen.setdefault(node, []).append(axis)
@@ -326,7 +326,7 @@ class Probe:
         return found
 
     def _axes(self, node: int) -> tuple[Array, Array]:
-        """(f, 3) and (h, 3) orthonormal directions in which a node is free and held."""
+        """(f, 3) and (h, 3) orthonormal directions in which a node is free and fixed."""
         forces = np.zeros_like(self.points)
         rows = []
         for axis in np.eye(3):
@@ -361,8 +361,8 @@ class Probe:
         return np.asarray(b - self._rigid @ (self._rigid.T @ b))
 
     @cached_property
-    def _held_columns(self) -> Array:
-        return self._columns([(int(n), axis) for n in self._held for axis in self._axes(int(n))[0]])
+    def _fixed_columns(self) -> Array:
+        return self._columns([(int(n), axis) for n in self._fixed for axis in self._axes(int(n))[0]])
 
     def _rigid_body(self) -> Array:
         """(size, r) orthonormal rigid motions that the supports leave."""

@@ -19,6 +19,7 @@ try:
 
     import typer
 
+    from bh.commands.compare import compare
     from bh.commands.fold_options import fold
     from bh.runtime.consent import take_options
     from bh.runtime.terminal import say
@@ -30,7 +31,7 @@ COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
     "design": "Find a crease for a target, and check it by simulation.",
     "segments": "Make a data set of folded and pinched strips for inverse design.",
-    "studio": "Fold a sheet by sliders and pull on it, in a window of the browser.",
+    "studio": "Fold a sheet by sliders, in a window of the browser.",
     "sweep": "Solve a scene for many parameters into a labelled data set.",
     "verify": "Check the solvers against theory and published numbers.",
     "report": "Run the verification cases and write the report page.",
@@ -138,6 +139,13 @@ def run(
     estimate: Annotated[
         bool, typer.Option("--estimate/--no-estimate", help="Of a given mesh: also solve a coarser one.")
     ] = True,
+    formulation: Annotated[
+        str | None, typer.Option("--formulation", metavar="NAME", help="In place of the scene's.")
+    ] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Set a key: sheet.t=0.2, steps[0].fold.to=60deg."),
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
@@ -145,14 +153,23 @@ def run(
     from bh.commands.summary import summary
     from bh.scene.load import load_scene
 
-    loaded = load_scene(scene)
+    asked = [*(changes or ()), *([f"model.formulation={formulation}"] if formulation else [])]
+    loaded = load_scene(scene, asked)
+    if formulation is not None and loaded.accuracy is not None:
+        from bh.errors import InputError
+
+        raise InputError(
+            f"--formulation {formulation}: this scene is solved to an accuracy, which chooses the formulation; "
+            "give it a mesh (--set mesh.rows=4 --set mesh.along=32), or use bh compare"
+        )
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
         path, names, before, contact = solve(
             loaded, folder, resume=resume, progress=not quiet, estimate=estimate
         )
     except KeyboardInterrupt:
-        again = shlex.join(["bh", "run", str(scene), "-o", str(folder), "--resume"])
+        sets = [word for change in asked for word in ("--set", change)]
+        again = shlex.join(["bh", "run", str(scene), *sets, "-o", str(folder), "--resume"])
         raise _InterruptedError(
             f"go on with: {again}" if holds_states(folder) else "nothing is kept"
         ) from None
@@ -182,6 +199,7 @@ def run(
 
 
 app.command()(fold)
+app.command()(compare)
 
 
 @app.command()

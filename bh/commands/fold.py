@@ -9,8 +9,13 @@ from __future__ import annotations
 import json
 import shutil
 import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bh.analysis.contact import first_contact
 from bh.commands.run import (
@@ -28,9 +33,14 @@ from bh.paths.path import Path as Trace
 from bh.runtime.progress import ProgressMeter, meter, stage
 from bh.scene.folding import Proposal, Wish, proposals
 from bh.scene.load import Scene, parse_scene
+from bh.solvers.automatic import Automatic
+from bh.solvers.points import Increment, Point
+from bh.solvers.system import Evaluation, System
+from bh.solvers.trace import Strategy
 from bh.solving.levels import folder_of, move
 from meshes.io.export import replacing
 
+Array = NDArray[np.float64]
 SHARE = 0.6  # of the time that is left goes to each of the scenes but the last
 LONG = 60.0  # s, after which a run that is not watched says what it does all the same
 
@@ -73,11 +83,56 @@ class _Clock:
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
         self._inner.update(step, steps, lam, iterations, energy)
+        self.check(lam)
+
+    def check(self, lam: float) -> None:
+        """Raise `TimeUpError` if the time is over."""
         if time.process_time() > self._until:
             raise TimeUpError(f"its {self._seconds:.0f} s were over at lambda = {lam:.2f}")
 
+    def timed(self, strategy: Strategy) -> Strategy:
+        """The strategy, which ends where the time is over in the middle of an increment, too."""
+        return _Timed(strategy, self.check)
+
     def close(self, outcome: str) -> None:
         self._inner.close(outcome)
+
+
+@dataclass(frozen=True)
+class _Timed:
+    """A strategy whose systems look at the clock whenever they are evaluated."""
+
+    inner: Strategy
+    check: Callable[[float], None]
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.inner, name)  # what else drivers ask of a strategy
+
+    def limits(self, system: System) -> tuple[float, float]:
+        return self.inner.limits(system)
+
+    def follow(
+        self,
+        system: System,
+        history: Sequence[Point],
+        increment: float | None = None,
+        origin: Point | None = None,
+    ) -> Iterator[Increment]:
+        return self.inner.follow(cast(System, _TimedSystem(system, self.check)), history, increment, origin)
+
+
+class _TimedSystem:
+    """A system that looks at the clock whenever it is evaluated."""
+
+    def __init__(self, system: System, check: Callable[[float], None]) -> None:
+        self._system, self._check = system, check
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._system, name)
+
+    def evaluate(self, q: Array, lam: float) -> Evaluation:
+        self._check(lam)
+        return self._system.evaluate(q, lam)
 
 
 def fold_file(
@@ -153,7 +208,8 @@ def _solved(scene: Scene, place: Path, clock: _Clock) -> tuple[Trace, str]:
         InputError: it cannot be solved at all.
     """
     try:
-        path = solve(scene, place, progress=clock, estimate=False).path
+        timed = clock.timed(scene.strategy or Automatic())
+        path = solve(scene, place, progress=clock, estimate=False, strategy=timed).path
     except TimeUpError as over:
         levels = sorted(folder_of(place / FINISHED[0]).glob("*.bh"), key=lambda found: found.stat().st_mtime)
         file = place / FINISHED[0]

@@ -25,8 +25,11 @@ def fold(  # noqa: PLR0913 - the options of a command line
         typer.Option("--percent", help="Of the drawn angles, or of 180 degrees; default 80 of 180."),
     ] = None,
     material: Annotated[
-        str, typer.Option("--material", help="paper, card, board, pet, pp, aluminium or steel.")
-    ] = "card",
+        str | None,
+        typer.Option(
+            "--material", help="paper, card, board, pet, pp, aluminium or steel; default card, or paper."
+        ),
+    ] = None,
     fit: Annotated[
         float | None,
         typer.Option("--fit", metavar="200mm", parser=a_length, help="Longer side of the sheet."),

@@ -26,6 +26,7 @@ from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
+from bh.solvers.trace import Strategy
 from bh.solving.levels import folder_of, move
 from bh.solving.levels import remove as remove_levels
 from bh.solving.trace import trace
@@ -57,6 +58,7 @@ def solve(
     resume: bool = False,
     progress: bool | ProgressMeter = False,
     estimate: bool = True,
+    strategy: Strategy | None = None,
 ) -> Solved:
     """Trace a scene into a folder, which is made if need be.
 
@@ -68,6 +70,7 @@ def solve(
         resume: go on from the states in the folder.
         progress: as for `bh.trace`.
         estimate: solve a coarser mesh, too, where the mesh was given, for an estimate of the error.
+        strategy: of the increments; None for the scene's.
 
     Raises:
         InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
@@ -79,7 +82,9 @@ def solve(
     try:
         with only_writer(folder):
             ours = True
-            return _solved(scene, folder, names, resume=resume, progress=progress, estimate=estimate)
+            return _solved(
+                scene, folder, names, resume=resume, progress=progress, estimate=estimate, strategy=strategy
+            )
     except (InputError, KeyboardInterrupt):
         if ours and not resume and not holds_states(folder):
             remove_levels(folder_of(folder / names[0]))
@@ -95,6 +100,7 @@ def _solved(
     resume: bool,
     progress: bool | ProgressMeter,
     estimate: bool,
+    strategy: Strategy | None,
 ) -> Solved:
     """What `solve` gives, of a folder that nobody else writes."""
     file = folder / names[0]
@@ -109,6 +115,7 @@ def _solved(
         resume=resume,
         accuracy=scene.accuracy,
         symmetry=scene.symmetry,
+        strategy=strategy or scene.strategy,
         estimate=estimate and scene.accuracy is None,
     )
     clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays

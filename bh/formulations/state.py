@@ -21,13 +21,15 @@ class Energy:
     Attributes:
         lock: what the locks of hinges hold that are about to close (`Model.hinge_lock`), zero otherwise. It is no part
             of the theory and of none of the others, but of what the actuation has done as work:
-            work = change of (total + lock).
+            work = change of (total + lock + contact).
+        contact: what panels hold that press on each other (`Model.contact`), zero otherwise; apart like the locks.
     """
 
     stretching: float
     bending: float
     folding: float
     lock: float = 0.0
+    contact: float = 0.0
 
     @property
     def total(self) -> float:

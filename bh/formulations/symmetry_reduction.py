@@ -78,7 +78,7 @@ class Halves:
             plane: "x", "y" or a normal; see `bh.loading.symmetry.mirror`.
 
         Raises:
-            ModelError: the formulation cannot be solved by halves, or something is not symmetric; one line names it.
+            ModelError: the formulation takes no plane of symmetry, or something is not symmetric; one line names it.
         """
         if not isinstance(formulation, Mirrored):
             others = ", ".join(able(lambda other: isinstance(other, Mirrored)))

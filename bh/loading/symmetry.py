@@ -243,10 +243,10 @@ def _constrained(c: Constraints) -> list[tuple[str, Array, Array]]:
     axes = np.broadcast_to(np.eye(3), (len(c.fixed), 3, 3)).copy()
     turned = np.flatnonzero(c.frame_of >= 0)
     axes[turned] = c.frames[c.frame_of[turned]]
-    held = axes * c.fixed[:, :, None]
-    tensor = np.einsum("nki,nkj->nij", held, held)
+    normals = axes * c.fixed[:, :, None]
+    tensor = np.einsum("nki,nkj->nij", normals, normals)
     return [
-        (name, tensor, np.einsum("nk,nki->ni", np.nan_to_num(values), held))
+        (name, tensor, np.einsum("nk,nki->ni", np.nan_to_num(values), normals))
         for name, values in (("start", c.start), ("end", c.end))
     ]
 

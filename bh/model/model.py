@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,7 @@ from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
 
+Contact = float | Literal["thickness", False]
 OF_GIVEN_STIFFNESS: str = "bars-and-hinges"  # no other formulation has elements to which it could be given
 
 
@@ -40,6 +42,9 @@ class Model:
         stiffness: given element stiffness (bars and hinges only), or None to derive it from the sheet.
         hinge_lock: bending hinges and spring creases stop before their panels pass through each other (bars and hinges
             only): stiffening without bound within the last 2 degrees before 0 and 2 pi, nothing elsewhere.
+        contact: panels that share no node stop each other: "thickness" (their middle surfaces stay the sheet's
+            thickness apart), a gap in mm, or False (they pass through each other:
+            `bh.contact.first_contact` tells).
     """
 
     mesh: SheetMesh
@@ -50,6 +55,7 @@ class Model:
     formulation: str = "consistent"
     stiffness: ElementStiffness | None = None
     hinge_lock: bool = True
+    contact: Contact = False
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
@@ -78,6 +84,10 @@ class Model:
             said(self.formulation)
         if not isinstance(self.hinge_lock, bool):
             raise ModelError(f"hinge_lock = {self.hinge_lock!r} cannot be; give True or False")
+        gap = self.contact
+        number = isinstance(gap, int | float) and not isinstance(gap, bool) and 0.0 < gap < math.inf
+        if not (number or gap is False or gap == "thickness"):
+            raise ModelError(f"contact = {gap!r} cannot be; give 'thickness', a gap in mm, or False")
 
     def __repr__(self) -> str:
         """One line: "Model(384 triangles, 1 crease, 4 supports, 1 step, consistent)"."""
@@ -111,7 +121,7 @@ class Model:
             bending_stiffness: (m,) their stiffness, N mm / rad.
             folding_hinges: as `bending_hinges`; they become the crease "fold", at rest flat.
             folding_stiffness: (m,) their stiffness, N mm / rad.
-            supports: (s, 4) rows node, x, y, z with 1 for a direction that is held.
+            supports: (s, 4) rows node, x, y, z with 1 for a direction that is fixed.
             green: bars measure Green's strain; see `ElementStiffness`.
 
         Raises:
@@ -140,8 +150,8 @@ class Model:
         )
         if len(creased):
             model = model.crease("fold", stiffness=1.0)
-        for node, *held in np.asarray(supports, dtype=np.int64).reshape(-1, 4).tolist():
-            letters = "".join(axis for axis, on in zip("xyz", held, strict=True) if on)
+        for node, *fixed in np.asarray(supports, dtype=np.int64).reshape(-1, 4).tolist():
+            letters = "".join(axis for axis, on in zip("xyz", fixed, strict=True) if on)
             if letters:
                 model = model.support([node], letters)
         return model

@@ -53,6 +53,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         "format": FORMAT,
         "formulation": model.formulation,
         "hinge_lock": model.hinge_lock,
+        **({} if model.contact is False else {"contact": model.contact}),
         "green": model.stiffness is not None and model.stiffness.green,
         "sheet": _plain(model.sheet),
         "mesh": {
@@ -108,6 +109,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             if "stiffness/bars" in arrays
             else None,
             hinge_lock=data.get("hinge_lock", False),  # files of versions that had no lock
+            contact=data.get("contact", False),
         )
     except (KeyError, TypeError) as missing:
         raise PathFileError(f"the stored model is incomplete ({missing}); solve again") from missing

@@ -371,7 +371,7 @@ def _orthonormal(node: int, rows: list[tuple[Array, float, float]]) -> tuple[Arr
             values.append(value / norm)
         elif np.nanmax(np.abs(value)) > 1e-12 * (1.0 + abs(end)):
             raise ModelError(
-                f"node {node} is held and displaced along the same direction; remove the support or the displacement"
+                f"node {node} is fixed and displaced along the same direction; remove the support or the displacement"
             )
     return np.array(axes), np.array(values)
 

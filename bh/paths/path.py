@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.formulations.protocols import Formulation, SheetSystem
 from bh.formulations.registry import checked_system, formulation, remarks
 from bh.formulations.state import State
@@ -25,6 +26,7 @@ from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.runtime import viewer
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import ARC, CriticalPoint
+from bh.solvers.system import Limited
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -301,11 +303,25 @@ class Path:
         )  # fmt: skip
 
     def system(self, step: int) -> SheetSystem:
-        """The system of a step, made when it is first needed; the step begins at the last state of the one before."""
+        """The system of a step, made when it is first needed; the step begins at the last state of the one before.
+
+        Args:
+            step: its index, from 0.
+
+        Returns:
+            the same system each time.
+
+        Raises:
+            ModelError: the formulation cannot take the step, or the model has contact and the formulation has none.
+        """
         if step not in self._systems:
             if any(each.until is not None for each in self.model.steps[:step]):
                 self._load_steps = load_steps(self.model, self._ended(step))
             made = self._formulation.system(self.model, self._load_steps[step], self._start(step))
+            if self.model.contact is not False and not isinstance(made, Limited):
+                raise ModelError(
+                    f"formulation '{self.model.formulation}' has no contact; take 'consistent', or contact = False"
+                )
             self._systems[step] = checked_system(made, self.model.formulation)
         return self._systems[step]
 

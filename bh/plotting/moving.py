@@ -115,5 +115,7 @@ def _mp4(pictures: Sequence[NDArray[np.uint8]], file: FilePath, fps: int, progra
     raw = b"".join(picture.tobytes() for picture in pictures)
     done = subprocess.run([program, *options], input=raw, capture_output=True, check=False)
     if done.returncode != 0:
-        told = done.stderr.decode(errors="replace").strip().splitlines()
-        raise PlotError(f"ffmpeg could not write the animation ({told[-1] if told else 'no reason given'})")
+        messages = done.stderr.decode(errors="replace").strip().splitlines()
+        raise PlotError(
+            f"ffmpeg could not write the animation ({messages[-1] if messages else 'no reason given'})"
+        )

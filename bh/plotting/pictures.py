@@ -327,7 +327,9 @@ def _lines(state: State, pairs: NDArray[np.int64]) -> PolyData:
 
 def _tubes(plotter: Plotter, lines: PolyData, radius: float) -> None:
     joined = lines.strip(join=True, max_length=100_000)
-    plotter.add_mesh(joined.tube(radius=radius, n_sides=12, capping=True), color=INK, lighting=False)
+    tube = joined.tube(radius=radius, n_sides=12, capping=True)
+    if tube.n_points:  # lines without a length have no tube, and are not seen
+        plotter.add_mesh(tube, color=INK, lighting=False)
 
 
 # --- rendering ---------------------------------------------------------------------------------------------

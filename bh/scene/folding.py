@@ -24,6 +24,8 @@ from meshes.planar import CORNER
 PERCENT = 80.0  # of the way, where neither the user nor the file says how far
 FULLY = math.radians(170.0)  # drawn angles beyond that mean folded flat: then 80 % of them, too
 STIFFER = 8.0  # crease springs against the bending of a panel
+STRAIN = 4e-3  # that a spring, one radian off its angle, may make in the narrowest panel
+THIN = 0.05  # thickness over the width of a panel, at most, of the sheet that is taken for card
 CREASES = 12  # curved creases of which an accuracy can be afforded
 ROWS = 4.0  # of cells in a panel between curved creases
 SECONDS = 15.0  # of a run to an accuracy
@@ -48,7 +50,7 @@ class Wish:
     Attributes:
         angle: fold angle of every crease, rad; None for what the file says, or `percent`.
         percent: of the drawn angles, or of 180 degrees; None for the drawn angles as they are, or 80 without any.
-        material: one of `MATERIALS`.
+        material: one of `MATERIALS`; None for card, or paper where card is thick for the panels.
         fit: longer side of the sheet, mm.
         scale: mm a unit of the drawing.
         frame: of a FOLD file.
@@ -57,7 +59,7 @@ class Wish:
 
     angle: float | None = None
     percent: float | None = None
-    material: str = "card"
+    material: str | None = None
     fit: float | None = None
     scale: float | None = None
     frame: int | str | None = None
@@ -121,7 +123,7 @@ def proposals(file: str | os.PathLike[str], wish: Wish | None = None) -> list[Pr
 
 
 def _check(wish: Wish) -> None:
-    if wish.material not in MATERIALS:
+    if wish.material is not None and wish.material not in MATERIALS:
         raise InputError(f"material '{wish.material}' is not known; use one of {', '.join(MATERIALS)}")
     if wish.angle is not None and wish.percent is not None:
         raise InputError("an angle and a percentage are both given; give one of them")
@@ -184,8 +186,12 @@ def _proposed(
             'lines stand for in a scene: lines = { "#00aa00" = "valley" } (bh init --drawing writes one)'
         )
     width = _width(found)
-    step, words = _step(wish, sheet, width)
-    young, nu, t, about = MATERIALS[wish.material]
+    material = wish.material or ("card" if MATERIALS["card"][2] <= THIN * width else "paper")
+    young, nu, t, about = MATERIALS[material]
+    if material != wish.material:
+        assumed.append(f"{about}: no material is given")
+    spring = max(width / STIFFER, t**2 / (12.0 * STRAIN * _narrowest(found, width)))
+    step, words = _step(wish, sheet, spring)
     if t > 0.1 * width:
         assumed.append(
             f"{about} of {t:g} mm is thick for panels of about {width:.2g} mm: no thin sheet any more"
@@ -212,7 +218,14 @@ def _proposed(
             f"t = {t}",
             "",
             *(["[mesh]", mesh, ""] if not mesh.startswith("accuracy") else []),
-            *(["[model]", f'formulation = "{formulation}"', ""] if formulation else []),
+            "[model]",
+            *([f'formulation = "{formulation}"'] if formulation else []),
+            *(
+                ['strategy = "settling"          # nets snap: each state is where the sheet comes to rest']
+                if formulation
+                else []
+            ),
+            "",
             "[[steps]]",
             step,
             "",
@@ -225,9 +238,9 @@ def _proposed(
     return scenes
 
 
-def _step(wish: Wish, sheet: SheetMesh | CreasePattern, width: float) -> tuple[str, str]:
+def _step(wish: Wish, sheet: SheetMesh | CreasePattern, length: float) -> tuple[str, str]:
     """The fold of the step, and in words how far it goes and why."""
-    spring = f"Lstar = {width / STIFFER:.3g}"
+    spring = f"Lstar = {length:.3g}"
     if wish.angle is not None:
         return f'fold = {{ crease = "all", by = {wish.angle:.6g}, {spring} }}', (
             f"springs at every crease want {math.degrees(wish.angle):g} degrees, as asked for"
@@ -237,13 +250,13 @@ def _step(wish: Wish, sheet: SheetMesh | CreasePattern, width: float) -> tuple[s
     if not len(known):
         percent = PERCENT if wish.percent is None else wish.percent
         angle = math.pi * min(percent / 100.0, 1.0 - 1e-6)
-        told = "the file gives no fold angles" if wish.percent is None else "as asked for"
+        origin = "the file gives no fold angles" if wish.percent is None else "as asked for"
         return f'fold = {{ crease = "all", by = {angle:.6g}, {spring} }}', (
-            f"springs at every crease want {math.degrees(angle):.0f} degrees, {percent:g} % of the way ({told})"
+            f"springs at every crease want {math.degrees(angle):.0f} degrees, {percent:g} % of the way ({origin})"
         )
     fully = bool((known > FULLY).any())
     percent = wish.percent if wish.percent is not None else PERCENT if fully else 100.0
-    told = (
+    origin = (
         "as asked for"
         if wish.percent is not None
         else "they close completely"
@@ -253,7 +266,7 @@ def _step(wish: Wish, sheet: SheetMesh | CreasePattern, width: float) -> tuple[s
     some = "" if len(known) == len(drawn) else "; creases without an angle are taken as closing completely"
     part = f", part = {percent / 100.0:g}" if percent != 100.0 else ""
     return f'fold = {{ crease = "all", by = "drawn"{part}, {spring} }}', (
-        f"springs at every crease want {percent:g} % of the drawn angles ({told}){some}"
+        f"springs at every crease want {percent:g} % of the drawn angles ({origin}){some}"
     )
 
 
@@ -272,10 +285,13 @@ def _drawn_angles(sheet: SheetMesh | CreasePattern) -> np.ndarray[tuple[int], np
 
 def _meshes(found: _Found, width: float) -> list[tuple[str, str, str]]:
     """(tables of the mesh, the same in words, formulation or "" for the program's own choice), the best first."""
-    drawn = ('kind = "drawn"', "the faces of the drawing", "bars-and-hinges")
+    drawn = [
+        ('kind = "drawn"', "the faces of the drawing", "bars-and-hinges"),
+        ('kind = "drawn"', "the faces of the drawing, which may bend", "consistent"),
+    ]
     pattern = found.pattern
     if pattern is None:
-        return [drawn]
+        return drawn
     scenes = []
     if len(pattern.creases) <= CREASES:
         scenes.append(
@@ -288,13 +304,13 @@ def _meshes(found: _Found, width: float) -> list[tuple[str, str, str]]:
         scenes += _ruled(pattern) if pattern.rails else []
     ruled = found.faces is not None and len(pattern.facets) >= len(pattern.creases)
     if ruled:
-        scenes.append(drawn)
+        scenes += drawn
     size = max(width, math.sqrt(_area(pattern)) / 60.0)
     for finer in (1.0, 2.0, 4.0):
         words = f"triangles of {size / finer:.3g} mm by gmsh"
         scenes.append((f'kind = "gmsh"\nsize = {size / finer:.4g}', words, "consistent"))
     if found.faces is not None and not ruled:
-        scenes.append(drawn)
+        scenes += drawn
     return scenes
 
 
@@ -326,6 +342,16 @@ def _width(found: _Found) -> float:
     area = float(mesh.areas.sum())
     half = len(mesh.topology.boundary)
     return max(area / float(lengths.sum() - 0.5 * lengths[-half:].sum()), 2e-3 * math.sqrt(area))
+
+
+def _narrowest(found: _Found, width: float) -> float:
+    """Height of the narrowest face that is no sliver, mm; where faces are not known a third of a panel's width."""
+    if found.faces is None:
+        return width / 3.0
+    corners = found.faces.points[found.faces.triangles]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    heights = 2.0 * found.faces.areas / sides.max(axis=1)
+    return max(float(np.quantile(heights, 0.02)), width / 10.0)
 
 
 def _area(pattern: CreasePattern) -> float:

@@ -24,6 +24,7 @@ from bh.model.sheet import Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, RigidBody, Support, directions, select
 from bh.model.until import Until
+from bh.scene.changes import set_keys
 from bh.scene.meshing import mesh_of
 from bh.scene.reading import (
     arguments,
@@ -50,6 +51,9 @@ from bh.scene.tables import (
     UntilTable,
 )
 from bh.scene.wanted_accuracy import wanted_accuracy
+from bh.solvers.settling import Settling
+from bh.solvers.trace import Strategy
+from meshes.limits import check_limit
 
 SECTIONS = (
     "pattern",
@@ -93,7 +97,8 @@ class Scene:
         model: checked; its steps can be programmed (`bh.loading.builder`), nothing is solved.
         outputs: what a run is to write.
         accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
-        symmetry: the plane of a scene to be solved by halves, or None: `bh.trace(..., symmetry=scene.symmetry)`.
+        symmetry: the plane of symmetry of a scene, or None: `bh.trace(..., symmetry=scene.symmetry)`.
+        strategy: of the increments, or None for the default: `bh.trace(..., strategy=scene.strategy)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
     """
@@ -104,13 +109,15 @@ class Scene:
     source: Path | None = None
     accuracy: Goal | None = None
     symmetry: Plane | None = None
+    strategy: Strategy | None = None
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, changes: Sequence[str] = ()) -> Scene:
     """Read a scene file.
 
     Args:
         path: of the file (TOML); patterns that it names are looked for in its folder.
+        changes: keys that are set before it is read, such as "mesh.rows=4" (`bh.scene.changes`).
 
     Raises:
         SceneError: it cannot be read, or asks for what cannot be; one line that begins with the file's name.
@@ -133,7 +140,7 @@ def load_scene(path: str | Path) -> Scene:
         if len(content) > LONGEST_FILE:
             raise SceneError(f"the file is longer than {LONGEST_FILE // 10**6} MB; give a scene file (TOML)")
         text = content.decode("utf-8-sig")
-        scene = _scene(text, path.parent)
+        scene = _scene(text, path.parent, changes)
     except FileNotFoundError as error:
         raise SceneError(one_line(f"there is no scene file '{path}'; check the name")) from error
     except IsADirectoryError as error:
@@ -184,8 +191,10 @@ def scene_from_tables(tables: dict[str, object], folder: str | Path = ".", name:
         raise SceneError(one_line(f"{name}: {error}")) from error
 
 
-def _scene(text: str, folder: Path) -> Scene:
-    return _from_tables(read_toml(text), folder)
+def _scene(text: str, folder: Path, changes: Sequence[str] = ()) -> Scene:
+    tables = read_toml(text)
+    set_keys(tables, changes)
+    return _from_tables(tables, folder)
 
 
 def _from_tables(data: dict[str, object], folder: Path) -> Scene:
@@ -196,6 +205,8 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     sheet = read_table(SheetTable, data["sheet"], "sheet")
     how = read_table(ModelTable, data.get("model", {}), "model")
     name = _formulation(how.formulation)
+    steps = as_tables(data["steps"], "steps")
+    check_limit("steps", len(steps), "this scene", SceneError)
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
@@ -203,7 +214,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         mesh=mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data),
         sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
-        steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(as_tables(data["steps"], "steps"))),
+        steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(steps)),
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
         hinge_lock=how.hinge_lock,
@@ -214,6 +225,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         Outputs(**arguments(outputs)),
         accuracy=wanted_accuracy(data, model),
         symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None,
+        strategy=Settling() if how.strategy == "settling" else None,
     )
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from bh.errors import SceneError
 from bh.model.plugins import made
 from bh.scene.patterns import LIBRARY, DrawingPattern
@@ -13,8 +11,6 @@ from bh.scene.reading import as_table, inside, nearest, read_table, shown, withi
 from bh.scene.tables import DrawnTable, GmshTable, MeshTable
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.choices import first_mesh
-
-LARGEST_MESH = 4_000_000  # triangles; a sheet of that many takes some ten gigabytes to solve
 
 
 def mesh_of(pattern: object, mesh: object, folder: Path, anew: bool = False) -> SheetMesh:
@@ -64,9 +60,8 @@ def _drawn(table: dict[str, object]) -> CreasePattern:
 
 def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
     if isinstance(how, GmshTable):
-        from meshes.unstructured import sheet_area, unstructured
+        from meshes.unstructured import unstructured
 
-        _check_triangles(sheet_area(flat) / (0.433 * how.size**2))  # equilateral ones
         with within("mesh"):
             return unstructured(flat, size=how.size, near=how.near, growth=how.growth, seed=how.seed)
     if not flat.rails:
@@ -74,7 +69,6 @@ def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
             f'mesh.kind = "{how.kind}" is for creases that run across the sheet side by side, or round a hole; '
             'these do not: use kind = "gmsh" with size'
         )
-    _check_size(flat, how)
     with within("mesh"):
         return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
 
@@ -124,21 +118,3 @@ def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: 
         if how is None:
             return first_mesh(drawn)
     return _meshed(drawn, how)
-
-
-def _check_size(pattern: CreasePattern, how: MeshTable) -> None:
-    """Refuse what would only fill the memory; `structured` decides the exact numbers."""
-    panels = len(pattern.rails) - 1
-    along = float(how.along or 0)
-    if how.aspect_ratio is not None:
-        length = max(rail.length for rail in pattern.rails)
-        # at one end and in the middle: panels can taper
-        inner, outer = (rail.point(np.array([0.0, 0.5])) for rail in (pattern.rails[0], pattern.rails[-1]))
-        height = float(np.linalg.norm(outer - inner, axis=1).max()) / panels
-        along = how.aspect_ratio * length / height * how.rows
-    _check_triangles(2.0 * along * how.rows * panels)
-
-
-def _check_triangles(triangles: float) -> None:
-    if triangles > LARGEST_MESH:
-        raise SceneError(f"mesh: this is some {triangles:.2g} triangles; ask for fewer than {LARGEST_MESH:,}")

@@ -66,8 +66,8 @@ def report(scene: Scene) -> list[str]:
         items = (*step.actuations, step.until) if step.until else step.actuations
         lines.append(f"step {i + 1}: " + ", ".join(_words(item) for item in items))
     # a mesh that is yet to be chosen is here to show the places, and nothing can be said of it
-    told = [r for r in remarks(model) if scene.accuracy is None or r.code == "drawing"]
-    return lines + [f"remark ({remark.code}): {remark}" for remark in told]
+    shown = [r for r in remarks(model) if scene.accuracy is None or r.code == "drawing"]
+    return lines + [f"remark ({remark.code}): {remark}" for remark in shown]
 
 
 def _chosen(goal: Goal) -> str:

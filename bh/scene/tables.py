@@ -98,6 +98,7 @@ class ModelTable(Table):
 
     formulation: str = Field("consistent", description="a name that `bh formulations` lists")
     hinge_lock: bool = Field(True, description="true or false")
+    strategy: Literal["automatic", "settling"] = Field("automatic", description='"automatic" or "settling"')
 
 
 class OutputsTable(Table):

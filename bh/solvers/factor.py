@@ -89,6 +89,10 @@ class Matrix(Protocol):
         """A x for x (n,)."""
         ...
 
+    def diagonal(self) -> Array:
+        """(n,) diagonal, in the order of the unknowns; without multipliers where there are some."""
+        ...
+
 
 def unpermuted(rows: Array, order: Ints) -> Array:
     """Rows in the order of the unknowns again; `order[k]` is the unknown in row k.

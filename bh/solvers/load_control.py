@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from bh.solvers.branching import NO_BRANCH, Branch, onto_stable_branch
 from bh.solvers.matrices import IndefiniteError
-from bh.solvers.modes import count_negative
+from bh.solvers.modes import GAP, KNOWN_GAP, count_negative, neutral_mode
 from bh.solvers.newton import INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point, power_rate
 from bh.solvers.stability import leave_saddle, locate
-from bh.solvers.system import System
+from bh.solvers.system import System, limited
 
 Array = NDArray[np.float64]
 LOOK = 2  # cuts of an increment before a bifurcation is looked for
@@ -112,6 +112,7 @@ class LoadControl:
         step = first if increment is None else increment
         cuts: list[str] = []
         iterations, looked = 0, False
+        held: Array | None = None  # the neutral mode, once the path has one
         while points[-1].lam < 1.0:
             here = points[-1]
             left = 1.0 - here.lam
@@ -127,12 +128,15 @@ class LoadControl:
             alone = len(points) == 1
             brisk = lam - here.lam > 0.5 * self.cautious(system) if alone else len(cuts) < self.brisk
             look = self.at_bifurcation == "stable" and len(cuts) >= LOOK and not looked
-            tried = self._try(system, points, lam, brisk, look)
+            if len(cuts) == 1 and held is None:  # a step may begin on a buckled ring
+                held = _neutral(system, here, known=False)
+            tried = self._try(system, points, lam, brisk, look, held)
             iterations += tried.iterations
             looked = looked or bool(tried.branch.critical)
             if tried.branch.points:
                 yield from tried.branch.increments(tuple(cuts), iterations)
                 points, looked = list(tried.branch.points[-3:]), False
+                held = _neutral(system, points[-1], known=held is not None)
                 step = max(2.0 * self.smallest, points[-1].lam - tried.branch.critical[0].lam)
                 cuts, iterations = [], 0
                 continue
@@ -147,6 +151,8 @@ class LoadControl:
                     )
                     return
                 continue
+            if held is not None or tried.solution.globalised:
+                held = _neutral(system, tried.point, known=held is not None)
             critical = self._critical(system, here, tried.primary, lam)
             if self.at_bifurcation == "stop" and tried.solution.negative:
                 where = f" at lambda {critical[0].lam:.6g}" if critical else f" before lambda {lam:.6g}"
@@ -171,16 +177,20 @@ class LoadControl:
             )  # fmt: skip
             cuts, iterations, looked = [], 0, False
 
-    def _try(self, system: System, points: Sequence[Point], lam: float, brisk: bool, look: bool) -> _Trial:
+    def _try(
+        self, system: System, points: Sequence[Point], lam: float, brisk: bool, look: bool, held: Array | None
+    ) -> _Trial:
         """One solve at `lam`, from the branch's stable side if it is unstable there, and what is to be said against it.
 
         A shorter increment is a cheaper remedy than globalised Newton, so that is left out where `brisk`. Where `look`,
-        a branch that is lost for an indefinite tangent is looked for behind a bifurcation first.
+        a branch that is lost for an indefinite tangent is looked for behind a bifurcation first. `held` is a neutral
+        mode that is left alone.
         """
         here = points[-1]
-        newton = replace(self.newton, unstable=self.at_bifurcation != "stable")
+        newton = replace(self.newton, unstable=self.at_bifurcation != "stable", held=held)
         method = replace(newton, globalised=0, hasty=True) if brisk or look else newton
         q, forces = extrapolate(points, lam)
+        q, forces = _as_far_as_clear(system, here, lam, q, forces)
         primary = found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
         iterations, note, branch = found.iterations, "", NO_BRANCH
         downhill = look and not brisk and not found.converged
@@ -283,6 +293,23 @@ def jump(system: System, here: Point, there: Point, mismatch: float) -> str:
     return ""
 
 
+def _as_far_as_clear(system: System, here: Point, lam: float, q: Array, forces: Array) -> tuple[Array, Array]:
+    """A guess and its element forces, or as much of the way there from the last state as nothing stands in."""
+    change = q - here.q
+    step = limited(system, here.q, change, lam)
+    if step is change:
+        return q, forces
+    part = float(np.linalg.norm(step)) / max(float(np.linalg.norm(change)), 1e-300)
+    return here.q + step, here.forces + part * (forces - here.forces)
+
+
 def _lost(found: Solution) -> bool:
     """Whether a branch has no stable state where Newton's method went."""
     return found.reason == INDEFINITE or found.stable is False
+
+
+def _neutral(system: System, here: Point, known: bool) -> Array | None:
+    """(primal,) the neutral mode of a state, None where it has none; one that was `known` before may be less so."""
+    matrix = system.tangent(here.q, here.lam, here.forces).matrix
+    found = neutral_mode(matrix, system.primal, KNOWN_GAP if known else GAP)
+    return None if found is None else found.mode

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,21 +13,92 @@ from bh.solvers.saddle import MultiplierMatrix
 Array = NDArray[np.float64]
 NEUTRAL = 1e-13  # shift, in parts of the diagonal, at which an eigenvalue is zero but for rounding
 ROUNDED = 1e-11  # one that takes off what rounding makes of neutral modes in a badly conditioned matrix
+GAP = 1e-6  # a mode whose stiffness is less than this part of the next one's is neutral
+KNOWN_GAP = 1e-3  # of a mode that was so before: what is left of the imbalance gives it some stiffness
 
 
-def count_negative(matrix: Matrix) -> int:
-    """Number of negative eigenvalues on the null space of the constraints; those that are rounding count as zero.
+def count_negative(matrix: Matrix, gap: float = GAP) -> int:
+    """Number of negative eigenvalues on the null space of the constraints; neutral ones count as zero.
 
     Where there are too many constraints for an exact count it is that of the augmented matrix, an upper bound.
+
+    Args:
+        matrix: symmetric.
+        gap: see `neutral_mode`.
     """
     try:
         matrix.factorise(NEUTRAL)
         return 0
     except IndefiniteError:
         try:
-            return max(matrix.factorise_any()[1], 1)
+            counted = max(matrix.factorise_any()[1], 1)
         except IndefiniteError as error:
-            return max(error.negative, 1)
+            counted = max(error.negative, 1)
+    lowest = neutral_mode(matrix, len(matrix.diagonal()), gap)
+    return counted - 1 if lowest is not None and lowest.negative else counted
+
+
+class NeutralMode(NamedTuple):
+    """A mode without a stiffness of its own, such as the phase of the waves of a buckled ring.
+
+    Attributes:
+        negative: whether rounding, or the mesh, makes its stiffness a negative one.
+        mode: (primal,) of unit length.
+    """
+
+    negative: bool
+    mode: Array
+
+
+def neutral_mode(matrix: Matrix, primal: int, gap: float = GAP, iterations: int = 8) -> NeutralMode | None:
+    """The mode whose stiffness is nothing beside that of all others, if there is one.
+
+    A ring that has buckled may turn its waves round itself: only the cells of the mesh tell one place from another, so
+    the energy hardly changes, and Newton's steps along that mode are rounding divided by next to nothing.
+
+    Args:
+        matrix: symmetric.
+        primal: number of unknowns that are no multipliers.
+        gap: part of the next mode's stiffness that is nothing.
+        iterations: of inverse iteration with two vectors.
+
+    Returns:
+        None where no mode is so much softer than the next one.
+    """
+    matrix = matrix.augmented if isinstance(matrix, MultiplierMatrix) else matrix
+    factor: Factor | None
+    try:
+        factor, _ = matrix.factorise_any()
+    except IndefiniteError:
+        factor, _ = factorise_shifted(matrix, 0.0, least=ROUNDED)
+    if factor is None or primal < 2:
+        return None
+    modes = np.random.default_rng(20).normal(size=(primal, 2))
+    for _ in range(iterations):
+        modes = np.linalg.qr(np.column_stack([factor.solve(mode) for mode in modes.T]))[0]
+    stiffnesses, turns = np.linalg.eigh(modes.T @ np.column_stack([matrix @ mode for mode in modes.T]))
+    soft, following = np.argsort(np.abs(stiffnesses))
+    if not abs(stiffnesses[soft]) < gap * stiffnesses[following]:
+        return None
+    return NeutralMode(bool(stiffnesses[soft] < 0.0), modes @ turns[:, soft])
+
+
+def without(factor: Factor, x: Array, mode: Array) -> Array:
+    """The solution x of K x = b once it may not move along a mode: K x + v mu = b, v . x = 0.
+
+    Args:
+        factor: of K.
+        x: (n,) solution without that.
+        mode: v, (primal,).
+
+    Returns:
+        (n,) the solution with that.
+    """
+    p = len(mode)
+    v = np.zeros_like(x)
+    v[:p] = mode
+    along = factor.solve(v)
+    return x - along * float(mode @ x[:p]) / float(mode @ along[:p])
 
 
 def factorise_shifted(

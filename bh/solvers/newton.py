@@ -12,9 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.factor import Descent, Factor, IndefiniteError, Matrix
-from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted, lowest_mode
+from bh.solvers.modes import (
+    GAP,
+    KNOWN_GAP,
+    NEUTRAL,
+    ROUNDED,
+    count_negative,
+    factorise_shifted,
+    lowest_mode,
+    without,
+)
 from bh.solvers.pseudo_transient import PseudoTransient
-from bh.solvers.system import Evaluation, System
+from bh.solvers.system import Evaluation, System, limited
 
 Array = NDArray[np.float64]
 INDEFINITE = "indefinite tangent"  # why full Newton gave up
@@ -59,6 +68,7 @@ class Newton:
         full_shift: largest shift of full Newton; a tangent that is more indefinite asks for the globalised way.
         transient: the last resort; None to do without.
         hasty: give full Newton up where its steps contract too slowly; for increments that are cheaper cut than saved.
+        held: (primal,) a neutral mode that full steps leave alone (`bh.solvers.modes.neutral_mode`), None without one.
         unstable: take indefinite tangents as they are and take full steps only, to stay on a branch that is not stable.
     """
 
@@ -68,6 +78,7 @@ class Newton:
     full_shift: float = 1e-5
     transient: PseudoTransient | None = field(default_factory=PseudoTransient)
     hasty: bool = False
+    held: Array | None = None
     unstable: bool = False
 
     def solve(
@@ -135,6 +146,8 @@ class Newton:
             what came of it.
         """
         now = system.evaluate(q, lam)
+        if not np.isfinite(now.energy):
+            return Solution(q, now, 0, False, "the guess has no energy")
         forces = now.forces if forces is None else forces
         least, before = now.imbalance, np.inf
         sizes: list[float] = []  # of the steps taken
@@ -146,10 +159,13 @@ class Newton:
             if factor is None:
                 return Solution(q, now, iteration, False, INDEFINITE)
             dq = -factor.solve(now.residual)
+            if self.held is not None:
+                dq = without(factor, dq, self.held)
             if not float(np.abs(dq).max(initial=0.0)) < ENDLESS:
                 return Solution(q, now, iteration, False, "singular tangent")
             if self._exhausted(system, now, before, dq):
                 return self._finish(system, q, lam, now, iteration, globalised=False)
+            dq = limited(system, q, dq, lam)
             sizes.append(float(np.linalg.norm(dq[: system.primal])))
             if self.hasty and now.imbalance > NEAR_SADDLE and slow(sizes):
                 return Solution(q, now, iteration, False, "slow contraction")
@@ -244,11 +260,11 @@ class Newton:
         stuck = 0.5 * before <= now.imbalance <= 100.0 * self.tolerance
         return stuck and gain <= 1e-13 * abs(now.energy)
 
-    @staticmethod
     def _finish(
-        system: System, q: Array, lam: float, now: Evaluation, iterations: int, globalised: bool
+        self, system: System, q: Array, lam: float, now: Evaluation, iterations: int, globalised: bool
     ) -> Solution:
-        negative = count_negative(system.tangent(q, lam, now.forces).matrix)
+        matrix = system.tangent(q, lam, now.forces).matrix
+        negative = count_negative(matrix, GAP if self.held is None else KNOWN_GAP)
         return Solution(q, now, iterations, True, "", negative, globalised)
 
 
@@ -358,6 +374,7 @@ def line_search(
         start = q.copy()
         start[p:] += dq[p:]
         now = system.evaluate(start, lam)
+    dq = limited(system, start, dq, lam)
     noise = 1e-13 * max(abs(now.merit), abs(slope))
     length = 1.0
     for _ in range(30):

@@ -124,6 +124,10 @@ class MultiplierMatrix:
         top = self.augmented @ x[:n] + self.G.transpose_times(x[n:] - self.gamma * turn)
         return np.concatenate((top, turn - self.compliance * x[n:]))
 
+    def diagonal(self) -> Array:
+        """(n,) diagonal of the augmented matrix, without multipliers."""
+        return self.augmented.diagonal()
+
 
 @dataclass(frozen=True)
 class MultiplierFactor(Factor):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,6 +193,38 @@ class System(Protocol):
         ...
 
 
+@runtime_checkable
+class Limited(Protocol):
+    """Ability of a system: something can stand in the way of a step, which then has to be shorter."""
+
+    def free_part(self, q: Array, dq: Array, lam: float) -> float:
+        """How much of the step dq (n,) from q nothing stands in, 0 to 1.
+
+        Args:
+            q: (n,) unknowns, with nothing in their way.
+            dq: (n,) step.
+            lam: load parameter of the step, 0 to 1.
+        """
+        ...
+
+
+def limited(system: System, q: Array, dq: Array, lam: float) -> Array:
+    """The step dq (n,) from q, or as much of it as leaves a tenth of the way to what stands in it.
+
+    Args:
+        system: any; only those that are `Limited` shorten steps.
+        q: (n,) unknowns.
+        dq: (n,) step.
+        lam: load parameter of the step, 0 to 1.
+    """
+    # asked in every iteration: looking for the method takes 0.1 microseconds, `isinstance` of a protocol 20
+    free_part: Callable[[Array, Array, float], float] | None = getattr(system, "free_part", None)
+    if free_part is None:
+        return dq
+    part = free_part(q, dq, lam)
+    return dq if part >= 1.0 else 0.9 * part * dq
+
+
 def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, float], float]) -> bool:
     """Does `measure`, zero in equilibrium, grow to first order along the path's own tangent from an accepted state?
 
@@ -212,3 +244,18 @@ def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, 
     ahead = 1e-3 * max(lam, 0.01)
     moved = q - ahead * factor.solve(system.control_rate(q, lam))
     return measure(moved, lam + ahead) - measure(q, lam) > 1e-6 * ahead
+
+
+@runtime_checkable
+class Hinged(Protocol):
+    """A system with hinges that close, and stiffen as they do."""
+
+    def left_to_close(self, q: Array, q_new: Array, lam: float) -> float:
+        """Least part of its way to closed that a hinge is left with, of those that are about to close; 1 for none.
+
+        Args:
+            q: (n,) unknowns of the state before.
+            q_new: (n,) unknowns of the state after.
+            lam: load parameter of the step, 0 to 1.
+        """
+        ...

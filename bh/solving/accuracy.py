@@ -78,7 +78,7 @@ def solve(
     began = time.perf_counter()
     pattern = pattern_of(model)
     _check(model, goal)
-    race = Race(goal, candidates(halves=symmetry is not None))
+    race = Race(goal, candidates(symmetric=symmetry is not None))
     task = _Task(model, goal, meter(progress), strategy, symmetry, levels)
     ladders = {name: Ladder(pattern, option.kind, race.first(name)) for name, option in race.options.items()}
     trials: list[Trial] = []
@@ -251,8 +251,8 @@ def estimate(values: Sequence[Array], nothing: float = 0.0) -> tuple[float, floa
     return SAFETY * left / size, order
 
 
-def candidates(halves: bool = False) -> dict[str, Refinement]:
-    """The formulations that say on which meshes they converge; those only that can be solved by `halves`, if asked.
+def candidates(symmetric: bool = False) -> dict[str, Refinement]:
+    """The formulations that say on which meshes they converge; if `symmetric`, those that take a plane of symmetry.
 
     Returns:
         how each refines, by name.
@@ -263,7 +263,11 @@ def candidates(halves: bool = False) -> dict[str, Refinement]:
     known = {}
     for name in names():
         found = formulation(name)
-        if isinstance(found, Refinable) and found.refinement and (not halves or isinstance(found, Mirrored)):
+        if (
+            isinstance(found, Refinable)
+            and found.refinement
+            and (not symmetric or isinstance(found, Mirrored))
+        ):
             known[name] = found.refinement
     if not known:
         raise ModelError(

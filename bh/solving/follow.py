@@ -161,11 +161,7 @@ def _stable_end(path: Path, strategy: Strategy) -> StepOutcome:
     if getattr(strategy, "at_bifurcation", None) != "stable" or path.stable is not False:
         return StepOutcome(Outcome.REACHED)
     modes = count(path.records[-1].negative or 0, "negative mode")
-    why = (
-        ""
-        if path.half(len(path.steps)) is None
-        else "; the whole sheet would leave the symmetry of its halves"
-    )
+    why = "" if path.half(len(path.steps)) is None else "; the whole sheet would leave the symmetry"
     return StepOutcome(Outcome.UNSTABLE, f"the end state is not stable ({modes}){why}")
 
 

@@ -21,7 +21,7 @@ def studio(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of this machine; 0 for a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the browser of this machine.")] = True,
 ) -> None:
-    """Fold a sheet by sliders, pull on it, read its forces: a window in the browser of this machine.
+    """Fold a sheet by sliders, in a window of the browser.
 
     Args:
         file: a drawing, or the name of a pattern of the library.

@@ -8,12 +8,12 @@ import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
-from bh.errors import InputError
+from bh.errors import InputError, SceneError
 from bh.model.supports import select
 from bh.paths.path import Path as Trace
+from bh.scene.changes import setter
 from bh.scene.load import Scene, scene_from_tables
 from bh.scene.reading import read_toml
 from bh.solving.trace import trace
@@ -21,7 +21,6 @@ from bh.sweep.dataset import Label
 from bh.sweep.points import SweepError, Value
 from bh.sweep.task import Measured
 
-TOKEN = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 MEASURED = re.compile(
     r"(energy|dihedral|points)_.*|stable|critical_points|iterations|unknowns|points|flat_points|node|node_.*|xyz?"
 )
@@ -92,7 +91,7 @@ class SceneTask:
     def __call__(self, parameters: Mapping[str, Value]) -> Measured:
         """Solve the scene of a point and measure its last state."""
         scene = self.scene(parameters)
-        path = trace(scene.model, accuracy=scene.accuracy)
+        path = trace(scene.model, accuracy=scene.accuracy, strategy=scene.strategy)
         if not path.reached:
             where = f"step {len(path.steps)}, lambda {path.records[-1].lam:.6g}"
             return Measured({}, path.outcome, f"{where}: {path.reason}")
@@ -184,39 +183,11 @@ class SceneTask:
 
 
 def _setter(tables: dict[str, object], key: str, name: str) -> Callable[[Value], None]:
-    """What sets a key of some tables; tables that are not there yet are made."""
-    words = TOKEN.findall(key)
-    if not words or "".join(f"[{i}]" if i else f".{w}" for w, i in words).lstrip(".") != key:
-        raise SweepError(
-            f"parameter '{name}': the key '{key}' is not understood; write it as steps[0].fold.to"
-        )
-    parts: list[str | int] = [int(i) if i else w for w, i in words]
-    here: dict[str, object] | list[object] = tables
-    for part, after in zip(parts, [*parts[1:], None], strict=True):
-        wrong = SweepError(
-            f"parameter '{name}': the scene has no '{key}'; it must name a key of one of its tables"
-        )
-        inner: object
-        if isinstance(here, list):
-            if not isinstance(part, int) or part >= len(here):
-                raise wrong
-            if after is None:
-                return partial(here.__setitem__, part)
-            inner = here[part]
-        else:
-            if not isinstance(part, str):
-                raise wrong
-            if after is None:
-                return partial(here.__setitem__, part)
-            if part not in here and not isinstance(after, int):
-                here[part] = {}
-            if part not in here:
-                raise wrong
-            inner = here[part]
-        if not isinstance(inner, dict | list):
-            raise wrong
-        here = inner
-    raise wrong
+    """What sets a key of some tables for a parameter."""
+    try:
+        return setter(tables, key)
+    except SceneError as error:
+        raise SweepError(f"parameter '{name}': {error}") from error
 
 
 def word(place: str) -> str:

@@ -17,9 +17,10 @@ from meshes.io.export import shown
 from meshes.io.perforation import join_dashes
 from meshes.io.sizes import check_lengths, size_remarks
 from meshes.io.strokes import Rules, Stroke, Strokes
+from meshes.limits import check_limit
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
-from meshes.planar import RIM, DrawnLine, Graph, heal
+from meshes.planar import RIM, DrawnLine, Graph, check_crossings, heal
 from meshes.sheet import pattern_of, region_of
 
 OUTLINES = ("drawn", "hull")
@@ -170,9 +171,10 @@ def read_graph(
         raise FileFormatError(
             f"there is no line in the drawing ({len(strokes)} are ignored); draw the creases as strokes"
         )
+    check_limit("lines", len(kept), "this drawing", FileFormatError)
     rough = _box([_finite(stroke, stroke.sample(math.inf)) for stroke, _ in kept])
     fine = TOLERANCE * float(np.linalg.norm(rough[1] - rough[0])) or 1.0
-    sampled = [_finite(stroke, stroke.sample(fine)) for stroke, _ in kept]
+    sampled = _sampled([stroke for stroke, _ in kept], fine)
     rim = [points for points, (_, kind) in zip(sampled, kept, strict=True) if kind in RIM]
     low, high = _box(rim or sampled)
     if fit is not None:
@@ -182,7 +184,7 @@ def read_graph(
     if not 0.0 < diagonal <= LONGEST:
         raise FileFormatError(f"the drawing is {diagonal:.3g} mm across; set scale (mm a unit) or fit (mm)")
     if tolerance is not None:
-        sampled = [_finite(stroke, stroke.sample(tolerance / unit)) for stroke, _ in kept]
+        sampled = _sampled([stroke for stroke, _ in kept], tolerance / unit)
     if scale is None:
         remarks += size_remarks(unit * float((high - low).max()), found.stated)
     moved = np.zeros(2) if Path(path).suffix.lower() in UPWARDS and fit is None else low
@@ -200,6 +202,7 @@ def read_graph(
         first = drawn[int(np.argmax(lengths <= gap))].name
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
+    check_crossings(np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in drawn]))
     drawn, joined = join_dashes(drawn, gap)
     if outline == "hull":
         drawn.append(_hull(drawn))
@@ -244,6 +247,17 @@ def _read(path: str | os.PathLike[str], frame: int | str | None) -> Strokes:
 
         return read_fold_lines(path, frame)
     raise FileFormatError(f"suffix '{suffix}' is no drawing; give one of {', '.join(PATTERNS)}")
+
+
+def _sampled(strokes: list[Stroke], tolerance: float) -> list[Array]:
+    """Points (k, 2) of every stroke, not more than the limit allows together."""
+    found: list[Array] = []
+    total = 0
+    for stroke in strokes:
+        found.append(_finite(stroke, stroke.sample(tolerance)))
+        total += len(found[-1])
+        check_limit("vertices", total, "this drawing", FileFormatError)
+    return found
 
 
 def _finite(stroke: Stroke, points: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -12,6 +13,7 @@ from meshes.curves import Array
 from meshes.errors import FileFormatError
 from meshes.io.files import drawing_bytes
 from meshes.io.strokes import Colour, Dash, Stroke, Strokes, dash_kind
+from meshes.limits import check_limit
 
 UNITS = {
     0: 1.0,
@@ -50,7 +52,8 @@ SILENT = (
     "ACAD_PROXY_ENTITY",
 )
 LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX", "3DFACE", "TRACE")
-MOST = 200_000  # entities once all blocks are written out
+# how an entity, or a row of a table, begins: its kind after the group code 0
+_BEGIN = re.compile(rb"\n *0\r?\n(?=[A-Z3])")
 DEEPEST = 50  # blocks in blocks
 
 
@@ -76,13 +79,16 @@ def read_dxf(path: str | os.PathLike[str]) -> Strokes:
             the xy plane, entities that are no lines, or blocks that contain themselves or become too many.
     """
     data = drawing_bytes(path, "DXF")
+    _check_size(data)
     drawing = _document(path)
     stated = b"$INSUNITS" in data  # a library's default for files without it is metres
     unit = int(drawing.header.get("$INSUNITS", 0)) if stated else 0
     if unit not in UNITS:
         raise FileFormatError(f"$INSUNITS = {unit} is no unit of a drawing; save it in mm, or give scale")
+    total = _written_out(drawing, drawing.modelspace(), (), {})
+    check_limit("entities", total, "this drawing, its blocks written out,", FileFormatError)
     strokes: list[Stroke] = []
-    for entity, around in _entities(drawing, drawing.modelspace(), None, (), [0]):
+    for entity, around in _entities(drawing, drawing.modelspace(), None, ()):
         kind = entity.dxftype()
         if kind not in LINES:
             raise FileFormatError(
@@ -98,6 +104,12 @@ def read_dxf(path: str | os.PathLike[str]) -> Strokes:
                 f"the model space is empty, all is in the paper space '{papers[0]}'; move it to the model space"
             )
     return Strokes(strokes, UNITS[unit], stated=stated and unit != 0)
+
+
+def _check_size(data: bytes) -> None:
+    """Refuse what would take long to be read: a value has two lines, a vertex two or three values."""
+    check_limit("vertices", data.count(b"\n") / 16.0, "this drawing", FileFormatError)
+    check_limit("entities", len(_BEGIN.findall(data)), "this drawing", FileFormatError)
 
 
 def _document(path: str | os.PathLike[str]) -> Any:
@@ -120,29 +132,49 @@ def _document(path: str | os.PathLike[str]) -> Any:
 
 
 def _entities(
-    drawing: Any, items: Any, around: Look | None, inside: tuple[str, ...], count: list[int]
+    drawing: Any, items: Any, around: Look | None, inside: tuple[str, ...]
 ) -> Iterator[tuple[Any, Look | None]]:
     """What is drawn, blocks written out, each with what it takes from the reference around it."""
     for entity in items:
         kind = entity.dxftype()
         if kind in SILENT or _off(drawing, entity):
             continue
-        count[0] += 1
-        if count[0] > MOST:
-            raise FileFormatError(
-                f"the drawing has more than {MOST} entities once its blocks are written out; explode and thin it"
-            )
         if kind != "INSERT":
             yield entity, around
             continue
-        name = str(entity.dxf.name)
-        if name in inside or len(inside) >= DEEPEST:
-            raise FileFormatError(f"block '{name}' contains itself; remove the reference in it")
+        name = _deeper(entity, inside)
         look = Look(
             _layer_name(entity, around), _colour(drawing, entity, around), _dash(drawing, entity, around)
         )
         for copy in entity.multi_insert() if entity.mcount > 1 else (entity,):
-            yield from _entities(drawing, _contents(copy), look, (*inside, name), count)
+            yield from _entities(drawing, _contents(copy), look, (*inside, name))
+
+
+def _written_out(drawing: Any, items: Any, inside: tuple[str, ...], sizes: dict[str, int]) -> int:
+    """Number of entities that blocks come to; each block is looked at once (`sizes`), and nothing is written out.
+
+    To find out by writing them out takes a minute for as many as are allowed.
+    """
+    total = 0
+    for entity in items:
+        kind = entity.dxftype()
+        if kind in SILENT or _off(drawing, entity):
+            continue
+        total += 1
+        if kind == "INSERT":
+            name = _deeper(entity, inside)
+            if name not in sizes:
+                sizes[name] = _written_out(drawing, entity.block() or (), (*inside, name), sizes)
+            total += max(entity.mcount, 1) * (1 + sizes[name])  # an array of nothing takes its time too
+    return total
+
+
+def _deeper(insert: Any, inside: tuple[str, ...]) -> str:
+    """The name of a block that is referred to within others."""
+    name = str(insert.dxf.name)
+    if name in inside or len(inside) >= DEEPEST:
+        raise FileFormatError(f"block '{name}' contains itself; remove the reference in it")
+    return name
 
 
 def _contents(insert: Any) -> Iterator[Any]:
@@ -157,6 +189,9 @@ def _contents(insert: Any) -> Iterator[Any]:
 def _stroke(drawing: Any, entity: Any, around: Look | None, number: int) -> Stroke | None:
     """The stroke of an entity, None where it has no length."""
     name = f"{entity.dxftype()} {number + 1} (handle {entity.dxf.handle})"
+    if entity.dxftype() == "SPLINE":
+        points = max(entity.control_point_count(), entity.fit_point_count())
+        check_limit("control_points", points, name, FileFormatError)
     try:
         flatten = _flattening(entity)
         first = flatten(1e300)

@@ -8,8 +8,9 @@ import zlib
 from pathlib import Path
 
 from meshes.errors import FileFormatError
+from meshes.limits import check_limit, limits
 
-LARGEST = 64 * 2**20  # bytes of a drawing, unpacked
+MEGABYTE = 2**20
 _GZIP = b"\x1f\x8b"
 # how files of other kinds begin, what they are, and the mend
 _OTHERS = (
@@ -30,7 +31,7 @@ def drawing_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
         kind: what it should be, for messages: "SVG", "DXF", ...
 
     Returns:
-        its bytes, at most `LARGEST`.
+        its bytes, within the limit of `meshes.limits`.
 
     Raises:
         FileFormatError: it cannot be read, is no plain file, is too large, or is something else by its first bytes.
@@ -41,9 +42,10 @@ def drawing_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
             raise FileFormatError(f"this is a folder; name a .{kind.lower()} file in it")
         if not stat.S_ISREG(found.st_mode):  # a pipe would be waited for
             raise FileFormatError("this is no plain file; copy the drawing to one")
-        if found.st_size > LARGEST:
-            raise FileFormatError(_too_large(found.st_size))
+        check_limit("megabytes", found.st_size / MEGABYTE, "this drawing", FileFormatError)
         data = Path(path).read_bytes()
+    except FileFormatError:
+        raise
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise FileFormatError(f"cannot be read ({why}); check the name and rights") from error
@@ -58,16 +60,8 @@ def drawing_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
 def _unpacked(data: bytes) -> bytes:
     unpack = zlib.decompressobj(wbits=31)
     try:
-        text = unpack.decompress(data, LARGEST + 1)
+        text = unpack.decompress(data, limits().megabytes * MEGABYTE + MEGABYTE)
     except zlib.error as error:
         raise FileFormatError(f"the packed file is damaged ({error}); save the drawing again") from error
-    if len(text) > LARGEST:
-        raise FileFormatError(_too_large(len(text)))
+    check_limit("megabytes", len(text) / MEGABYTE, "this drawing, unpacked,", FileFormatError)
     return text
-
-
-def _too_large(size: int) -> str:
-    return (
-        f"the drawing has more than {LARGEST // 2**20} MB ({size / 2**20:.0f}); a crease pattern has less: "
-        "remove pictures and texts, or simplify its curves"
-    )

@@ -72,27 +72,27 @@ def read_fold(
         chosen = select(load(path), frame)
         found = _sized(laid_flat(check(chosen)), chosen, scale, fit)
         mesh = sheet_of_frame(found)
-        told = _remarks(found, chosen, scale is None and fit is None)
-        return replace(mesh, remarks=(*told, *mesh.remarks))
+        remarks = _remarks(found, chosen, scale is None and fit is None)
+        return replace(mesh, remarks=(*remarks, *mesh.remarks))
     except (InputError, shapely.errors.ShapelyError) as error:
         text = " ".join(str(error).split())
         raise FileFormatError(f"{shown(path)}: {text}") from error
 
 
-def _sized(frame: Frame, told: dict[str, Any], scale: float | None, fit: float | None) -> Frame:
+def _sized(frame: Frame, units: dict[str, Any], scale: float | None, fit: float | None) -> Frame:
     """The frame at another size."""
     check_lengths({"scale": scale, "fit": fit})
     if scale is not None:
-        return replace(frame, points=frame.points * (scale / UNITS[told.get("frame_unit", "unit")]))
+        return replace(frame, points=frame.points * (scale / UNITS[units.get("frame_unit", "unit")]))
     if fit is not None:
         longest = float(np.ptp(frame.points, axis=0).max())
         return replace(frame, points=frame.points * (fit / (longest or 1.0)))
     return frame
 
 
-def _remarks(frame: Frame, told: dict[str, Any], as_told: bool) -> tuple[str, ...]:
+def _remarks(frame: Frame, units: dict[str, Any], as_stated: bool) -> tuple[str, ...]:
     size = float(np.ptp(frame.points, axis=0).max())
-    return tuple(size_remarks(size, told.get("frame_unit", "unit") != "unit")) if as_told else ()
+    return tuple(size_remarks(size, units.get("frame_unit", "unit") != "unit")) if as_stated else ()
 
 
 # --- the sheet ------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ import numpy as np
 from meshes.curves import Array
 from meshes.errors import FileFormatError
 from meshes.io.fold_frame import Face, Frame, Side, side
+from meshes.planar import check_crossings
 
 THIN = 1e-10  # doubled area over longest side squared of a degenerate triangle, as in SheetMesh
 
@@ -80,6 +81,7 @@ def _check_plane_graph(frame: Frame) -> None:
 
     xy, edges = frame.points[:, :2], np.array(frame.edges)
     size = float(np.linalg.norm(np.ptp(xy, axis=0)))
+    check_crossings(xy[edges].reshape(-1, 4))
     lines = shapely.linestrings(xy[edges])
     tree = shapely.STRtree(lines)
     used = np.unique(edges)

@@ -16,6 +16,7 @@ import numpy as np
 from meshes.errors import FileFormatError
 from meshes.io.files import drawing_bytes
 from meshes.io.strokes import Colour, Stroke, Strokes, always
+from meshes.limits import check_limit
 
 COLOURS: dict[int, Colour | None] = {
     0: (255, 255, 255),  # auxiliary
@@ -34,6 +35,7 @@ def read_cp(path: str | os.PathLike[str]) -> Strokes:
         FileFormatError: it cannot be read; the message names the line.
     """
     text = drawing_bytes(path, "CP").decode("utf-8", errors="replace")
+    check_limit("entities", text.count("\n"), "this pattern", FileFormatError)
     return _strokes(_cp_rows(text))
 
 

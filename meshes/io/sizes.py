@@ -43,8 +43,8 @@ def size_remarks(size: float, stated: bool) -> list[str]:
     """
     if not absurd(size):
         return []
-    told = "as the file says" if stated else "as the file states no unit"
+    origin = "as the file says" if stated else "as the file states no unit"
     return [
-        f"the sheet is {size:.3g} mm long, {told}; if that is not meant, give its longer side: fit = 200.0 (mm), or "
+        f"the sheet is {size:.3g} mm long, {origin}; if that is not meant, give its longer side: fit = 200.0 (mm), or "
         "scale (mm a unit of the drawing)"
     ]

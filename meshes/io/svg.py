@@ -18,6 +18,7 @@ from meshes.errors import FileFormatError
 from meshes.io.files import drawing_bytes
 from meshes.io.strokes import Colour, Dash, Stroke, Strokes, always, dash_kind
 from meshes.io.svg_tree import CLIP, CLIP_SHAPE, svg_tree
+from meshes.limits import check_limit
 
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 PIXELS = 96.0  # an inch, as CSS has it
@@ -218,11 +219,13 @@ def _sampler(se: Any, segments: list[Any]) -> Any:
 
     def sample(tolerance: float) -> Array:
         points = [np.array([[segments[0].start.x, segments[0].start.y]])]
-        for segment in segments:
+        pieces = [_pieces(se, s, tolerance) if isinstance(s, curved) else 1 for s in segments]
+        check_limit("vertices", sum(pieces), "a line of this drawing", FileFormatError)
+        for segment, chords in zip(segments, pieces, strict=True):
             if not isinstance(segment, curved):
                 points.append(np.array([[segment.end.x, segment.end.y]]))
                 continue
-            t = np.linspace(0.0, 1.0, _pieces(se, segment, tolerance) + 1)[1:]
+            t = np.linspace(0.0, 1.0, chords + 1)[1:]
             points.append(np.array([[p.x, p.y] for p in map(segment.point, t)]))
             points[-1][-1] = segment.end.x, segment.end.y
         flipped: Array = np.vstack(points) * (1.0, -1.0)

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from meshes.errors import FileFormatError
+from meshes.limits import check_limit
 
 Element = ElementTree.Element
 SVG = "{http://www.w3.org/2000/svg}"
 XLINK = "{http://www.w3.org/1999/xlink}href"
-MOST = 200_000  # elements once every `use` is written out
 DEEPEST = 200  # groups in groups
 CLIP, CLIP_SHAPE = "data-clip", "data-clip-shape"
 # which attributes are percentages of what: the viewport's width, its height, or its diagonal / sqrt(2)
@@ -58,12 +58,16 @@ def svg_tree(data: bytes) -> Tree:
     Raises:
         FileFormatError: it is no XML, has no <svg> element, refers to itself, or becomes too large.
     """
+    # an element has one or two angle brackets
+    check_limit("entities", data.count(b"<") / 2.0, "this drawing", FileFormatError)
     try:
         root = ElementTree.parse(io.BytesIO(data)).getroot()
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise FileFormatError(f"this is not XML ({error}); save the drawing as SVG again") from error
     if _tag(root) != "svg":
         raise FileFormatError("the file has no <svg> element; save the drawing as SVG")
+    numbers = sum(_separators(e.get(key, "")) for e in root.iter() for key in ("d", "points"))
+    check_limit("vertices", numbers, "this drawing", FileFormatError)
     writer = _Writer({e.get("id", ""): e for e in root.iter() if e.get("id")}, _clip_classes(root))
     width, height = root.get("width", ""), root.get("height", "")
     out = writer.write(root, _viewport(root, None), ())
@@ -122,10 +126,7 @@ class _Writer:
     def write(self, element: Element, view: Viewport, inside: tuple[str, ...], deep: int = 0) -> Element:
         """A copy of an element with everything in it; `inside` are the ids that are being written out around it."""
         self.written += 1
-        if self.written > MOST:
-            raise FileFormatError(
-                f"the drawing has more than {MOST} elements once every <use> is written out; simplify it"
-            )
+        check_limit("entities", self.written, "this drawing, every <use> written out,", FileFormatError)
         if deep > DEEPEST:
             raise FileFormatError(f"the drawing has groups in groups, more than {DEEPEST} deep; ungroup it")
         if _tag(element) == "use":
@@ -283,6 +284,11 @@ def _number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
+
+
+def _separators(text: str) -> int:
+    """About how many numbers a path has."""
+    return max(text.count(" ") + text.count(","), text.count("."), text.count("-"))
 
 
 def _tag(element: Element) -> str:

@@ -14,9 +14,9 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from bh.analysis.alignment import aligned, hausdorff
 from bh.solvers.outcome import Outcome
 from verification.framework import cases, command
-from verification.framework.alignment import aligned, hausdorff
 from verification.framework.checks import CaseResult, Check, Context
 from verification.studies.app_b import appendix_b_cross as cross
 from verification.studies.app_b import appendix_b_fields as fields

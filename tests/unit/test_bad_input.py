@@ -168,7 +168,7 @@ CASES = [
      ["steps[1]", "equilibrium", "supports"]),
     ("displaced support", {"supports": HELD,
                            "steps": step("displace = { at = 'edge:inner', direction = 'z', by = 1 }")},
-     ["steps[0]", "held and displaced", "remove"]),
+     ["steps[0]", "fixed and displaced", "remove"]),
     ("displaced nowhere", {"supports": HELD,
                            "steps": step("displace = { at = 'edge:end', direction = [0, 0, 0], by = 1 }")},
      ["steps[0].displace.direction = [0", "zero vector"]),

@@ -116,3 +116,14 @@ def test_load_control_goes_over() -> None:
     assert not any(record.jumped for record in path.records)
     assert all(record.negative == 0 for record in path.records if record.lam >= behind[0].lam)
     assert path[-1].energy.total == pytest.approx(trace(ring)[-1].energy.total, rel=1e-8)
+
+
+def test_phase_of_a_buckled_ring_is_left_alone() -> None:
+    """Its waves may turn round the ring at no cost; steps of Newton's method along that mode would be rounding."""
+    mesh = meshes.structured(meshes.full_annulus(100.0, 10.0), along=126, rows=2)
+    path = trace(Model(mesh, Sheet(E=4000.0, t=0.127)).fold("crease", to=2.2))
+    assert path.outcome is Outcome.REACHED
+    assert path.stable
+    buckled = path.records[2:]
+    assert max(record.iterations for record in buckled) <= 8
+    assert not any(record.cuts for record in buckled)

@@ -311,5 +311,5 @@ class TestModels:
         model = bh.Model(mesh, bh.Sheet(E=4000, t=0.2)).force("near:50,60", each=(0.0, 0.0, 1e-3))
         with pytest.raises(ModelError, match="cuts part the sheet into 2 pieces"):
             bh.trace(model)
-        with pytest.raises(ModelError, match=r"rigid motions of the piece at \(50\.3.* supports there$"):
+        with pytest.raises(ModelError, match=r"rigid motions of the piece at \(50\..* supports there$"):
             bh.trace(model.support("edge:side-1", "xyz", clamp=True))

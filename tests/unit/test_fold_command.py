@@ -114,7 +114,9 @@ class TestOneCommand:
     def test_a_corner_is_no_curve(self, tmp_path: Path) -> None:
         """Straight lines that meet at an angle, in pieces: the faces of the drawing do."""
         knee = '<path d="M0 10 L10 20 L20 30 L30 40 L40 30 L50 20 L60 10 L70 0" stroke="red" fill="none"/>'
-        (only,) = proposals(svg(tmp_path, RIM + knee))
+        only, softer = proposals(svg(tmp_path, RIM + knee))
+        assert 'formulation = "consistent"' in softer.text
+        assert all('kind = "drawn"' in offer.text for offer in (only, softer))
         assert 'kind = "drawn"' in only.text
 
     @pytest.mark.parametrize(

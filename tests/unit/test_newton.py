@@ -14,7 +14,14 @@ from bh.solvers.factor import Descent
 from bh.solvers.linear import linear_response
 from bh.solvers.load_control import LoadControl, jump
 from bh.solvers.matrices import BandMatrix
-from bh.solvers.modes import factorise_shifted, lowest_mode
+from bh.solvers.modes import (
+    KNOWN_GAP,
+    count_negative,
+    factorise_shifted,
+    lowest_mode,
+    neutral_mode,
+    without,
+)
 from bh.solvers.newton import Newton, Solution, line_search, slow
 from bh.solvers.points import Increment, Point, extrapolate, point
 from bh.solvers.stability import leave_saddle
@@ -475,3 +482,31 @@ def test_linear_response_of_springs() -> None:
     exact = np.linalg.solve(system.K, system.load)
     assert found.dq == pytest.approx(exact)
     assert found.energy == pytest.approx(-0.5 * float(system.load @ exact))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_neutral_mode_is_left_alone(seed: int) -> None:
+    """Along a mode without stiffness no state is unstable; Newton's steps keep off it and are exact else."""
+    rng = np.random.default_rng(seed)
+    Q = np.linalg.qr(rng.normal(size=(8, 8)))[0]
+    stiffness = np.array([-1e-9, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0])
+    matrix = band(Q @ np.diag(stiffness) @ Q.T)
+    found = neutral_mode(matrix, 8)
+    assert found is not None
+    assert found.negative
+    assert abs(found.mode @ Q[:, 0]) == pytest.approx(1.0, abs=1e-8)
+    assert count_negative(matrix) == 0
+    b = rng.normal(size=8)
+    factor = matrix.factorise_any()[0]
+    x = without(factor, factor.solve(b), found.mode)
+    assert x == pytest.approx(Q[:, 1:] @ ((Q[:, 1:].T @ b) / stiffness[1:]), abs=1e-5)
+
+
+@pytest.mark.parametrize("stiffness", [-1e-5, -0.5])
+def test_soft_modes_are_no_neutral_ones(stiffness: float) -> None:
+    rng = np.random.default_rng(1)
+    Q = np.linalg.qr(rng.normal(size=(5, 5)))[0]
+    matrix = band(Q @ np.diag([stiffness, 1.0, 2.0, 3.0, 4.0]) @ Q.T)
+    assert neutral_mode(matrix, 5) is None
+    assert count_negative(matrix) == 1
+    assert count_negative(matrix, KNOWN_GAP) == (1 if stiffness < -KNOWN_GAP else 0)

@@ -97,6 +97,16 @@ def test_options_change_the_picture(path: bh.Path, tmp_path: Path, options: dict
 
 
 @needs_opengl
+def test_lines_without_a_length_are_no_fault() -> None:
+    """Two nodes that have met make a line that has no tube: nothing is drawn of it."""
+    import pyvista as pv
+
+    plotter = pv.Plotter(off_screen=True)
+    pictures._tubes(plotter, pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1]), 0.1)
+    assert not plotter.actors
+    plotter.close()
+
+
 def test_flat_sheet_has_no_colours(path: bh.Path, tmp_path: Path) -> None:
     image = pixels(plotting.picture(path[0], tmp_path / "flat.png", size=(240, 180)))
     assert np.ptp(image, axis=2).max() < 0.15

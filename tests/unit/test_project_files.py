@@ -121,7 +121,7 @@ def test_workflow_calls_what_ci_run_calls_and_needs_no_secret(workflow: dict[str
     commands = re.findall(r"^\t@\$\(PY\) -m ((?:ruff|mypy|pytest).*)$", makefile, re.MULTILINE)
     wanted = [command.replace(" $(PYTEST_ARGS)", "") for command in commands if "--cov" not in command]
     wanted = [command for command in wanted if "--fix" not in command and "benchmarks" not in command]
-    assert "pytest -n auto --maxprocesses=4" in wanted
+    assert "pytest -n auto --maxprocesses=4 --dist worksteal" in wanted
     for command in wanted:
         if command != "ruff format .":
             assert f".venv/Scripts/python -m {command}" in "\n".join(runs)
@@ -175,3 +175,25 @@ def test_no_test_looks_outside_the_repository() -> None:
         depth = len(file.relative_to(ROOT).parts) - 1
         for found in re.findall(r"parents\[(\d+)\]", file.read_text(encoding="utf-8")):
             assert int(found) <= depth, f"{file.name} leaves the repository"
+
+
+# --------------------------------------------------------------------------------------------------- addresses
+
+
+def made_up(urls: dict[str, str]) -> list[str]:
+    """Names of addresses that lead nowhere: not https, or of a domain that is reserved for examples (RFC 2606)."""
+    nowhere = re.compile(r"https://([^/]+\.)?(invalid|example|test|localhost|example\.(com|org|net))(/|$)")
+    return [name for name, url in urls.items() if not url.startswith("https://") or nowhere.match(url)]
+
+
+def test_no_address_is_made_up() -> None:
+    """What `pip show` and an index print as links opens, or is not there (docs/releasing.md)."""
+    assert made_up(PROJECT["project"].get("urls", {})) == []
+    assert made_up(
+        {"Source": "https://code.example/x", "Issues": "https://example.org", "Home": "docs/"}
+    ) == [
+        "Source",
+        "Issues",
+        "Home",
+    ]
+    assert made_up({"Source": "https://codeberg.org/name/project", "Docs": "https://protest.org/"}) == []

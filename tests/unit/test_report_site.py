@@ -23,6 +23,7 @@ from reports.claims import claims
 from reports.pdf import browser, print_report
 from reports.records import Case, CaseInfo, Check, Frames, Results, read, schema
 from tests.unit.test_report import Page, record, results, write
+from verification.framework import run as runner
 from verification.framework.cases import ALL_CASES
 from verification.framework.chapters import CHAPTERS, OTHER, chapter_of
 from verification.framework.run import RECORDS, run
@@ -275,13 +276,20 @@ def test_sheets_are_in_the_chapter(path: bh.Path, tmp_path: Path) -> None:
 # ------------------------------------------------------------------------------------------------- schemas
 
 
-def test_results_obey_their_schema(tmp_path: Path) -> None:
+def test_results_obey_their_schema(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is run, and a kept record beside it; all kept records are held against the schema below."""
+    kept = tmp_path / "records"
+    kept.mkdir()
+    shutil.copyfile(RECORDS / "problem_c.json", kept / "problem_c.json")
+    monkeypatch.setattr(runner, "RECORDS", kept)
     run(["shear_calibration", "derivatives"], tmp_path, quick=True)
     build(tmp_path, tmp_path / "report.html")
     stored = json.loads((tmp_path / "checks.schema.json").read_text(encoding="utf-8"))
     assert stored == schema(Results)
     jsonschema.Draft202012Validator.check_schema(stored)
-    jsonschema.validate(json.loads((tmp_path / "checks.json").read_text(encoding="utf-8")), stored)
+    results_ = json.loads((tmp_path / "checks.json").read_text(encoding="utf-8"))
+    assert {info["name"] for info in results_["cases"]} == {"shear_calibration", "derivatives", "problem_c"}
+    jsonschema.validate(results_, stored)
     with pytest.raises(jsonschema.ValidationError, match="'yes'"):
         jsonschema.validate({"checks": [record("a", "b", 1.0) | {"passed": "yes"}]}, stored)
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from verification.framework.richardson import limit
+from bh.analysis.richardson import limit
 
 
 @pytest.mark.parametrize("rate", [1.0, 2.0, 4.0])

@@ -296,7 +296,7 @@ def on_the_boundary() -> meshes.SheetMesh:
         ),
         (
             lambda: sheet().support("edge:inner", "xyz").displace("edge:inner", "z", 1.0),
-            ("node 0", "held and displaced along the same direction", "remove"),
+            ("node 0", "fixed and displaced along the same direction", "remove"),
         ),
         (
             lambda: (

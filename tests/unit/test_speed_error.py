@@ -11,10 +11,10 @@ import pytest
 
 import meshes
 from bh import trace
+from bh.analysis.richardson import fitted
 from verification.framework.checks import Context
 from verification.framework.measuring import measure
 from verification.framework.pareto import Trial, cheapest, front, rate
-from verification.framework.richardson import fitted
 from verification.studies.solver import speed_error
 from verification.studies.solver.speed_problems import PROBLEMS, curve
 

@@ -13,13 +13,13 @@ import pytest
 
 import bh
 import meshes
+from bh.analysis.alignment import aligned
 from bh.errors import ModelError, SceneError
 from bh.loading.symmetry import mirror
 from bh.mechanics.consistent.system import ConsistentSystem
 from bh.paths.path import Path
 from bh.scene.load import parse_scene
 from meshes.cells import Kind
-from verification.framework.alignment import aligned
 
 SHEET = bh.Sheet(E=4000.0, nu=0.3, t=0.127)
 SECTOR = meshes.annulus_sector(100.0, 10.0, math.pi / 2)

@@ -52,7 +52,9 @@ SLOW = {
     "fig5_11",
     "pinch_shell",
     "three_point",
-}  # over some five seconds on a slow machine
+    "appendix_b_shell",  # test_shell_convergence.py has the same figures
+    "shell_benchmarks",  # the same
+}  # over some five seconds on a slow machine; `bh verify` runs them all
 
 
 def check(**changes: Any) -> Check:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.formulations.remarks import Remark
 from bh.formulations.state import Energy, State
 from bh.loading.load_step import LoadStep
@@ -75,8 +76,10 @@ class BarsAndHinges:
         """Derivatives of a system by its element data at unknowns q (size,).
 
         Raises:
-            ModelError: bars measure Green's strain, of which there are none.
+            ModelError: bars measure Green's strain, of which there are none, or panels are in contact.
         """
+        if system.barrier is not None:
+            raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
         return BarHingeDerivatives(system, q, lam)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
@@ -96,6 +99,7 @@ class BarsAndHinges:
         e, mesh = system.elements, system.mesh
         x = system.positions(q, lam)
         _, _, f, forces, turn = system.internal_forces(x, q, lam)
+        contact = 0.0 if system.barrier is None else system.barrier.forces(x, f)
         phi = dihedral_angles(x, e.hinges)
         s_bar, s_hinge = forces[: len(e.bars)], forces[len(e.bars) :]
         stretch = 0.5 * s_bar**2 / np.maximum(e.bar_stiffness, 1e-300)
@@ -119,7 +123,8 @@ class BarsAndHinges:
         return State(
             mesh=mesh, step=step, lam=lam, points=x,
             energy=Energy(
-                float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum()), float(by_lock)
+                float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum()), float(by_lock),
+                contact,
             ),
             dihedral_angles=angles, energy_density=density, reactions=reactions,
             crease_moments=moments, stable=stable,

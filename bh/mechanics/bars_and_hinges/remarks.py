@@ -44,10 +44,10 @@ MEASURED: dict[str, dict[str, tuple[float, float]]] = {
         "mirrored": (58.0, 58.0),
     },
     "ring": {
-        "staggered": (4.1, 4.1),
-        "alternating": (3.7, 3.7),
-        "one-way": (5.2, 5.2),
-        "mirrored": (5.1, 5.1),
+        "staggered": (4.3, 4.3),
+        "alternating": (3.9, 3.9),
+        "one-way": (5.5, 5.5),
+        "mirrored": (5.4, 5.4),
     },
 }
 

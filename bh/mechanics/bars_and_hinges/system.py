@@ -131,6 +131,8 @@ class BarsAndHingesSystem(SupportedSheet):
         f -= load
         if self.rigid_contact is not None:
             energy += self.rigid_contact.forces(x, lam, f)
+        if self.barrier is not None:
+            energy += self.barrier.forces(x, f)
         residual = np.empty(self.size)
         residual[: self.primal] = self.displacements.components(f)
         gap = penalty = 0.0
@@ -143,7 +145,8 @@ class BarsAndHingesSystem(SupportedSheet):
             gap = 1e4 * max(float(np.abs(residual[self.primal :]).max()) - ROUNDING, 0.0)
             # the compliance is no excuse for an angle that is not met
             gap = max(gap, 10.0 * float(np.abs(missed).max()))
-        return Evaluation(energy, residual, self._imbalance(residual, size, load, x, gap), forces, penalty)
+        imbalance = self._imbalance(residual, size, load, x, gap) if energy < np.inf else np.inf
+        return Evaluation(energy, residual, imbalance, forces, penalty)
 
     def _imbalance(self, residual: Array, size: float, load: Array, x: Array, gap: float) -> float:
         largest = float(np.abs(residual[: self.primal]).max(initial=0.0))
@@ -199,9 +202,13 @@ class BarsAndHingesSystem(SupportedSheet):
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
-        e, pattern = self.elements, self._pattern
+        e = self.elements
         bars = len(e.bars)
         x = self.positions(q, lam)
+        touching = None if self.barrier is None else self.barrier.blocks(x)
+        if touching is not None and not self.contact_blocks.known(touching[0]):
+            vars(self).pop("_pattern", None)
+        pattern = self._pattern
         data = np.zeros(pattern.size)
         linear = Linearised(np.empty((bars, 3)), np.empty((len(e.hinges), 12)), np.empty(len(e.hinges)))
         tangent_values(
@@ -211,9 +218,13 @@ class BarsAndHingesSystem(SupportedSheet):
         )  # fmt: skip
         matrix: Matrix
         if self.rigid_contact is not None:
+            slots = pattern.slots[-1 if touching is None else -2]
             self.rigid_contact.tangent(
-                x, lam, self.constraints.frame_of, self.constraints.frames, pattern.slots[-1], data
+                x, lam, self.constraints.frame_of, self.constraints.frames, slots, data
             )
+        if touching is not None:
+            axes = (self.constraints.frame_of, self.constraints.frames)
+            self.contact_blocks.add(*touching, *axes, pattern.slots[-1], data)
         if self.constraints.rigid_body:
             Z = self.displacements.rigid(x)
             ground = self._ground(Z, data)
@@ -251,6 +262,8 @@ class BarsAndHingesSystem(SupportedSheet):
             out += self.tangent_times(x, moving, forces)
         if self.rigid_contact is not None:
             self.rigid_contact.force_rates(x, moving, lam, 1.0, out)
+        if self.barrier is not None:
+            out += self.barrier.times(x, moving)
         rate = np.empty(self.size)
         rate[: self.primal] = self.displacements.components(out)
         if e.prescribed:
@@ -269,6 +282,8 @@ class BarsAndHingesSystem(SupportedSheet):
         if self.rigid_contact is not None:
             total += self.rigid_contact.power(x, lam)
             self.rigid_contact.forces(x, lam, f)
+        if self.barrier is not None:
+            self.barrier.forces(x, f)
         return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
@@ -282,6 +297,8 @@ class BarsAndHingesSystem(SupportedSheet):
             out = self.tangent_times(x, moving, forces)
             g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
             turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
+            if self.barrier is not None:
+                out += self.barrier.times(x, moving)
             total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
             total += 2.0 * float((e.couple.rate - e.hinge_stiffness * e.rest.rate) @ turn)
         return total if self.rigid_contact is None else total + self.rigid_contact.control_stiffness(x, lam)
@@ -311,12 +328,14 @@ class BarsAndHingesSystem(SupportedSheet):
             groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
         if self.rigid_contact is not None:
             groups += (self.mesh.triangles,)
+        if self.barrier is not None:
+            groups += (self.contact_blocks.pairs,)
         number, groups = self.displacements.pattern_nodes(groups)
         return build_pattern(number, groups, self.reference)
 
     @cached_property
     def compliance(self) -> Array:
-        """Compliance of held creases, rad / (N mm): far below rounding of the angles at ordinary moments.
+        """Compliance of prescribed creases, rad / (N mm): far below rounding of the angles at ordinary moments.
 
         Where panels are rigid, a straight crease can carry moments that balance each other at no cost; it picks the
         smallest ones.
@@ -333,7 +352,7 @@ class BarsAndHingesSystem(SupportedSheet):
         return self.displacements.number[self.elements.hinges[-self.elements.prescribed :]].reshape(-1, 12)
 
     def _constraint_rows(self, turns: Array) -> ConstraintRows:
-        """Gradients of the held angles, in local axes, from those of all hinges (h, 12)."""
+        """Gradients of the prescribed angles, in local axes, from those of all hinges (h, 12)."""
         g = turns[-self.elements.prescribed :]
         if len(self.displacements.turned):
             index = self.constraints.frame_of[self.elements.hinges[-self.elements.prescribed :]]

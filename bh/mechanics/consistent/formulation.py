@@ -71,8 +71,10 @@ class Consistent:
         """Derivatives of a system by its element data at unknowns q (size,).
 
         Raises:
-            ModelError: the material is not linear.
+            ModelError: the material is not linear, or panels are in contact.
         """
+        if system.barrier is not None:
+            raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
         if not (system.elements.stretching.constant and system.elements.bending.constant):
             raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
         return ConsistentDerivatives(system, q, lam)
@@ -100,6 +102,7 @@ class Consistent:
         x = system.positions(q, lam)
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
+        contact = 0.0 if system.barrier is None else system.barrier.forces(x, now.f)
         stretching, bending = system.stretching_by_triangle(x), system.bending_by_triangle(now.theta)
         folding = 0.5 * e.spring_stiffness * now.turns**2
 
@@ -117,7 +120,7 @@ class Consistent:
         moments[prescribed] = (by_hinge / lengths)[prescribed]
         return State(
             mesh=mesh, step=step, lam=lam, points=x,
-            energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock),
+            energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact),
             dihedral_angles=angles,
             energy_density={
                 "stretching": stretching / mesh.areas,

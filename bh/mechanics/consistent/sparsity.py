@@ -16,7 +16,11 @@ from meshes.topology import Ints
 
 
 def rotation_pattern(
-    mesh: SheetMesh, e: ConsistentElements, displacements: Displacements, ground: int | None
+    mesh: SheetMesh,
+    e: ConsistentElements,
+    displacements: Displacements,
+    ground: int | None,
+    contact: Ints | None = None,
 ) -> Pattern:
     """Pattern of triangles, patches, spring creases, locks and the triangle `ground`, if there is one.
 
@@ -28,6 +32,7 @@ def rotation_pattern(
         e: its elements.
         displacements: their unknowns.
         ground: triangle that is held against rigid motions, or None.
+        contact: (p, 2) pairs of nodes in contact, whose slots come last, or None.
     """
     number, _ = displacements.pattern_nodes(())
     n, moving = len(number), int(number.max()) + 1
@@ -50,6 +55,8 @@ def rotation_pattern(
     groups: tuple[Ints, ...] = (mesh.triangles, patches, springs, hinges)
     if ground is not None:
         groups += (mesh.triangles[[ground]],)
+    if contact is not None:
+        groups += (contact,)
     pattern = build_pattern(table, displacements.pattern_nodes(groups)[1], places)
     triangles, wide, wide_springs, *rest = pattern.slots
     # of a rotation's three rows there only the first exists

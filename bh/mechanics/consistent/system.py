@@ -238,6 +238,8 @@ class ConsistentSystem(SupportedSheet):
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
         touched = 0.0 if self.rigid_contact is None else self.rigid_contact.forces(x, lam, now.f)
+        if self.barrier is not None:
+            touched += self.barrier.forces(x, now.f)
         energy = (
             now.stretching
             + now.bending
@@ -247,7 +249,8 @@ class ConsistentSystem(SupportedSheet):
             - float(np.vdot(load, x - self.mesh.points))
         )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
-        return Evaluation(energy, residual, self._imbalance(residual, now.size, load, x), now.forces)
+        imbalance = self._imbalance(residual, now.size, load, x) if energy < np.inf else np.inf
+        return Evaluation(energy, residual, imbalance, now.forces)
 
     def _imbalance(self, residual: Array, size: float, load: Array, x: Array) -> float:
         largest = float(np.abs(residual[: self.moving]).max(initial=0.0))
@@ -280,8 +283,12 @@ class ConsistentSystem(SupportedSheet):
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
-        e, joined, pattern = self.elements, self.elements.patches, self._pattern
+        e, joined = self.elements, self.elements.patches
         x = self.positions(q, lam)
+        touching = None if self.barrier is None else self.barrier.blocks(x)
+        if touching is not None and not self.contact_blocks.known(touching[0]):
+            vars(self).pop("_pattern", None)
+        pattern = self._pattern
         N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)
         axes = (self._frame_of, self.constraints.frames)
@@ -298,6 +305,8 @@ class ConsistentSystem(SupportedSheet):
         )
         if self.rigid_contact is not None:
             self.rigid_contact.tangent(x, lam, *axes, pattern.slots[0], data)
+        if touching is not None:
+            self.contact_blocks.add(*touching, *axes, pattern.slots[-1], data)
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
         matrix: Matrix = pattern.matrix(data)
@@ -327,7 +336,8 @@ class ConsistentSystem(SupportedSheet):
     @cached_property
     def _pattern(self) -> Pattern:
         ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
-        return rotation_pattern(self.mesh, self.elements, self.displacements, ground)
+        pairs = None if self.barrier is None else self.contact_blocks.pairs
+        return rotation_pattern(self.mesh, self.elements, self.displacements, ground, pairs)
 
     def _predicted_forces(self, x: Array, B: Array, closing: bool, forces: Array, dq: Array) -> Array:
         """Element forces after an increment dq (size,) from positions x with `forces`, linear in dq."""
@@ -393,6 +403,8 @@ class ConsistentSystem(SupportedSheet):
             closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
         if self.rigid_contact is not None:
             self.rigid_contact.force_rates(x, v, lam, 1.0, f)
+        if self.barrier is not None:
+            f += self.barrier.times(x, v)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         return f, r, second
 
@@ -417,6 +429,8 @@ class ConsistentSystem(SupportedSheet):
         if self.rigid_contact is not None:
             total += self.rigid_contact.power(x, lam)
             self.rigid_contact.forces(x, lam, now.f)
+        if self.barrier is not None:
+            self.barrier.forces(x, now.f)
         unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
 from bh.mechanics.shared import penetration as hinge_penetration
@@ -22,6 +23,7 @@ from meshes import SheetMesh
 
 if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
+    from bh.mechanics.contact.barrier import SheetBarrier
 
 Array = NDArray[np.float64]
 
@@ -62,9 +64,38 @@ class SupportedSheet:
         self.moving = len(self.displacements.free)
         if self.constraints.rigid_body:
             self.displacements.check_balance(self.force)
+        self.barrier: SheetBarrier | None = None
+        if model.contact is not False:
+            if plane is not None:
+                raise ModelError("contact is solved on the whole sheet; leave out symmetry, or contact")
+            from bh.mechanics.contact.barrier import ContactBlocks, sheet_barrier
+
+            self.barrier, self.contact_blocks = sheet_barrier(model), ContactBlocks()
+            self._check_start(start_points)
         self.rigid_contact = (
             RigidContact(self.mesh, load_step.bodies, start_points) if load_step.bodies else None
         )
+
+    def _check_start(self, x: Array) -> None:
+        """Raises `ModelError` where the step begins with a sheet that passes through itself."""
+        if self.barrier is not None and not self.barrier.clear(x):
+            met = self.barrier.meetings(x)
+            raise ModelError(f"contact: the first state meets itself ({met}); begin with panels apart")
+
+    def _passed(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
+        """Whether panels in contact would pass through each other on the straight way between two states."""
+        if self.barrier is None:
+            return ""
+        x, x_new = self.positions(q, lam), self.positions(q_new, lam_new)
+        if self.barrier.clear(x_new) and self.barrier.free_part(x, x_new) >= 1.0:
+            return ""
+        return "panels would pass through each other on the straight way there"
+
+    def free_part(self, q: Array, dq: Array, lam: float) -> float:
+        """How much of a step dq (size,) from q no panels stand in, 0 to 1; see `bh.solvers.system.Limited`."""
+        if self.barrier is None:
+            return 1.0
+        return self.barrier.free_part(self.positions(q, lam), self.positions(q + dq, lam))
 
     @property
     def rotation(self) -> float:
@@ -96,12 +127,20 @@ class SupportedSheet:
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Why an increment between two states is not to be trusted, or an empty string."""
+        if passed := self._passed(q, lam, q_new, lam_new):
+            return passed
         asked = np.where(self.load_step.law == SHEET, 0.0, self.rotation * abs(lam_new - lam))
         return hinge_penetration.objection(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new), asked)
 
     def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Which panels passed through each other between two states, or an empty string."""
+        if passed := self._passed(q, lam, q_new, lam_new):
+            return passed
         return hinge_penetration.penetration(self.mesh, self.angles(q, lam), self.angles(q_new, lam_new))
+
+    def left_to_close(self, q: Array, q_new: Array, lam: float) -> float:
+        """Least part of its way to closed that a hinge is left with, of those in the zone of the locks; 1 for none."""
+        return hinge_penetration.left_to_close(self.angles(q, lam), self.angles(q_new, lam))
 
     def contact(self, q: Array, lam: float) -> str:
         """Which panels have met at a hinge that is not prescribed, or an empty string.

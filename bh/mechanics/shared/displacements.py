@@ -126,8 +126,8 @@ class Displacements:
         """The triangle that carries the stiffness against rigid motions: in the middle, without supports of its own."""
         centres = self.reference[self.mesh.triangles].mean(axis=1)
         distance = np.linalg.norm(centres - self.reference.mean(axis=0), axis=1)
-        held = (self.number[self.mesh.triangles] < 0).sum(axis=(1, 2))
-        return int(np.lexsort((distance, held))[0])
+        supported = (self.number[self.mesh.triangles] < 0).sum(axis=(1, 2))
+        return int(np.lexsort((distance, supported))[0])
 
     @cached_property
     def ground_numbers(self) -> Ints:

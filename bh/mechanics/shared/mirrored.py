@@ -126,8 +126,8 @@ class MirroredDisplacements(Displacements):
         """The triangle against rigid motions: of those that lie in the half, as in a whole sheet."""
         centres = self.reference[self.mesh.triangles].mean(axis=1)
         distance = np.linalg.norm(centres - self.reference.mean(axis=0), axis=1)
-        held = (self.number[self.mesh.triangles] < 0).sum(axis=(1, 2))
-        return int(np.lexsort((distance, held, self.plane.triangle_weight < 1.0))[0])
+        supported = (self.number[self.mesh.triangles] < 0).sum(axis=(1, 2))
+        return int(np.lexsort((distance, supported, self.plane.triangle_weight < 1.0))[0])
 
 
 def _reflected(c: Constraints, plane: Mirror) -> Constraints:

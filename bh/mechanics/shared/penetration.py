@@ -117,6 +117,20 @@ def objection(mesh: SheetMesh, before: Array, after: Array, asked: Array) -> str
     return penetration(mesh, before, after) or far
 
 
+def left_to_close(before: Array, after: Array) -> float:
+    """Least part of its way to closed that a hinge is left with, of those that end in the zone of the locks; else 1.
+
+    A way that began outside the zone counts from its edge.
+
+    Args:
+        before: (m,) dihedral angles, rad.
+        after: (m,) dihedral angles, rad.
+    """
+    left = np.minimum(after, 2.0 * np.pi - after)
+    had = np.minimum(np.minimum(before, 2.0 * np.pi - before), ZONE)
+    return float((left / np.maximum(had, 1e-300)).min(initial=1.0, where=left < ZONE))
+
+
 def panels_in_contact(mesh: SheetMesh, angles: Array, reference: Array, asked: NDArray[np.bool_]) -> str:
     """Which panels have met at a hinge (within the zone of closed), or an empty string.
 

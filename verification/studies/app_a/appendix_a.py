@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Model, Sheet, trace
+from bh.analysis.alignment import aligned
 from bh.analysis.creases import along, panel_generators
 from bh.analysis.isometric import (
     FoldedCrease,
@@ -22,7 +23,6 @@ from bh.analysis.isometric import (
     relax,
 )
 from bh.solvers.outcome import Outcome
-from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.theory import cone
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.analysis.alignment import aligned, hausdorff
 from fem.state import ShellState
 from meshes.cells import Kind
-from verification.framework.alignment import aligned, hausdorff
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.studies.app_b.shell_folding import ACTUATIONS, ANGLE, Solved, solve
 

@@ -74,10 +74,10 @@ def on_grid(state: State, along: int, rows: int) -> Grid:
     shape = (2 * rows, along)
     cell = np.ravel_multi_index((np.clip(row, 0, shape[0] - 1), np.clip(column, 0, along - 1)), shape)
     weight = np.bincount(cell, mesh.areas, minlength=shape[0] * shape[1])
-    held = {kind: mesh.areas * state.energy_density[kind] for kind in KINDS}
+    stored = {kind: mesh.areas * state.energy_density[kind] for kind in KINDS}
     density = {
         kind: (np.bincount(cell, energy, minlength=len(weight)) / weight).reshape(shape)
-        for kind, energy in held.items()
+        for kind, energy in stored.items()
     }
     r = INNER + height * (np.arange(shape[0], dtype=float) + 0.5)
     theta = width * (np.arange(along, dtype=float) + 0.5)
@@ -125,10 +125,10 @@ def _checks(
     crease = np.abs(grid.r - CREASE) < NEAR
     edges = (grid.r - INNER < NEAR) | (OUTER - grid.r < NEAR)
     for kind, name in KINDS.items():
-        held = float((grid.density[kind] * grid.area).sum())
+        stored = float((grid.density[kind] * grid.area).sum())
         check(
             f"{name} energy of the field",
-            held,
+            stored,
             unit="N mm",
             reference=getattr(solved.state.energy, kind),
             source="the state's own total; cells are sectors, triangles flat-edged",

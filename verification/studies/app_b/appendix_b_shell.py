@@ -11,9 +11,9 @@ import numpy as np
 
 import meshes
 from bh import Model
+from bh.analysis.richardson import limit
 from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
-from verification.framework.richardson import limit
 from verification.studies.app_b import appendix_b
 from verification.studies.app_b.shell_folding import (
     ACTUATIONS,

@@ -142,14 +142,14 @@ def _energies(result: CaseResult, angle: float, found: Found) -> None:
     for mesh, item in found.items():
         params = mesh.params(angle)
         # the source's word on its own meshes: judged at the first aspect ratio beyond the one it names
-        said = 0.10 if (mesh.formulation, mesh.kind, mesh.alpha) == (BARS, "alternating", 8.0) else None
+        printed = 0.10 if (mesh.formulation, mesh.kind, mesh.alpha) == (BARS, "alternating", 8.0) else None
         result.check(
             "energy over that of the cones",
             item.ratio,
             unit="U / U_Th",
             reference=1.0,
             source=SOURCE + ": within 10 % above alpha = 7",
-            tolerance=said,
+            tolerance=printed,
             params=params,
             path=item.path,
         )

@@ -40,7 +40,7 @@ def run(context: Context) -> CaseResult:
             2 * along,
             "Half an annulus, its crease a spring that wants 90 degrees",
         ),
-        ("pleats", pleats, _exactly, along, "Five pleats, folded by 90 degrees"),
+        ("pleats", pleats, _exactly, 3 * along // 2, "Five pleats, folded by 90 degrees"),
     ):
         params = {"sheet": name, "along": cells}
 

@@ -51,8 +51,8 @@ def bent(formulation: str, along: int, rows: int) -> Bent:
 
 def against_shell(result: CaseResult, quick: bool) -> None:
     """Checks of depth, energy and deflection."""
-    judge = bent("shell", 24, 2)
-    finest = ("consistent", 36, 3) if quick else ("consistent", 48, 4)
+    judge = bent("shell", 24, 2) if quick else bent("shell", 48, 4)
+    finest = ("consistent", 36, 3) if quick else ("consistent", 96, 8)
     for formulation, along, rows in (("consistent", 32, 2), finest, ("bars-and-hinges", 32, 2)):
         found = bent(formulation, along, rows)
         params: dict[str, Any] = {

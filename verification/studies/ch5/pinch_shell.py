@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 import bh
+from bh.analysis.alignment import aligned
 from bh.applications.inverse.transforms import frame
 from meshes.curves import arc_lengths
-from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Context, line, plot
 from verification.studies.ch5.pinching import AS_SOURCE, CONVERGED, Pinched, Stiffness, Way, pinched
 
@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 SHEETS = ((1, 0.005), (1, 0.01), (1, 0.02), (2, 0.01))  # creases, kappa_0 in 1/mm
 SHELL = Way("shell", "shell", "cosine", CONVERGED.zone, ((50, 1), (50, 2), (100, 2)))
 BARS = Way("bars and hinges", "bars-and-hinges", "cosine", CONVERGED.zone, ((100, 1), (200, 2)))
-CONSISTENT = Way("consistent", "consistent", "cosine", CONVERGED.zone, ((50, 1), (100, 2), (200, 4)))
+CONSISTENT = Way(
+    "consistent", "consistent", "cosine", CONVERGED.zone, ((50, 1), (100, 2), (200, 4), (400, 8))
+)
 SEGMENTS, THIN = (0.005, 0.015), Stiffness(bh.Sheet(E=4000.0, t=0.1), Lstar=0.5)
 SMALL = 1.0  # degrees of twist that is left where bend and torsion turn the end to opposite sides
 OFF = 8.0  # mm at either end where finite differences are not to be used

@@ -16,13 +16,13 @@ import numpy as np
 
 import meshes
 from bh import Path, trace
+from bh.analysis.alignment import aligned
+from bh.analysis.richardson import fitted
 from bh.solvers.outcome import Outcome
 from meshes.cells import Kind
-from verification.framework.alignment import aligned
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.framework.measuring import REPEATS, measure
 from verification.framework.pareto import Trial, cheapest, front, rate
-from verification.framework.richardson import fitted
 from verification.framework.store import Store
 from verification.studies.solver.speed_problems import PROBLEMS, Problem, curve
 

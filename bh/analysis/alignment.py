@@ -12,6 +12,10 @@ Array = NDArray[np.float64]
 def aligned(points: Array, onto: Array) -> tuple[Array, Rotation, Array]:
     """The points (n, 3) moved rigidly onto as many others in the sense of least squares (Kabsch 1976).
 
+    Args:
+        points: (n, 3) to be moved.
+        onto: (n, 3) where they should lie.
+
     Returns:
         the moved points, the rotation R and the shift s: moved = R points + s. A proper rotation: no reflection.
     """
@@ -25,6 +29,11 @@ def hausdorff(one: Array, two: Array, dense: int = 8) -> float:
     """Hausdorff distance of two polylines (n, 3) and (m, 3): how far a point of either is at most from the other.
 
     Each is measured at its corners and at `dense` - 1 points between them, from the other's segments exactly.
+
+    Args:
+        one: (n, 3) corners of a polyline.
+        two: (m, 3) of another.
+        dense: parts that each segment is measured in.
     """
     return max(_farthest(_resampled(one, dense), two), _farthest(_resampled(two, dense), one))
 

@@ -1,0 +1,98 @@
+"""`bh compare`: one scene by every formulation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bh.runtime.terminal import say
+
+if TYPE_CHECKING:
+    from bh.applications.comparison import Comparison, Stiff
+
+
+def compare(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).")],
+    formulations: Annotated[
+        list[str] | None,
+        typer.Option("--formulation", metavar="NAME", help="One of them, as often as wanted; default all."),
+    ] = None,
+    stiffness: Annotated[
+        str | None,
+        typer.Option("--stiffness", metavar="PLACE:AXIS", help="Also compare it: corner:outer-end:z."),
+    ] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Set a key: sheet.t=0.2, steps[0].fold.to=60deg."),
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures to a JSON file.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Draw the differences: PNG, SVG or PDF."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+) -> None:
+    """Solve a scene by every formulation on one mesh, and compare."""
+    import json
+
+    from bh.applications import comparison
+    from bh.scene.load import load_scene
+    from meshes.io.export import replacing
+
+    _check(picture)
+    loaded = load_scene(scene, changes or ())
+    wanted = None if stiffness is None else _stiffness(stiffness)
+    found = comparison.compare(
+        loaded.model,
+        formulations=formulations or (),
+        accuracy=loaded.accuracy,
+        symmetry=loaded.symmetry,
+        stiffness=wanted,
+        progress=not quiet,
+    )
+    if not quiet:
+        for line in comparison.lines(found):
+            say(line)
+    if json_file is not None:
+        with replacing(json_file) as draft:
+            draft.write_text(json.dumps(found.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    if picture is not None:
+        _draw(found, picture)
+    for file in (json_file, picture):
+        if file is not None and not quiet:
+            say(f"wrote {file}")
+    missing = [member.formulation for member in found.members if not member.reached]
+    if missing:
+        say(f"bh: {scene}: not reached by {', '.join(missing)}", err=True)
+        raise typer.Exit(1)
+
+
+def _stiffness(text: str) -> Stiff:
+    from bh.applications.comparison import Stiff
+    from bh.errors import InputError
+    from bh.model.supports import AXES
+
+    place, _, axis = text.rpartition(":")
+    if not place or axis not in AXES:
+        raise InputError(f"--stiffness {text} is no place and axis; write it as corner:outer-end:z")
+    return Stiff(place, AXES[axis])
+
+
+def _check(file: Path | None) -> None:
+    from bh.errors import InputError
+
+    if file is not None and file.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise InputError(f"picture '{file}' is no .png, .svg or .pdf file; name it so")
+
+
+def _draw(found: Comparison, file: Path) -> None:
+    from bh.applications.comparison import picture
+    from meshes.io.export import replacing
+
+    figure = picture(found)
+    with replacing(file) as draft:
+        figure.savefig(draft, format=file.suffix.lower()[1:], dpi=150)

@@ -1,0 +1,82 @@
+"""Limits on what a file may ask for, checked before time or memory is taken. The one place where they are written.
+
+Within them everything that is refused is refused within seconds; what is larger and meant is let in by a variable of
+the environment for each limit, such as BH_LIMIT_CREASES=5000 (worker processes inherit it).
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields
+
+from meshes.errors import InputError
+
+PREFIX = "BH_LIMIT_"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a pattern, a mesh and a drawing may have at the most.
+
+    Attributes:
+        creases: of a pattern of the library, side by side.
+        pieces: of a crease that is made of arcs.
+        steps: load steps of a scene.
+        triangles: of a mesh; a million of them take some gigabytes to solve.
+        entities: of a drawing's file, every <use> and block written out, and rows of a .cp file.
+        lines: of a drawing, without those that are ignored.
+        vertices: of a drawing's lines, once curves are chords; numbers of its paths, values of a DXF file.
+        crossings: of a drawing's lines where none has a node.
+        control_points: of one spline.
+        megabytes: of a drawing's file, unpacked.
+    """
+
+    creases: int = 1_000
+    pieces: int = 1_000
+    steps: int = 1_000
+    triangles: int = 1_000_000
+    entities: int = 20_000
+    lines: int = 5_000
+    vertices: int = 100_000
+    crossings: int = 5_000
+    control_points: int = 2_000
+    megabytes: int = 32
+
+
+def limits() -> Limits:
+    """The limits that hold in this process.
+
+    Raises:
+        InputError: a variable of the environment that is no whole number from 1.
+    """
+    return Limits(**{field.name: _limit(field.name) for field in fields(Limits)})
+
+
+def _limit(name: str) -> int:
+    word = os.environ.get(PREFIX + name.upper(), "").strip()
+    if not word:
+        return int(getattr(Limits, name))
+    if not word.isdecimal() or len(word) > 18 or int(word) < 1:
+        raise InputError(f"{PREFIX}{name.upper()} = {word[:40]!r} cannot be; give a whole number from 1")
+    return int(word)
+
+
+def check_limit(name: str, count: float, what: str, error: type[InputError]) -> None:
+    """Refuse what is more than its limit.
+
+    Args:
+        name: of the limit, a field of `Limits`.
+        count: how many there are, or would be.
+        what: what would have so many, for the message: "this pattern".
+        error: the kind of error to raise.
+
+    Raises:
+        InputError: of the kind `error`, if there are more.
+    """
+    most = _limit(name)
+    if count > most:
+        some = f"{count:,.0f}" if count < 1e6 else f"some {count:.2g}"
+        raise error(
+            f"{what} has {some} {name.replace('_', ' ')}, more than {most:,}; ask for fewer, or raise the limit: "
+            f"{PREFIX}{name.upper()}=..."
+        )

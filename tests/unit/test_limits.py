@@ -1,0 +1,210 @@
+"""Bombs: small files that ask for much get one line before time or memory is taken, and the limit can be raised."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ezdxf.filemanagement import new
+
+import bh
+import meshes
+from meshes.errors import InputError
+from meshes.io import read_fold, read_pattern
+from meshes.limits import Limits, limits
+
+REST = """
+[sheet]
+E = 4000.0
+t = 0.2
+"""
+STEP = """
+[[steps]]
+fold = { crease = "all", by = 0.3, Lstar = 40.0 }
+"""
+ANNULUS = '[pattern]\nkind = "annulus_sector"\nradius = {}\nwidth = 10.0\nangle = 1.0\n'
+PAGE = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="100mm" viewBox="0 0 100 100">'
+    '<rect width="100" height="100" fill="none" stroke="black"/>{}</svg>'
+)
+
+
+def scene(pattern: str, mesh: str = "along = 8", steps: int = 1) -> str:
+    return f"{pattern}\n[mesh]\n{mesh}\n{REST}{STEP * steps}"
+
+
+SCENES = {
+    "radii": (scene(ANNULUS.format([20.0 + i for i in range(5_000)])), "5,000 creases, more than 1,000"),
+    "heights": (
+        scene(
+            '[pattern]\nkind = "strip"\nlength = 9.0\nwidth = 9.0\n'
+            f"creases = {[9.0 * (i + 1) / 5_002 for i in range(5_000)]}"
+        ),
+        "5,000 creases, more than 1,000",
+    ),
+    "pieces": (
+        scene(
+            f'[pattern]\nkind = "parallel_creases"\ncurvature = {[1e-4] * 9_000}\nlength = {[0.01] * 9_000}'
+        ),
+        "9,000 pieces, more than 1,000",
+    ),
+    "along": (scene(ANNULUS.format(40.0), "along = 999999"), "some 4e+06 triangles, more than 1,000,000"),
+    "rows": (scene(ANNULUS.format(40.0), "along = 600\nrows = 999"), "some 2.4e+06 triangles"),
+    "aspect": (
+        scene(ANNULUS.format(40.0), "aspect_ratio = 1e4\nrows = 99"),
+        "triangles, more than 1,000,000",
+    ),
+    "size": (scene(ANNULUS.format(40.0), 'kind = "gmsh"\nsize = 1e-4'), "triangles, more than 1,000,000"),
+    "near": (
+        scene(ANNULUS.format(40.0), 'kind = "gmsh"\nsize = 5.0\nnear = { "crease:crease" = 1e-6 }'),
+        "triangles, more than 1,000,000",
+    ),
+    "steps": (scene(ANNULUS.format(40.0), steps=2_000), "2,000 steps, more than 1,000"),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scenes_that_ask_for_too_much_are_refused_at_once(tmp_path: Path, name: str) -> None:
+    text, words = SCENES[name]
+    file = tmp_path / "bomb.toml"
+    file.write_text(text, encoding="utf-8")
+    began = time.process_time()
+    with pytest.raises(InputError) as refusal:
+        bh.load_scene(file)
+    assert time.process_time() - began < 5.0
+    line = str(refusal.value)
+    assert words in line
+    assert "BH_LIMIT_" in line
+    assert "\n" not in line
+
+
+def lines(*ends: tuple[float, float, float, float]) -> str:
+    return "".join(f'<line x1="{a}" y1="{b}" x2="{c}" y2="{d}" stroke="red"/>' for a, b, c, d in ends)
+
+
+def wave(count: int) -> str:
+    return " ".join(f"{1.0 + 98.0 * i / count:.4f},{50.0 + (i % 7):.1f}" for i in range(count))
+
+
+# name: (what is drawn, words of the refusal)
+DRAWINGS = {
+    "entities": ("<g/>" * 250, "more than 200"),
+    "lines": (lines(*((1.0, 1.0 + i, 2.0, 1.0 + i) for i in range(60))), "61 lines, more than 50"),
+    "crossings": (
+        lines(*((0, i, 100, i) for i in range(1, 21)), *((i, 0, i, 100) for i in range(1, 21))),
+        "crossings, more than 300",
+    ),
+    "points": (f'<polyline fill="none" stroke="red" points="{wave(25_000)}"/>', "more than 2,000"),
+    "chords": (
+        '<path fill="none" stroke="red" d="M 1 1 ' + "C 90 1 1 90 90 90 C 1 90 90 1 1 1 " * 30 + '"/>',
+        "vertices, more than 2,000",
+    ),
+}
+LOWER = {"ENTITIES": "200", "LINES": "50", "CROSSINGS": "300", "VERTICES": "2000"}
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_drawings_that_hold_too_much_are_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Limits are lowered here, so that the drawings are small; `bh verify attack` takes the whole ones."""
+    drawn, words = DRAWINGS[name]
+    for limit, value in LOWER.items():
+        monkeypatch.setenv(f"BH_LIMIT_{limit}", value)
+    file = tmp_path / "bomb.svg"
+    file.write_text(PAGE.format(drawn), encoding="utf-8")
+    began = time.process_time()
+    with pytest.raises(InputError) as refusal:
+        read_pattern(file)
+    assert time.process_time() - began < 5.0
+    assert words in str(refusal.value)
+    assert "BH_LIMIT_" in str(refusal.value)
+
+
+def test_arrays_and_splines_of_dxf_are_counted_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BH_LIMIT_ENTITIES", "2000")
+    array = new()
+    array.blocks.new("empty")
+    many = {"row_count": 30_000, "column_count": 30_000, "row_spacing": 1, "column_spacing": 1}
+    array.modelspace().add_blockref("empty", (0, 0), dxfattribs=many)
+    spline = new()
+    spline.modelspace().add_open_spline([(i, i % 5) for i in range(3_000)])
+    crowd = new()
+    for i in range(3_000):
+        crowd.modelspace().add_line((0, i), (1, i))
+    nested = new()
+    nested.blocks.new("b0")  # with nothing in it: no line ever comes out
+    for level in range(1, 40):
+        block = nested.blocks.new(f"b{level}")
+        for x in (0, 1):
+            block.add_blockref(f"b{level - 1}", (x, 0))
+    nested.modelspace().add_blockref("b39", (0, 0))
+    bombs = ((array, "entities"), (spline, "control points"), (crowd, "entities"), (nested, "entities"))
+    for drawing, words in bombs:
+        file = tmp_path / "bomb.dxf"
+        drawing.saveas(file)
+        began = time.process_time()
+        with pytest.raises(InputError, match=f"{words}, more than"):
+            read_pattern(file)
+        assert time.process_time() - began < 5.0
+
+
+def test_rows_of_a_cp_file_are_counted_first(tmp_path: Path) -> None:
+    file = tmp_path / "bomb.cp"
+    file.write_text("2 0 0 1 1\n" * 30_000, encoding="utf-8")
+    with pytest.raises(InputError, match="30,000 entities, more than 20,000"):
+        read_pattern(file)
+
+
+def test_limits_are_raised_and_lowered_by_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert limits() == Limits()
+    monkeypatch.setenv("BH_LIMIT_CREASES", "2")
+    with pytest.raises(InputError, match="3 creases, more than 2"):
+        meshes.annulus_sector([40.0, 50.0, 60.0], 5.0, 1.0)
+    monkeypatch.setenv("BH_LIMIT_CREASES", "3")
+    assert len(meshes.annulus_sector([40.0, 50.0, 60.0], 5.0, 1.0).creases) == 3
+    for word in ("no", "0", "-1", "1e3", "9" * 30):
+        monkeypatch.setenv("BH_LIMIT_CREASES", word)
+        with pytest.raises(InputError, match=r"BH_LIMIT_CREASES = .* cannot be; give a whole number from 1"):
+            limits()
+
+
+def test_a_graded_mesh_has_as_many_triangles_as_expected() -> None:
+    """The estimate that near = ... is refused by is within a factor of two of what gmsh makes."""
+    from meshes.unstructured import _expected, _sizes
+
+    pattern = meshes.annulus_sector(40.0, 10.0, 1.0)
+    near = {"crease:crease": 0.1}
+    curves = {f"crease:{crease.name}": crease.curve for crease in pattern.creases}
+    expected = _expected(pattern, curves, _sizes(curves, 5.0, near, 0.3))
+    made = len(meshes.unstructured(pattern, size=5.0, near=near).triangles)
+    assert 0.5 * made < expected < 2.0 * made
+
+
+def test_scribbles_are_refused_before_anything_is_made_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dashes are joined, and vertices looked for on edges, in times that grow with the square of their number."""
+
+    def never(*_: object) -> None:
+        raise AssertionError("the scribble was worked on")
+
+    monkeypatch.setattr("meshes.io.drawing.join_dashes", never)
+    random = np.random.default_rng(1)
+    ends = random.uniform(1.0, 99.0, (300, 4)).round(3)
+    drawing = tmp_path / "scribble.svg"
+    drawing.write_text(PAGE.format(lines(*map(tuple, ends.tolist()))), encoding="utf-8")
+    frame = tmp_path / "scribble.fold"
+    points = ends.reshape(-1, 2).tolist()
+    edges = [[2 * i, 2 * i + 1] for i in range(300)]
+    frame.write_text(
+        json.dumps({"vertices_coords": points, "edges_vertices": edges, "edges_assignment": ["V"] * 300}),
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match="crossings, more than 5,000"):
+        read_pattern(drawing)
+    with pytest.raises(InputError, match="crossings, more than 5,000"):
+        read_fold(frame)
