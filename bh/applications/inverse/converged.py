@@ -82,7 +82,11 @@ class Converged:
             raise DesignError(f"the data set is incomplete ({error}); {ANEW}") from error
 
     def sector_bound(self, length: ArrayLike) -> Array:
-        """Curvature before folding at which the sector is as large as it may be, 1/mm, of the shape of `length`."""
+        """Curvature before folding at which the sector is as large as it may be, 1/mm.
+
+        Returns:
+            of the shape of `length` (mm).
+        """
         bound = self.domain.sector * math.sin(0.5 * self.setting.fold)
         return np.asarray(bound / np.asarray(length, dtype=float))
 
@@ -106,7 +110,14 @@ class Converged:
         return t, r
 
     def curvature(self, k0: ArrayLike) -> Array:
-        """Curvature of folded arcs, 1/mm, of the shape of `k0` (before folding, 1/mm)."""
+        """Curvature of folded arcs, 1/mm.
+
+        Args:
+            k0: (...) before folding, 1/mm.
+
+        Returns:
+            of the shape of `k0`.
+        """
         return np.asarray(self._at("arc", np.asarray(k0, dtype=float))[..., 5])
 
     def _at(self, name: str, *k0: Array) -> Array:
@@ -163,6 +174,9 @@ class Converged:
         Args:
             k0: (..., n) curvatures before folding, 1/mm.
             length: (..., n), mm.
+
+        Returns:
+            (..., n + 1, 3) points, mm, and (..., n + 1, 3, 3) frames.
         """
         return self.forward(k0, length, np.zeros(np.shape(k0), dtype=bool), check=False)
 

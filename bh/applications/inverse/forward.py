@@ -44,6 +44,9 @@ class Forward(Protocol):
         Args:
             k0: (..., n) curvatures before folding, 1/mm.
             length: (..., n), mm.
+
+        Returns:
+            (..., n + 1, 3) points, mm, and (..., n + 1, 3, 3) frames.
         """
         ...
 

@@ -3,8 +3,8 @@
 Arguments are curvatures over the largest, in [-1, 1]; values are vectors of motions (..., 6). A level is interpolated
 as the level before plus a polynomial through the differences, which are smoother than the values: so it may have fewer
 points. Errors of the formulation go with the square of the width of the cells once the layers along the crease and the
-edges are resolved, so the limit is f + (f - f') / 3 of the last two levels. Its error bar is all of what is added there, and the distance to
-the limit that the levels before the last would have given.
+edges are resolved, so the limit is f + (f - f') / 3 of the last two levels. Its error bar is all of what is added
+there, and the distance to the limit that the levels before the last would have given.
 """
 
 from __future__ import annotations
@@ -100,9 +100,7 @@ class Limit:
             fine + (fine + coarse.times(-1.0)).times(1.0 / 3.0)
             for coarse, fine in ((levels[-2], levels[-1]), (levels[-3], levels[-2]))
         )
-        return cls(
-            tuple(levels), last, (last + levels[-1].times(-1.0), last + other.times(-1.0))
-        )
+        return cls(tuple(levels), last, (last + levels[-1].times(-1.0), last + other.times(-1.0)))
 
     def bar(self, *x: Array) -> Array:
         """(..., 6) error bars at one or two arguments (...) in [-1, 1], not negative."""

@@ -71,6 +71,9 @@ def then(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Array
     Args:
         first: translations (..., 3), mm, and rotations (..., 3, 3).
         second: the same.
+
+    Returns:
+        its translation, mm, and rotation.
     """
     t, r = first
     moved: Array = t + (r @ second[0][..., None])[..., 0]
@@ -82,6 +85,9 @@ def inverse(motion: tuple[Array, Array]) -> tuple[Array, Array]:
 
     Args:
         motion: translations (..., 3), mm, and rotations (..., 3, 3).
+
+    Returns:
+        its translation, mm, and rotation.
     """
     t, r = motion
     back = np.swapaxes(r, -1, -2)

@@ -232,7 +232,9 @@ class Reach:
                 best = reached
             if best.missed_simulated <= self.aim and best.missed_at_most <= self.tolerance:
                 break
-            if np.linalg.norm(landing.end - end) < SAME:  # the chain was right: its nearest design is this one
+            if (
+                np.linalg.norm(landing.end - end) < SAME
+            ):  # the chain was right: its nearest design is this one
                 break
             problem = replace(problem, target=problem.target + point - landing.end)
             found = polish(problem, found.x, found.on)

@@ -84,14 +84,12 @@ def solve(file: Path, quick: bool, pool: int | None = None) -> Any:
 
 
 def drawn(count: int, seed: int = 19) -> list[tuple[float, float, bool]]:
-    """Segments at random in the domain, three of four pinched: curvature before folding (1/mm), length (mm), pinched."""
+    """Segments at random in the domain, three of four pinched: k0 before folding (1/mm), length (mm), pinched."""
     rng, domain = np.random.default_rng(seed), model().domain
     found = []
     for i in range(count):
         length = float(rng.uniform(*domain.length))
-        found.append(
-            (float(rng.uniform(-1.0, 1.0) * domain.largest_curvature(length)), length, i % 4 != 3)
-        )
+        found.append((float(rng.uniform(-1.0, 1.0) * domain.largest_curvature(length)), length, i % 4 != 3))
     return found
 
 
