@@ -21,7 +21,7 @@ from bh.applications.inverse.models import Name, model, read
 from bh.applications.inverse.problems import CURVES, Design
 from bh.applications.inverse.reach import Library, Reach
 from bh.applications.inverse.segments import DesignError
-from bh.applications.inverse.simulate import Simulated
+from bh.applications.inverse.simulate import Landing, Simulated
 from bh.errors import InputError
 from bh.paths.provenance import versions
 from bh.runtime.terminal import say
@@ -76,7 +76,7 @@ class Answer:
 
     Attributes:
         design: crease and pinches.
-        strip: the simulated strip.
+        landing: of the simulated strip.
         measure: name, value and unit of what was asked for, by the surrogate and by the simulation of the
             strip.
         goal: (k, 3) point or curve to be drawn beside it, mm.
@@ -86,12 +86,17 @@ class Answer:
     """
 
     design: Design
-    strip: Simulated
+    landing: Landing
     measure: dict[str, tuple[float, str]]
     goal: Array
     surrogate: Forward
     point: bool = False
     verdict: Verdict | None = None
+
+    @property
+    def strip(self) -> Simulated:
+        """The strip on the mesh on which it was simulated."""
+        return self.landing.strip
 
     def judged(self) -> Answer:
         """With the shell's word on it.
@@ -150,16 +155,16 @@ def _point(point: list[float], search: SearchTable, surrogate: Forward) -> Answe
         "clears itself in space": (float(found.clear), "1 yes, 0 no"),
     }
     goal = np.array([point], dtype=float)
-    return Answer(found.design, found.landing.strip, measure, goal, surrogate, point=True)
+    return Answer(found.design, found.landing, measure, goal, surrogate, point=True)
 
 
 def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> Answer:
     curve = CURVES[name] if name in CURVES else read_curve(inside(folder, name, "target.curve"))
     problem, top = fit_curve(curve, search.segments, seed=search.seed)[-1]
     design = problem.design(top.x)
-    strip = surrogate.land(*design.lists()).strip
+    landing = surrogate.land(*design.lists())
     at = np.linspace(0.0, 1.0, problem.samples)
-    crease = strip.crease()
+    crease = landing.strip.crease()
     s = arc_lengths(crease)
     points = interpolated(at * s[-1], s, crease)
     goal = np.column_stack((problem.goal, np.zeros(problem.samples)))
@@ -168,7 +173,7 @@ def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> 
         "mean distance of the simulated strip": (float(np.linalg.norm(points - goal, axis=1).mean()), "mm"),
         "length of the curve": (problem.size, "mm"),
     }
-    return Answer(design, strip, measure, goal, surrogate)
+    return Answer(design, landing, measure, goal, surrogate)
 
 
 def _tip(search: SearchTable, surrogate: Forward) -> Answer:
@@ -184,7 +189,7 @@ def _tip(search: SearchTable, surrogate: Forward) -> Answer:
         "movement of the tip of the simulated strip": (float(np.linalg.norm(after.end - before.end)), "mm"),
         "its error bar": (after.bar + before.bar, "mm"),
     }
-    return Answer(design, after.strip, measure, before.end[None], surrogate)
+    return Answer(design, after, measure, before.end[None], surrogate)
 
 
 def read_curve(file: str | Path) -> Array:
@@ -241,7 +246,9 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
         about = {
             "segments": answer.design.rows(),
             "total_length_mm": answer.design.total,
-            "end_mm": answer.strip.t.tolist(),
+            "end_mm": answer.landing.end.tolist(),
+            "error_bar_mm": answer.landing.bar,
+            "model": {"formulation": answer.surrogate.setting.formulation, **answer.surrogate.about()},
             "measures": {
                 name: {"value": value, "unit": unit} for name, (value, unit) in answer.measure.items()
             },

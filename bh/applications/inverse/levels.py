@@ -68,8 +68,7 @@ def _vander(x: Array, degree: int) -> Array:
 
 def _matrix(count: int) -> Array:
     """From values at Chebyshev points to coefficients."""
-    found: Array = np.linalg.inv(chebyshev.chebvander(points(count), count - 1))
-    return found
+    return np.asarray(np.linalg.inv(chebyshev.chebvander(points(count), count - 1)), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +94,8 @@ class Limit:
             at = points(each.shape[0])
             grid = np.meshgrid(*([at] * (each.ndim - 1)), indexing="ij")
             before = levels[-1] if levels else Series(np.zeros((1,) * (each.ndim - 1) + (6,)))
-            levels.append(before + Series.through(each - before(*grid)))
+            added: Array = each - before(*grid)
+            levels.append(before + Series.through(added))
         last, other = (
             fine + (fine + coarse.times(-1.0)).times(1.0 / 3.0)
             for coarse, fine in ((levels[-2], levels[-1]), (levels[-3], levels[-2]))
