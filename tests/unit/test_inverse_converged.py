@@ -226,6 +226,11 @@ def test_a_point_is_reached() -> None:
     assert found.landing.bar > 0.0
     assert found.design.pinched.any()
     assert np.linalg.norm(found.landing.strip.t - found.landing.end) > 5.0 * found.landing.bar
+    # what the strip does beside its chain is small, and half of it is doubt
+    beside = float(np.linalg.norm(found.landing.end - found.end))
+    assert 0.0 < beside < 0.05
+    bar = float(converged().bars(*found.design.lists())[0])
+    assert found.landing.bar == pytest.approx(bar + 0.5 * beside)
 
 
 def test_the_shell_is_asked() -> None:
