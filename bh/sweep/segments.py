@@ -212,7 +212,7 @@ def segments(
         bool, typer.Option("--resume", help="Go on from the points that are finished.")
     ] = False,
 ) -> int:
-    """Make a data set of folded and pinched strips for inverse design."""
+    """Make the data set of strips for inverse design."""
     from dataclasses import replace
 
     if model == "source":

@@ -14,12 +14,12 @@ from bh.applications.inverse.simulate import simulate
 from bh.applications.inverse.tolerances import VARIED, Spreads, Tolerance, sampled, tolerance
 
 DESIGN = Design(np.array([0.009]), np.array([105.0]), np.array([True]))
-COARSE = {"edge": 5.0, "rows": 1}
+EDGE, ROWS = 5.0, 1
 
 
 @pytest.fixture(scope="module")
 def found() -> Tolerance:
-    return tolerance(model(), DESIGN, **COARSE)
+    return tolerance(model(), DESIGN, edge=EDGE, rows=ROWS)
 
 
 def test_the_ellipsoid_is_that_of_its_moves() -> None:
@@ -32,7 +32,7 @@ def test_the_ellipsoid_is_that_of_its_moves() -> None:
 
 def test_moves_are_those_of_strips(found: Tolerance) -> None:
     """Whole strips made otherwise end where the first order says, the cut crease too; E is of no account."""
-    setting = replace(model().setting, **COARSE)
+    setting = replace(model().setting, edge=EDGE, rows=ROWS)
     base = simulate(*DESIGN.lists(), setting).t
     thick = simulate(*DESIGN.lists(), replace(setting, t=setting.t + 0.002)).t
     np.testing.assert_allclose(found.moves["t"] + found.bent["t"], thick - base, atol=1e-9)
@@ -40,14 +40,14 @@ def test_moves_are_those_of_strips(found: Tolerance) -> None:
     np.testing.assert_allclose(stiff, base, atol=1e-5)
     curved = simulate([0.009 + 1e-4], [105.0], [True], setting).t - base
     np.testing.assert_allclose(
-        10.0 * found.moves["k0 of segment 1"], curved, atol=0.15 * np.linalg.norm(curved)
+        10.0 * found.moves["k0 of segment 1"], curved, atol=0.15 * float(np.linalg.norm(curved))
     )
     assert set(found.moves) == {*VARIED, "k0 of segment 1", "length of segment 1"}
 
 
 def test_without_a_pinch_its_angle_is_of_no_account() -> None:
     plain = replace(DESIGN, pinched=np.array([False]))
-    assert set(tolerance(model(), plain, Spreads(Lstar=0.0, t=0.0, k0=0.0), **COARSE).moves) == {
+    assert set(tolerance(model(), plain, Spreads(Lstar=0.0, t=0.0, k0=0.0), edge=EDGE, rows=ROWS).moves) == {
         "fold",
         "length of segment 1",
     }
@@ -56,8 +56,8 @@ def test_without_a_pinch_its_angle_is_of_no_account() -> None:
 @pytest.mark.slow
 def test_strips_lie_in_the_ellipsoid(found: Tolerance) -> None:
     """Of 200 strips with random errors 95 % should; and their scatter is that of the ellipsoid."""
-    ends = sampled(model(), DESIGN, 200, **COARSE)
-    apart = ends - simulate(*DESIGN.lists(), replace(model().setting, **COARSE)).t
+    ends = sampled(model(), DESIGN, 200, edge=EDGE, rows=ROWS)
+    apart = ends - simulate(*DESIGN.lists(), replace(model().setting, edge=EDGE, rows=ROWS)).t
     far = np.einsum("ij,jk,ik->i", apart, np.linalg.inv(found.covariance), apart)
     assert 0.90 <= float((far <= 7.814728).mean()) <= 0.99
     size, directions = found.axes(0.95)
