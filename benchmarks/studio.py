@@ -7,7 +7,6 @@ frame and its drawing.
 from __future__ import annotations
 
 import asyncio
-import os
 import threading
 import time
 
@@ -19,7 +18,7 @@ from bh.live import Session
 from bh.runtime.terminal import say
 from bh.studio.server import Studio
 from bh.studio.sheets import LiveSheet, of_model
-from reports.pdf import browser
+from tests.unit.browsers import opened
 
 CELLS = ((20, 4), (48, 8), (96, 16))  # about 1,000, 5,000 and 20,000 unknowns
 EVENTS = 40
@@ -53,8 +52,6 @@ def session_times(what: LiveSheet) -> list[float]:
 
 def window_times(what: LiveSheet) -> list[float]:
     """Seconds from the event to the drawn frame."""
-    from playwright.sync_api import sync_playwright
-
     studio, found = Studio(what), []
 
     async def serve() -> None:
@@ -64,15 +61,11 @@ def window_times(what: LiveSheet) -> list[float]:
     threading.Thread(target=lambda: asyncio.run(serve()), daemon=True).start()
     while not found:
         time.sleep(0.01)
-    alone = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-    options = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", *alone]
-    with sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=browser(), args=options)
+    with opened() as chromium:
         page = chromium.new_context(viewport={"width": 1400, "height": 820}, bypass_csp=True).new_page()
         page.goto(found[0])
         page.wait_for_function("window.studio?.head", timeout=60_000)
         times = [1e-3 * page.evaluate(EVENT, 1.0 * (k + 1)) for k in range(EVENTS)]
-        chromium.close()
     return times[5:]
 
 

@@ -5,14 +5,30 @@ Everything below is loaded when it is first used, so that `import bh` is quick.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+import sys as _sys
 
-from bh.runtime import viewer as _viewer
-from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
+try:
+    from importlib import import_module
+    from typing import TYPE_CHECKING, Any
+
+    from bh.runtime import viewer as _viewer
+    from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
+except KeyboardInterrupt:  # of the command `bh` alone; of a user's own program it is the user's
+    if _sys.argv[0].rpartition("/")[2] != "bh":
+        raise
+    _sys.stderr.write("bh: interrupted\n")
+    raise SystemExit(130) from None
 
 if TYPE_CHECKING:
-    from bh.errors import InputError, ModelError, PathFileError, SceneError
+    from bh.commands.read import Run, read
+    from bh.errors import (
+        InputError,
+        ModelError,
+        NotReachedError,
+        NotReachedWarning,
+        PathFileError,
+        SceneError,
+    )
     from bh.formulations.protocols import Formulation, SheetSystem
     from bh.formulations.registry import remarks
     from bh.formulations.remarks import Remark
@@ -40,7 +56,8 @@ if TYPE_CHECKING:
 
 # where a name is; `tests/test_architecture.py` holds it against the imports above
 _NAMES = {
-    "bh.errors": "InputError ModelError PathFileError SceneError",
+    "bh.commands.read": "Run read",
+    "bh.errors": "InputError ModelError NotReachedError NotReachedWarning PathFileError SceneError",
     "bh.formulations.protocols": "Formulation SheetSystem",
     "bh.formulations.registry": "remarks",
     "bh.formulations.remarks": "Remark",
@@ -109,6 +126,8 @@ __all__ = [
     "ModelError",
     "Moment",
     "Newton",
+    "NotReachedError",
+    "NotReachedWarning",
     "Outcome",
     "Path",
     "PathFileError",
@@ -117,6 +136,7 @@ __all__ = [
     "Refinement",
     "Remark",
     "RigidBody",
+    "Run",
     "SceneError",
     "Settling",
     "Sheet",
@@ -132,6 +152,7 @@ __all__ = [
     "allow_plugins",
     "depth",
     "load_scene",
+    "read",
     "remarks",
     "trace",
 ]

@@ -17,4 +17,19 @@ class PathFileError(InputError):
     """A stored path that cannot be read or written."""
 
 
-__all__ = ["InputError", "ModelError", "PathFileError", "SceneError"]
+class NotReachedError(RuntimeError):
+    """A path that was to reach its end (`Path.require`) and did not; one line with reason and advice."""
+
+
+class NotReachedWarning(UserWarning):
+    """`bh.trace` gives back a path that did not reach its end; its last state is not what was asked for."""
+
+
+__all__ = [
+    "InputError",
+    "ModelError",
+    "NotReachedError",
+    "NotReachedWarning",
+    "PathFileError",
+    "SceneError",
+]

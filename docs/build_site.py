@@ -25,7 +25,9 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
 PAGES = {
-    "Use": ("installation", "drawing", "studio", "scenes", "plots", "testing", "report"),
+    "Use": (
+        "installation", "drawing", "studio", "scenes", "materials", "results", "plots", "testing", "report",
+    ),
     "Studies": (
         "stiffness", "corrugations", "pinching", "inverse_design", "isometric", "sensitivities", "scaling", "scan",
         "performance",

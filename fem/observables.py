@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bh.formulations.state import Energy
 from bh.model.model import Model
 from bh.model.sheet import Sheet
+from fem import grain
 from fem.shell import ShellElements
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients
 from fem.state import ShellState
@@ -145,7 +146,11 @@ def stresses(elements: ShellElements, sheet: Sheet, moments: Array, strain: Arra
     inverse = np.linalg.inv(F)
     eps = np.einsum("tac,tab,tbd->tcd", inverse, eps, inverse)
     trace = np.einsum("taa->t", eps)[:, None, None] * np.eye(2)
-    N = sheet.E * sheet.t / (1.0 - sheet.nu**2) * ((1.0 - sheet.nu) * eps + sheet.nu * trace)
+    N = (
+        sheet.E * sheet.t / (1.0 - sheet.nu**2) * ((1.0 - sheet.nu) * eps + sheet.nu * trace)
+        if sheet.grain is None
+        else grain.forces(eps, sheet)
+    )
     m = np.einsum("tjm,m,jab->tab", moments.reshape(len(X), 3, -1), middle, MOMENTS)
     m = np.einsum("tca,tab,tdb->tcd", F, m, F) / np.linalg.det(F)[:, None, None] ** 2
     pick = ([0, 1, 0], [0, 1, 1])

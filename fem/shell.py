@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.model.sheet import Sheet
-from fem import kernels
+from fem import grain, kernels
 from fem.kernels import Frames, Loops
 from fem.spaces import MOMENTS, STRAINS, Tables, tables
 from meshes.curved import ElementMesh, plane_axes
@@ -129,7 +129,6 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
     X = mesh.planar[mesh.triangles]
     F = np.einsum("tnc,qnd->tqcd", X, table.slopes)
     J = np.linalg.det(F)
-    metric = np.einsum("tqca,tqcb->tqab", F, F)
     tangent = np.einsum("tnc,jpn->tjpc", X, table.along)
     speed = np.linalg.norm(tangent, axis=-1)
     edges = mesh.sheet.topology.triangle_edges
@@ -157,8 +156,7 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
         mesh,
         table,
         loops,
-        membrane_stiffness(table, metric, J, sheet),
-        bending_stiffness(table, metric, J, sheet),
+        *_stiffness(table, F, J, sheet),
         np.zeros((len(edges), table.measures)),
         lengths,
         J @ table.weights,
@@ -167,6 +165,17 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
     strain0, _ = elements.measures(mesh.nodes, np.zeros((len(edges), 3, table.rotations)), frames)
     elements.strain0[:] = strain0
     return elements
+
+
+def _stiffness(table: Tables, F: Array, J: Array, sheet: Sheet) -> tuple[Array, Array]:
+    """Of membrane and bending, (t, 3 m, 3 m) each, with F (t, q, 2, 2) and J (t, q) of the flat sheet."""
+    if sheet.grain is not None:
+        return (
+            grain.membrane_stiffness(_basis(table, STRAINS), table.weights, F, J, sheet),
+            grain.bending_stiffness(_basis(table, MOMENTS), table.weights, F, J, sheet),
+        )
+    metric = np.einsum("tqca,tqcb->tqab", F, F)
+    return membrane_stiffness(table, metric, J, sheet), bending_stiffness(table, metric, J, sheet)
 
 
 def _basis(table: Tables, tensors: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -115,7 +116,7 @@ class Polyline:
         vertices.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
 
-    @property
+    @cached_property
     def _arc_length(self) -> Array:
         return arc_lengths(self.vertices)
 

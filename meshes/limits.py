@@ -22,8 +22,9 @@ class Limits:
         creases: of a pattern of the library, side by side.
         pieces: of a crease that is made of arcs.
         steps: load steps of a scene.
-        triangles: of a mesh; a million of them take some gigabytes to solve.
-        entities: of a drawing's file, every <use> and block written out, and rows of a .cp file.
+        triangles: of a mesh; gmsh makes some twenty thousand a second, a million take gigabytes to solve.
+        entities: of a drawing's file, every <use> and block written out; rows of a .cp file; vertices, edges or
+            faces of a frame of a FOLD file.
         lines: of a drawing, without those that are ignored.
         vertices: of a drawing's lines, once curves are chords; numbers of its paths, values of a DXF file.
         crossings: of a drawing's lines where none has a node.
@@ -34,7 +35,7 @@ class Limits:
     creases: int = 1_000
     pieces: int = 1_000
     steps: int = 1_000
-    triangles: int = 1_000_000
+    triangles: int = 250_000
     entities: int = 20_000
     lines: int = 5_000
     vertices: int = 100_000

@@ -43,7 +43,7 @@ class Crease:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CreasePattern:
     """A flat sheet with named creases, in millimetres.
 
@@ -89,6 +89,13 @@ class CreasePattern:
             raise PatternError(f"name '{twice[0]}' of a cut is used twice; give every cut its own name")
         lines = [(f"crease '{crease.name}'", crease.curve) for crease in self.creases]
         _check_geometry(self.rings, lines + [(f"cut '{name}'", curve) for name, curve in self.cuts])
+
+    def __repr__(self) -> str:
+        """One line: "CreasePattern(120 x 40 mm, 5 creases, 1 hole)"."""
+        x, y = (float(side) for side in np.ptp(self.rings[0], axis=0))
+        counts = (len(self.creases), "crease"), (len(self.rings) - 1, "hole"), (len(self.cuts), "cut")
+        parts = [f"{n} {what}{'' if n == 1 else 's'}" for n, what in counts if n or what == "crease"]
+        return f"CreasePattern({x:.4g} x {y:.4g} mm, {', '.join(parts)})"
 
     @property
     def closed(self) -> bool:

@@ -103,7 +103,7 @@ _MORE = frozenset(("Nmm", "Nm", "N", "mN", "kN", "mm", "cm", "m", "um", "in", "f
 _SIGNS = str.maketrans({"°": " deg", "µ": "u", "μ": "u", "²": "**2", "³": "**3", "·": "*", "″": " in"})
 _TEXT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _ALLOWED = re.compile(
-    r"(?:[A-Za-z]+(?:(?:\*\*|\^)-?[1-3](?![0-9*^]))?|1(?= */)|[*/() ])+"
+    r"(?:[A-Za-z]++(?:(?:\*\*|\^)-?[1-3](?![0-9*^]))?|1(?= */)|[*/() ])+"
 )  # no towers of powers
 PATTERN = r"^\s*[-+]?[.0-9].*\S\s*$"  # what editors may check of a text that stands for a number
 LONGEST = 40  # characters

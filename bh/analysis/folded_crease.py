@@ -183,8 +183,10 @@ class FoldedCrease:
             trim: end before the regression curve; see `Panel.reach`.
 
         Raises:
-            ModelError: the strip reaches a regression curve (unless `trim`).
+            ModelError: the strip reaches a regression curve (unless `trim`), or the sheet has a grain.
         """
+        if sheet.grain is not None:
+            raise ModelError("the bending energy of a ruled strip is that of a sheet without a grain")
         D = sheet.bending_stiffness(nu)
         return sum(
             panel.bending_energy(D, v) for panel, v in zip(self.panels, self.reach(width, trim), strict=True)

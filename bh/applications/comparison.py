@@ -138,9 +138,8 @@ def compare(
     report = meter(progress)
     if accuracy is not None:
         stage(report, "choosing a mesh")
-        model = replace(
-            model, mesh=trace(model, accuracy=accuracy, symmetry=symmetry, progress=report).model.mesh
-        )
+        chosen = trace(model, accuracy=accuracy, symmetry=symmetry, progress=report, warn=False)
+        model = replace(model, mesh=chosen.model.mesh)
     members = [_solved(model, name, stiffness, report) for name in asked]
     reached = [member.formulation for member in members if member.reached]
     reference = next((name for name in (*JUDGES, *reached) if name in reached), None)
@@ -154,7 +153,7 @@ def _solved(model: Model, name: str, stiffness: Stiff | None, report: ProgressMe
     stage(report, name)
     began = time.perf_counter()
     try:
-        path = trace(replace(model, formulation=name), progress=report)
+        path = trace(replace(model, formulation=name), progress=report, warn=False)
     except InputError as error:
         return Member(name, "refused", str(error), wall_time_s=time.perf_counter() - began)
     spent = time.perf_counter() - began

@@ -115,7 +115,7 @@ def respond(pattern: CreasePattern, how: Pinching | None = None) -> Response:
     Raises:
         ModelError: the sheet did not get there; the message says how far.
     """
-    path = trace((how or Pinching()).model(pattern))
+    path = trace((how or Pinching()).model(pattern), warn=False)
     if not path.reached:
         raise ModelError(
             f"the sheet could not be folded and pinched: {path.outcome} ({path.steps[-1].reason})"

@@ -110,7 +110,7 @@ def polish(
     if not ((low <= p) & (p <= high)).all():
         raise ModelError("the start lies outside its bounds; move it inside")
     observables = [observable for observable, _ in targets]
-    path = trace(build(p), strategy=how.strategy)
+    path = trace(build(p), strategy=how.strategy, warn=False)
     if not path.reached:
         raise ModelError(f"the start cannot be solved ({path.outcome}): {path.reason}")
     missed = _values(path, observables) - wanted
@@ -168,7 +168,7 @@ def _better(
 ) -> tuple[Path, Array, Array] | None:
     """The solved model of a design, the design and what it misses; None if that is no less than what is missed now."""
     try:
-        path = trace(build(p), strategy=strategy)
+        path = trace(build(p), strategy=strategy, warn=False)
     except InputError:
         return None
     if not path.reached:

@@ -53,6 +53,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in (words[: words.index("--")] if "--" in words else words)
     if debug:  # it may stand anywhere, also behind a command
         words.remove("--debug")
+    try:
+        return _run(words, debug)
+    except KeyboardInterrupt:  # in the moment in which another end is told of
+        return _fail("interrupted", 130, debug)
+
+
+def _run(words: list[str], debug: bool) -> int:
     take_back = take_options(words)
     try:
         code = app(args=words, prog_name="bh", standalone_mode=False)
@@ -134,6 +141,9 @@ def run(
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Output folder; default SCENE-out.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the states in the folder.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a run that was stopped, or is of another scene.")
+    ] = False,
     pictures: Annotated[bool, typer.Option("--pictures", help="Draw the folded sheet (PNG).")] = False,
     vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
     estimate: Annotated[
@@ -149,7 +159,8 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
-    from bh.commands.run import UNFINISHED, holds_states, solve, write_extras
+    from bh.commands.occupied import UNFINISHED
+    from bh.commands.run import holds_states, solve, write_extras
     from bh.commands.summary import summary
     from bh.scene.load import load_scene
 
@@ -165,7 +176,7 @@ def run(
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
         path, names, before, contact = solve(
-            loaded, folder, resume=resume, progress=not quiet, estimate=estimate
+            loaded, folder, resume=resume, force=force, progress=not quiet, estimate=estimate
         )
     except KeyboardInterrupt:
         sets = [word for change in asked for word in ("--set", change)]
@@ -222,7 +233,7 @@ def view(
     state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
 ) -> None:
     """Show a state of a solved path, or draw it to a file."""
-    from bh.commands.run import path_file
+    from bh.commands.occupied import path_file
     from bh.errors import InputError
     from bh.paths.path import Path as Trace
 
@@ -269,7 +280,7 @@ def export(
 
         done = write_flat(file, load_scene(source).model.mesh, facets)
     else:
-        from bh.commands.run import path_file
+        from bh.commands.occupied import path_file
         from bh.paths.path import Path as Trace
 
         solved = Trace.load(path_file(source) if source.is_dir() else source)

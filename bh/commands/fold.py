@@ -18,16 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.analysis.contact import first_contact
-from bh.commands.run import (
-    FINISHED,
-    UNFINISHED,
-    make_folder,
-    remove_extras,
-    result,
-    solve,
-    take_back,
-    write_extras,
-)
+from bh.commands.occupied import FINISHED, UNFINISHED
+from bh.commands.result import result
+from bh.commands.run import make_folder, remove_extras, solve, take_back, write_extras
 from bh.errors import InputError
 from bh.paths.path import Path as Trace
 from bh.runtime.progress import ProgressMeter, meter, stage

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -17,6 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bh.analysis.contact import Contact, first_contact
+from bh.commands.occupied import FINISHED, UNFINISHED, changed, check_folder
+from bh.commands.result import result
 from bh.errors import InputError
 from bh.model.serialise import fingerprint
 from bh.paths.export import FOLDED, write_flat, write_state
@@ -27,12 +30,11 @@ from bh.runtime.progress import ProgressMeter
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
 from bh.solvers.trace import Strategy
+from bh.solving.follow import check_resumable
 from bh.solving.levels import folder_of, move
 from bh.solving.levels import remove as remove_levels
 from bh.solving.trace import trace
 from meshes.io.export import replacing
-
-FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
 
 
 class Solved(NamedTuple):
@@ -56,6 +58,7 @@ def solve(
     folder: Path,
     *,
     resume: bool = False,
+    force: bool = False,
     progress: bool | ProgressMeter = False,
     estimate: bool = True,
     strategy: Strategy | None = None,
@@ -68,6 +71,7 @@ def solve(
         scene: to be solved.
         folder: for the files.
         resume: go on from the states in the folder.
+        force: begin anew where the folder holds a run that was stopped, or one of another scene.
         progress: as for `bh.trace`.
         estimate: solve a coarser mesh, too, where the mesh was given, for an estimate of the error.
         strategy: of the increments; None for the scene's.
@@ -76,6 +80,8 @@ def solve(
         InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
             described; a folder that was made for the run is taken away again if nothing came of it.
     """
+    if not (resume or force):
+        check_folder(folder, scene)
     names = _names(folder, scene, resume)
     made = make_folder(folder)
     ours = False
@@ -104,6 +110,11 @@ def _solved(
 ) -> Solved:
     """What `solve` gives, of a folder that nobody else writes."""
     file = folder / names[0]
+    goes_on = resume and names == FINISHED and _is_finished(folder) and changed(file, scene)
+    if goes_on:  # the finished one stays until this one is finished, too
+        check_resumable(file, scene.model)
+        names, file = UNFINISHED, folder / UNFINISHED[0]
+        shutil.copyfile(folder / FINISHED[0], file)
     before = resume and _is_whole(file, scene)
     solved = _solved_meshes(file)
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
@@ -117,7 +128,9 @@ def _solved(
         symmetry=scene.symmetry,
         strategy=strategy or scene.strategy,
         estimate=estimate and scene.accuracy is None,
+        warn=False,  # the command says it in a line of its own
     )
+    _keep_scene(scene, file)
     clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
     if path.reached:
         if names == UNFINISHED:
@@ -139,6 +152,15 @@ def _solved(
     return Solved(path, names, before, contact)
 
 
+def _keep_scene(scene: Scene, file: Path) -> None:
+    """Put the text of the scene into its path file, for `bh.read`."""
+    if scene.source is None:
+        return
+    with contextlib.suppress(OSError, UnicodeDecodeError), contextlib.closing(PathFile.open(file)) as stored:
+        text = scene.source.read_text(encoding="utf-8-sig")
+        stored.note("scene", {"file": str(scene.source.resolve()), "text": text})
+
+
 def _solved_meshes(file: Path) -> list[str]:
     """Names of the path files of the meshes of a run to an accuracy."""
     return sorted(found.name for found in folder_of(file).glob("*.bh"))
@@ -152,18 +174,6 @@ def _is_whole(file: Path, scene: Scene) -> bool:
     with contextlib.closing(PathFile.open(file)) as stored, reading(file):
         outcomes = [outcome for outcome, *_ in stored.steps().values()]
     return outcomes == [Outcome.REACHED] * len(model.steps)
-
-
-def path_file(folder: Path) -> Path:
-    """The path file in the output folder of a run.
-
-    Raises:
-        InputError: there is none.
-    """
-    for name, _ in (FINISHED, UNFINISHED):
-        if (folder / name).is_file():
-            return folder / name
-    raise InputError(f"there is no {FINISHED[0]} in '{folder}'; give the output folder of `bh run`")
 
 
 def holds_states(folder_or_file: Path) -> bool:
@@ -257,91 +267,6 @@ def _move(file: Path, place: Path) -> None:
     # a journal that a killed run left there belongs to the file that goes
     place.with_name(place.name + "-journal").unlink(missing_ok=True)
     file.replace(place)
-
-
-def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, object]:
-    """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact.
-
-    Args:
-        path: solved, as far as it goes.
-        scene: that it is of.
-        contact: the path's first self-contact, if any.
-    """
-    model = path.model
-    mesh, last = model.mesh, path[-1]
-    folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
-    steps = []
-    for number in range(len(model.steps)):
-        records = [record for record in path.records if record.step == number]
-        tried = number < len(path.steps)
-        steps.append(
-            {
-                "outcome": path.steps[number].outcome if tried else "not tried",
-                "reason": path.steps[number].reason if tried else "an earlier step ended early",
-                "states": len(records),
-                "iterations": sum(record.iterations for record in records),
-            }
-        )
-    return {
-        "outcome": path.outcome,
-        "reason": path.reason,
-        "stable": path.stable,
-        "remarks": path.remarks,
-        "critical_points": [
-            {
-                "step": step,
-                "kind": c.kind,
-                "lambda": c.lam,
-                "error": c.error,
-                "negative_modes": list(c.negative),
-            }
-            for step, c in path.critical_points
-        ],
-        "energy": {kind: _number(value) for kind, value in last.energy.as_dict().items()},
-        "lock_energy": _number(last.energy.lock),
-        "fold_angle": {
-            crease: {"mean": _number(a.mean()), "min": _number(a.min()), "max": _number(a.max())}
-            for crease, a in folds.items()
-            if len(a)
-        },
-        "self_contact": _contact(path, contact),
-        "steps": steps,
-        "iterations": path.iterations,
-        "wall_time_s": path.wall_time_s,
-        "unknowns": path.unknowns,
-        "mesh": {
-            "nodes": len(mesh.points),
-            "triangles": len(mesh.triangles),
-            "aspect_ratio": _number(mesh.aspect_ratio),
-        },
-        "formulation": model.formulation,
-        "accuracy": path.accuracy.as_dict() if path.accuracy is not None else None,
-        "no_estimate": path.estimate_reason or None,
-        "versions": path.provenance["versions"],
-        "input": path.provenance["input"],
-        "scene": str(scene.source),
-    }
-
-
-def _contact(path: Trace, contact: Contact | None) -> dict[str, object]:
-    """Whether the sheet passes through itself, and where first; of very many triangle pairs the first hundred."""
-    found: dict[str, object] = {"found": contact is not None, "states": len(path)}
-    if contact is not None:
-        found |= {
-            "about": "reported, not prevented: from this state on the sheet passes through itself",
-            "state": contact.state,
-            "step": contact.step,
-            "lambda": contact.lam,
-            "panels": [list(pair) for pair in contact.panels],
-            "triangle_pairs": len(contact.triangles),
-            "triangles": contact.triangles[:100].tolist(),
-        }
-    return found
-
-
-def _number(value: float) -> float | None:
-    """A number that JSON can hold; there is none for nan."""
-    return float(value) if abs(value) < float("inf") else None
 
 
 def remove_extras(folder: Path, mark: str) -> None:

@@ -32,6 +32,8 @@ def summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact
         f"{scene.name}: {path.outcome}; {len(path)} states, {path.iterations} iterations, "
         f"{path.unknowns} unknowns, {path.wall_time_s:.2f} s"
     )
+    stable = {True: "yes", False: "no", None: "was not looked at"}[path.stable]
+    say(f"stable: {stable}")
     for remark in path.remarks[:6]:
         say(remark)
     model = path.model

@@ -75,6 +75,23 @@ class NodalUnknowns(Protocol):
         ...
 
 
+@runtime_checkable
+class PlacedSystem(Protocol):
+    """Ability of a system: it has unknowns for any positions of the nodes, such as those of another mesh's state."""
+
+    def unknowns_at(self, x: Array, lam: float) -> Array:
+        """Unknowns of positions, as far as supports allow, all others those of least energy.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            (n,) unknowns.
+        """
+        ...
+
+
 S = TypeVar("S", bound=SheetSystem)
 
 

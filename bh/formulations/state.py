@@ -66,6 +66,7 @@ class State:
             where it works to open the dihedral angle below the sheet against the crease. Near closed with what the
             lock carries (`Model.hinge_lock`).
         contact_forces: force of every `Indenter` of the step on the sheet, (3,), N, by its name.
+        ended: the outcome where the path ended early at this state, such as "stalled": it is not what was asked for.
         stable: True if the tangent is positive definite there (False: not, None: not known).
     """
 
@@ -80,11 +81,13 @@ class State:
     crease_moments: Array
     stable: bool | None = None
     contact_forces: Mapping[str, Array] = field(default_factory=dict)
+    ended: str = ""
 
     def __repr__(self) -> str:
-        """One line: "State(step 0, lambda 1, energy 0.0534 N mm, stable)"."""
+        """One line: "State(step 0, lambda 1, energy 0.0534 N mm, stable)", or "..., ENDED EARLY: stalled)"."""
         stable = {True: ", stable", False: ", not stable", None: ""}[self.stable]
-        return f"State(step {self.step}, lambda {self.lam:.4g}, energy {self.energy.total:.4g} N mm{stable})"
+        ended = f", ENDED EARLY: {self.ended}" if self.ended else ""
+        return f"State(step {self.step}, lambda {self.lam:.4g}, energy {self.energy.total:.4g} N mm{stable}{ended})"
 
     def dihedral(self, crease: str) -> Array:
         """Dihedral angles along a crease, one an edge in order, rad.

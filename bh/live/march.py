@@ -82,19 +82,23 @@ class March:
             free = size < SMALLEST * self.settings.limits(self.system)[0]
             found = yield from self._solve(lam, patient=cuts >= self.settings.brisk or free)
             reason = found.reason if not found.converged else ""
-            note = ""
+            left_saddle = False
             if found.converged and found.stable is False:
-                found, note = yield from self._downhill(found, lam)
-                reason = "" if note else "no stable state was found nearby"
+                saddle = found
+                found = yield from self._downhill(saddle, lam)
+                left_saddle = found is not saddle
+                reason = "" if left_saddle else "no stable state was found nearby"
             if not reason:
                 there = point(self.system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
                 reason = (
                     self.system.penetration(here.q, here.lam, there.q, lam)
-                    if note or free
+                    if left_saddle or free
                     else jump(self.system, here, there, self.settings.work_mismatch)
                 )
                 if not reason:
-                    self.snapped = bool(note) or (free and bool(self._off(here, there)))
+                    self.snapped = left_saddle or (
+                        free and bool(jump(self.system, here, there, self.settings.work_mismatch))
+                    )
                     before = [] if self.snapped else [at for at in self.points[-2:] if at.lam != lam]
                     self.points = [*before, there]
                     self._increment = min(
@@ -106,9 +110,6 @@ class March:
                 return
             size, cuts = 0.5 * min(size, abs(left)), cuts + 1
 
-    def _off(self, here: Point, there: Point) -> str:
-        return jump(self.system, here, there, self.settings.work_mismatch)
-
     def _solve(self, lam: float, patient: bool) -> Generator[Array, None, Solution]:
         """A state at `lam` near the last ones; `patient` goes downhill where full steps do not converge."""
         q, forces = extrapolate(self.points, lam)
@@ -118,8 +119,8 @@ class March:
         found = yield from self._newton.globalised_steps(self.system, q, lam)
         return found
 
-    def _downhill(self, saddle: Solution, lam: float) -> Generator[Array, None, tuple[Solution, str]]:
-        """From an unstable state along its lowest mode, in both senses, to the stable one of lower energy."""
+    def _downhill(self, saddle: Solution, lam: float) -> Generator[Array, None, Solution]:
+        """From an unstable state along its lowest mode, in both senses, to a stable one of lower energy; or itself."""
         matrix = self.system.tangent(saddle.q, lam, saddle.evaluation.forces).matrix
         _, mode = lowest_mode(matrix, len(saddle.q), self.system.primal)
         yield saddle.q
@@ -130,4 +131,4 @@ class March:
             found = yield from self._newton.globalised_steps(self.system, start, lam)
             if found.converged and found.stable and found.evaluation.energy < best.evaluation.energy:
                 best = found
-        return best, "" if best is saddle else "snapped"
+        return best

@@ -117,6 +117,24 @@ class StepEnd:
     dihedral_angles: Array
 
 
+def same_until_here(one: LoadStep, other: LoadStep) -> bool:
+    """Whether two load steps ask for the same, so that a state of the one is a state of the other.
+
+    Args:
+        one: of a stored model.
+        other: of another model on the same mesh.
+    """
+
+    def alike(a: object, b: object) -> bool:
+        if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+            return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+        if isinstance(a, Ramp | Pinched | Constraints) and type(a) is type(b):
+            return all(alike(x, y) for x, y in zip(vars(a).values(), vars(b).values(), strict=True))
+        return bool(a == b)
+
+    return all(alike(a, b) for a, b in zip(vars(one).values(), vars(other).values(), strict=True))
+
+
 def crease_hinges(mesh: SheetMesh, crease: str) -> Ints:
     """Rows of `mesh.topology.hinges` along a crease, in order.
 

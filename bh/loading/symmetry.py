@@ -7,6 +7,7 @@ the sheet; of a sector of an annulus x is radial and y goes along the crease at 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -199,8 +200,16 @@ def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
         plane: of its mirror.
 
     Raises:
-        ModelError: a support, a crease or an actuation has no image in the plane.
+        ModelError: the grain, a support, a crease or an actuation has no image in the plane.
     """
+    grain = model.sheet.grain
+    if grain is not None:
+        along = math.cos(grain) * plane.normal[0] + math.sin(grain) * plane.normal[1]
+        if min(abs(along), math.sqrt(max(1.0 - along**2, 0.0))) > 1e-7:
+            raise ModelError(
+                f"the grain at {math.degrees(grain):.6g} degrees is not mirror-symmetric: it runs neither along nor "
+                f"across the plane; {ADVICE}"
+            )
     for number, step in enumerate(steps):
         where = f"step {number + 1}"
         if step.bodies:

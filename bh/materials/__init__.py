@@ -1,6 +1,6 @@
 """Materials of the sheet: what a stretch and what a curvature of it cost."""
 
-from bh.materials.linear import Constant, LinearElastic
-from bh.materials.protocols import Law, Material
+from bh.materials.linear import Anisotropic, Constant, LinearElastic
+from bh.materials.protocols import Directed, Law, Material
 
-__all__ = ["Constant", "Law", "LinearElastic", "Material"]
+__all__ = ["Anisotropic", "Constant", "Directed", "Law", "LinearElastic", "Material"]

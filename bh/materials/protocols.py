@@ -7,7 +7,7 @@ with the stress (xx, yy, xy) is the work.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +38,32 @@ class Law(Protocol):
         ...
 
 
+@runtime_checkable
+class Directed(Law, Protocol):
+    """A law that depends on the direction, in the axes of the drawing: strains are those of each place's own axes."""
+
+    def turned(self, angle: Array) -> Law:
+        """The law of k places whose x axes stand at angles (k,) to the drawing's, rad; rows of strains are these k."""
+        ...
+
+
+def in_axes(law: Law, angle: Array) -> Law:
+    """The law as it reads in the axes of k places.
+
+    Args:
+        law: in the axes of the drawing, or one of no direction, which stays what it is.
+        angle: (k,) of the places' x axes to the drawing's, rad.
+    """
+    if not hasattr(
+        law, "turned"
+    ):  # asked at every step: `isinstance` with a protocol takes longer than the rest
+        return law
+    assert isinstance(law, Directed)
+    return law.turned(angle)
+
+
 class Material(Protocol):
-    """Makes the two laws of a sheet from its data (E, nu, t)."""
+    """Makes the two laws of a sheet from its data (E, nu, t and those of a grain). Of a grain they are `Directed`."""
 
     def stretching(self, sheet: Sheet) -> Law:
         """The law of Green's strain of the middle surface."""

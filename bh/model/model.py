@@ -75,6 +75,11 @@ class Model:
                 raise ModelError(
                     f"the {name} of a model is {what}; give bh.Model(mesh, sheet) {how} as {name}"
                 )
+        if self.sheet.grain is not None and not drawn_flat(self.mesh):
+            raise ModelError(
+                "the grain is a direction in the drawing, so the stress-free sheet must lie in z = const with its "
+                "triangles counter-clockwise; unfold it first, or give a sheet without a grain"
+            )
         for step in self.steps:
             if not isinstance(step, Step):
                 raise ModelError(
@@ -255,6 +260,17 @@ class Model:
             by: displacement along it at the end of the step, mm from the stress-free position.
         """
         return self.step(Displace(at, direction, by))
+
+
+def drawn_flat(mesh: SheetMesh) -> bool:
+    """Whether a mesh lies in a plane z = const (to 1e-9 of its size), its triangles counter-clockwise from +z.
+
+    Args:
+        mesh: of the stress-free sheet.
+    """
+    corner = mesh.points[mesh.triangles]
+    up = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2]
+    return bool(np.ptp(mesh.points[:, 2]) <= 1e-9 * mesh.size and (up > 0.0).all())
 
 
 def _on_edges(mesh: SheetMesh, what: str, rows: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:

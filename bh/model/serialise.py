@@ -55,7 +55,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         "hinge_lock": model.hinge_lock,
         **({} if model.contact is False else {"contact": model.contact}),
         "green": model.stiffness is not None and model.stiffness.green,
-        "sheet": _plain(model.sheet),
+        "sheet": {name: value for name, value in _plain(model.sheet).items() if value is not None},
         "mesh": {
             "corners": dict(mesh.corners),
             "folds": dict(mesh.folds),

@@ -13,24 +13,44 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from meshes.quantities import take_units
 
+TURN = 2.0 * math.pi
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sheet:
     """A thin elastic sheet; its values are given by name: `Sheet(E=4000, nu=0.38, t=0.127)`.
 
+    With E2, G12 and grain it is orthotropic, as paper and card are: E is E1 then, along the grain, and nu is nu12, what
+    a pull along the grain contracts across it (`Sheet.orthotropic` has these names).
+
     Attributes:
         E: Young's modulus, MPa, or with a unit ("4GPa").
         t: thickness, mm, or with a unit ("0.2mm").
-        nu: Poisson's ratio in (-1, 0.5]; bars and hinges take 0, as the source does (3.3.2).
+        nu: Poisson's ratio in (-1, 0.5], with a grain nu^2 < E / E2. Bars and hinges take 0, as the source (3.3.2).
+        E2: Young's modulus across the grain, MPa; None for a sheet that is alike in all directions.
+        G12: shear modulus in the plane of the sheet, MPa; with a grain.
+        grain: direction of the grain in the drawing, rad from its x axis towards its y axis, or with a unit ("30deg").
     """
 
     E: float
     t: float
     nu: float = 0.0
+    E2: float | None = None
+    G12: float | None = None
+    grain: float | None = None
 
     if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
 
-        def __init__(self, *, E: float | str, t: float | str, nu: float = 0.0) -> None:
+        def __init__(
+            self,
+            *,
+            E: float | str,
+            t: float | str,
+            nu: float = 0.0,
+            E2: float | str | None = None,
+            G12: float | str | None = None,
+            grain: float | str | None = None,
+        ) -> None:
             """See the attributes."""
 
     def __post_init__(self) -> None:
@@ -39,18 +59,80 @@ class Sheet:
         Raises:
             ModelError: one line that names the value and what to give.
         """
-        take_units(self, "sheet", E="modulus", t="length")
-        for name, unit in (("E", "MPa"), ("t", "mm")):
+        take_units(self, "sheet", E="modulus", t="length", E2="modulus", G12="modulus", grain="angle")
+        for name, unit in (("E", "MPa"), ("t", "mm"), ("E2", "MPa"), ("G12", "MPa")):
             value = getattr(self, name)
+            if value is None and name in ("E2", "G12"):
+                continue
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
                 raise ModelError(f"sheet {name} = {value!r} cannot be; give a positive number in {unit}")
-        if not (isinstance(self.nu, Real) and -1.0 < self.nu <= 0.5):
+        if (self.E2, self.G12, self.grain) != (None, None, None):
+            _check_grain(self)
+        elif not (isinstance(self.nu, Real) and -1.0 < self.nu <= 0.5):
             raise ModelError(f"sheet nu = {self.nu!r} cannot be; Poisson's ratio lies in (-1, 0.5]")
 
+    @classmethod
+    def orthotropic(
+        cls,
+        *,
+        E1: float | str,
+        E2: float | str,
+        G12: float | str,
+        nu12: float,
+        grain: float | str,
+        t: float | str,
+    ) -> Sheet:
+        """A sheet with a grain, by the names of its moduli.
+
+        Args:
+            E1: Young's modulus along the grain, MPa.
+            E2: Young's modulus across it, MPa.
+            G12: shear modulus in the plane of the sheet, MPa.
+            nu12: what a pull along the grain contracts across it; nu12 / E1 = nu21 / E2.
+            grain: direction of the grain in the drawing, rad from its x axis towards its y axis.
+            t: thickness, mm.
+
+        Raises:
+            ModelError: moduli that are not definite: a sheet that gives energy when it is strained.
+        """
+        return cls(E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t)
+
+    @property
+    def nu_squared(self) -> float:
+        """nu^2, or nu12 nu21 of a sheet with a grain."""
+        return self.nu**2 if self.E2 is None else self.nu**2 * self.E2 / self.E
+
     def bending_stiffness(self, nu: float | None = None) -> float:
-        """D = E t^3 / (12 (1 - nu^2)), N mm (Eq. B.2); `nu` overrides the sheet's."""
-        nu = self.nu if nu is None else nu
-        return self.E * self.t**3 / (12.0 * (1.0 - nu**2))
+        """D = E t^3 / (12 (1 - nu^2)), N mm (Eq. B.2); `nu` overrides the sheet's.
+
+        With a grain the geometric mean of both directions, to which L* of creases refers: E = sqrt(E1 E2), and
+        nu^2 = nu12 nu21.
+        """
+        E = self.E if self.E2 is None else math.sqrt(self.E * self.E2)
+        nu_squared = self.nu_squared if nu is None else nu**2
+        return E * self.t**3 / (12.0 * (1.0 - nu_squared))
+
+
+def _check_grain(sheet: Sheet) -> None:
+    """Are the moduli of a sheet with a grain all there, and definite?"""
+    missing = [name for name in ("E2", "G12", "grain") if getattr(sheet, name) is None]
+    if missing == ["grain"]:
+        raise ModelError('sheet E2 and G12 are of a grain without a direction; give grain, such as "30deg"')
+    if missing:
+        raise ModelError(
+            f"sheet {' and '.join(missing)} is missing; a sheet with a grain needs E2, G12 (MPa) and grain (an angle)"
+        )
+    assert sheet.E2 is not None
+    if not (isinstance(sheet.grain, Real) and abs(sheet.grain) <= TURN):
+        raise ModelError(
+            f'sheet grain = {sheet.grain!r} cannot be; give an angle in rad from -2 pi to 2 pi, or such as "30deg"'
+        )
+    if not (isinstance(sheet.nu, Real) and sheet.nu**2 < sheet.E / sheet.E2):
+        most = math.sqrt(sheet.E / sheet.E2)
+        raise ModelError(
+            f"sheet nu = {sheet.nu!r} cannot be with E = {sheet.E:g} along and E2 = {sheet.E2:g} MPa across the "
+            f"grain: the moduli are not definite; nu (nu12) lies between -{most:.4g} and {most:.4g}"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.errors import ModelError
+from bh.errors import ModelError, NotReachedError
 from bh.formulations.protocols import Formulation, SheetSystem
 from bh.formulations.registry import checked_system, formulation, remarks
 from bh.formulations.state import State
@@ -20,6 +20,7 @@ from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd, open_ends
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
+from bh.paths.advice import ADVICE
 from bh.paths.provenance import provenance_of
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
@@ -95,6 +96,36 @@ class Path:
     def reason(self) -> str:
         """Why the path ended early, or an empty string."""
         return next((step.reason for step in self.steps if not step.reached), "")
+
+    @property
+    def ended_early(self) -> bool:
+        """Did a step end before its actuations were complete, so that the last state is not what was asked for?"""
+        return any(not step.reached for step in self.steps)
+
+    @property
+    def early_end(self) -> str:
+        """Outcome, place, reason and advice of a path that did not reach its end, one line; empty where it did."""
+        if self.reached:
+            return ""
+        number = min(max(len(self.steps), 1), len(self.model.steps))
+        last = self.records[-1] if self.records else None
+        lam = last.lam if last is not None and last.step == number - 1 else 0.0
+        reason = f" ({self.reason})" if self.reason else ""
+        advice = ADVICE.get(self.outcome, "")
+        return (
+            f"the path ended early, {self.outcome}, in step {number} of {len(self.model.steps)} at lambda {lam:.3g}"
+            f"{reason}" + (f"; {advice}" if advice else "")
+        )
+
+    def require(self) -> Path:
+        """The path itself, if every step was reached: `bh.trace(model).require()[-1]`.
+
+        Raises:
+            NotReachedError: one was not; reason and advice in one line.
+        """
+        if not self.reached:
+            raise NotReachedError(self.early_end)
+        return self
 
     @property
     def stable(self) -> bool | None:
@@ -203,6 +234,9 @@ class Path:
         if index not in self._states:
             record = self.records[index]
             self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
+        ended = str(self.outcome) if index == len(self) - 1 and self.ended_early else ""
+        if self._states[index].ended != ended:
+            self._states[index] = replace(self._states[index], ended=ended)
         return self._states[index]
 
     def observe(self, step: int, q: Array, lam: float, stable: bool | None = None) -> State:

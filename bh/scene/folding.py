@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +32,8 @@ ROWS = 4.0  # of cells in a panel between curved creases
 SECONDS = 15.0  # of a run to an accuracy
 FIT = 200.0  # mm, the longer side of a sheet whose file says no unit and whose numbers make an absurd size
 STRAIGHT = 0.02  # rad that a crease turns between its ends, by which it is still straight
+JOINING = re.compile(r"to join them: gap = ([0-9.e+-]+)")  # as remarks of readers advise
+KINDS = ("mountain", "valley", "flat")  # names of all creases of a kind
 COARSE = 2e-3  # of the diagonal: chords of curves of which the drawing's own faces are made
 MATERIALS: Mapping[str, tuple[float, float, float, str]] = {
     "paper": (4000.0, 0.3, 0.1, "paper, 80 g/m2"),
@@ -119,6 +122,7 @@ def proposals(file: str | os.PathLike[str], wish: Wish | None = None) -> list[Pr
         assumed.append(f"the file states no unit and would be absurdly small or large: fitted to {FIT:g} mm")
         options["fit"] = FIT
         found = _read(Path(file), options)
+    found = _joined(Path(file), found, options, assumed)
     return _proposed(Path(file), wish, found, options, assumed)
 
 
@@ -157,15 +161,34 @@ def _read(file: Path, options: Mapping[str, object]) -> _Found:
     return found
 
 
+def _joined(file: Path, found: _Found, options: dict[str, object], assumed: list[str]) -> _Found:
+    """The file read once more with the gap that joins lines which nearly meet, where its remarks advise one."""
+    sheet = found.faces or found.pattern
+    gaps = [float(gap) for text in (sheet.remarks if sheet else ()) for gap in JOINING.findall(text)]
+    if not gaps or "gap" in options:
+        return found
+    joined = _read(file, options | {"gap": max(gaps)})
+    if joined.faces is None and joined.pattern is None:
+        return found
+    assumed.append(f"lines that end close to others ({len(gaps)}) are joined by gap = {max(gaps):g} mm")
+    options["gap"] = max(gaps)
+    return joined
+
+
 def _bent(mesh: SheetMesh) -> bool:
-    """True if a crease turns on its way, by less than a corner: a curve that was drawn."""
+    """True if a crease turns on its way, by less than a corner and where it meets no other line: a curve."""
+    drawn = [mesh.topology.boundary, *(mesh.crease_edges(name) for name in mesh.folds if name in KINDS)]
+    drawn += [mesh.edge_sets["edge:flat"]] if "edge:flat" in mesh.edge_sets else []
+    degree = np.bincount(
+        np.concatenate([np.asarray(pairs).ravel() for pairs in drawn]), minlength=len(mesh.points)
+    )
     for name in mesh.creases:
         pairs = mesh.crease_edges(name)
-        if name in ("mountain", "valley", "flat") or len(pairs) < 4:
+        if name in KINDS or len(pairs) < 4:
             continue
         steps = mesh.points[pairs[:, 1], :2] - mesh.points[pairs[:, 0], :2]
         turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
-        if turns[turns <= CORNER].sum() > STRAIGHT:
+        if turns[(turns <= CORNER) & (degree[pairs[1:, 0]] == 2)].sum() > STRAIGHT:
             return True
     return False
 

@@ -212,7 +212,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     creases = as_table(data.get("creases", {}), "creases")
     model = Model(
         mesh=mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data),
-        sheet=Sheet(E=sheet.E, t=sheet.t, nu=sheet.nu),
+        sheet=_sheet(sheet),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(steps)),
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
@@ -252,6 +252,13 @@ def _formulation(name: str) -> str:
         with within("model.formulation"):
             consent(name)
     return name
+
+
+def _sheet(table: SheetTable) -> Sheet:
+    E, nu = (table.E1, table.nu12) if table.E is None else (table.E, table.nu)
+    assert E is not None
+    with within("sheet"):
+        return Sheet(E=E, t=table.t, nu=nu or 0.0, E2=table.E2, G12=table.G12, grain=table.grain)
 
 
 def _support(item: object, at: str) -> Constraint:

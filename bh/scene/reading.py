@@ -53,6 +53,7 @@ _STIFF, _SECTOR, _PINCHED = (
     Interval(ge=SHORTEST, lt=TURN),
     Interval(gt=0.0, lt=math.pi),
 )
+_TURN = Interval(ge=-TURN, le=TURN)
 
 Number = Annotated[float, _ANY]
 Positive = Annotated[float, _POSITIVE]
@@ -66,6 +67,7 @@ Stiff = Annotated[float, _POSITIVE, spelled("stiffness", _POSITIVE)]
 Couple = Annotated[float, _ANY, spelled("couple", _ANY)]
 Closing = Annotated[float, _POSITIVE, spelled("couple", _POSITIVE)]
 Seconds = Annotated[float, _POSITIVE, spelled("time", _POSITIVE)]
+Turn = Annotated[float, _TURN, spelled("angle", _TURN)]
 Dihedral = Annotated[float, _DIHEDRAL, spelled("angle", _DIHEDRAL)]
 Rest = Annotated[float, _REST, spelled("angle", _REST)]
 FoldAngle = Annotated[float, _FOLD, spelled("angle", _FOLD)]

@@ -38,19 +38,52 @@ from bh.scene.reading import (
     Stiff,
     Stiffness,
     Table,
+    Turn,
     Vector,
 )
 from meshes.cells import Kind
 
 
 class SheetTable(Table):
-    """Material and thickness of the sheet."""
+    """Material and thickness of the sheet; with a grain E1 and nu12 are other names of E and nu."""
 
-    E: Modulus = Field(
-        description="Young's modulus in MPa, a positive number up to 1e9 MPa (1 GPa is 1000 MPa)"
+    E: Modulus | None = Field(
+        None, description="Young's modulus in MPa, a positive number up to 1e9 MPa (1 GPa is 1000 MPa)"
     )
-    nu: Annotated[float, Field(gt=-1.0, le=0.5)] = Field(0.0, description="Poisson's ratio in (-1, 0.5]")
+    nu: Annotated[float, Field(gt=-1.0, le=0.5)] | None = Field(
+        None, description="Poisson's ratio in (-1, 0.5]"
+    )
     t: Length = Field(description="the thickness in mm, a positive number")
+    E1: Modulus | None = Field(None, description="Young's modulus along the grain in MPa, a positive number")
+    E2: Modulus | None = Field(None, description="Young's modulus across the grain in MPa, a positive number")
+    G12: Modulus | None = Field(
+        None, description="the shear modulus of a sheet with a grain in MPa, a positive number"
+    )
+    nu12: Annotated[float, Field(gt=-100.0, lt=100.0)] | None = Field(
+        None, description="Poisson's ratio of a pull along the grain, nu12^2 < E1 / E2"
+    )
+    grain: Turn | None = Field(
+        None,
+        description="the direction of the grain in the drawing in rad from its x axis, from -2 pi to 2 pi",
+    )
+
+    @model_validator(mode="after")
+    def one_name(self) -> SheetTable:
+        """Check that the modulus is there, and that nothing is given by two names."""
+        for name, other in (("E", "E1"), ("nu", "nu12")):
+            if getattr(self, name) is not None and getattr(self, other) is not None:
+                raise ValueError(f"has both {name} and {other}, which are one value; remove one of them")
+        if self.E is None and self.E1 is None:
+            raise ValueError(
+                "needs E, Young's modulus in MPa; or E1, E2, G12, nu12 and grain of a sheet with a grain"
+            )
+        if self.E2 is None and self.G12 is None and self.grain is None:
+            for name in ("E1", "nu12"):
+                if getattr(self, name) is not None:
+                    raise ValueError(
+                        f"has {name} but no grain; give E2, G12 and grain too, or E and nu alone"
+                    )
+        return self
 
 
 class GmshTable(Table):

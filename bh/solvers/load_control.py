@@ -15,7 +15,16 @@ from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import GAP, KNOWN_GAP, count_negative, neutral_mode
 from bh.solvers.newton import INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
-from bh.solvers.points import CriticalPoint, Increment, Point, extrapolate, fold_ahead, point, power_rate
+from bh.solvers.points import (
+    CriticalPoint,
+    Increment,
+    Point,
+    extrapolate,
+    fold_ahead,
+    lambda_after,
+    point,
+    power_rate,
+)
 from bh.solvers.stability import leave_saddle, locate
 from bh.solvers.system import System, limited
 
@@ -67,6 +76,8 @@ class LoadControl:
             ("stable"), stay on the one that is not stable ("primary"), or end with the outcome "bifurcation" ("stop").
         foresee: hand over as soon as the last states point at a limit point in the next increment, instead of
             finding out by cutting it; only of use where something else can pass it (`Automatic`).
+        guess: unknowns (n,) near an equilibrium of a system at a lambda, or None: tried where Newton's method finds no
+            way from the last states, before the energy is minimised.
     """
 
     first_rotation: float = math.radians(90.0)
@@ -82,6 +93,7 @@ class LoadControl:
     brisk: int = 2
     at_bifurcation: AtBifurcation = "stable"
     foresee: bool = False
+    guess: Callable[[System, float], Array | None] | None = field(default=None, compare=False)
 
     def limits(self, system: System) -> tuple[float, float]:
         """First and largest increment of lambda for a system."""
@@ -115,9 +127,7 @@ class LoadControl:
         held: Array | None = None  # the neutral mode, once the path has one
         while points[-1].lam < 1.0:
             here = points[-1]
-            left = 1.0 - here.lam
-            # do not leave a crumb for the end
-            lam = 1.0 if step > 0.999 * left else here.lam + (0.5 * left if step > 0.7 * left else step)
+            lam = lambda_after(here.lam, step)
             fold = fold_ahead(points, system.primal)
             if self.foresee and fold <= lam and len(cuts) > 2:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
@@ -151,7 +161,7 @@ class LoadControl:
                     )
                     return
                 continue
-            if held is not None or tried.solution.globalised:
+            if held is not None or cuts or tried.solution.globalised:
                 held = _neutral(system, tried.point, known=held is not None)
             critical = self._critical(system, here, tried.primary, lam)
             if self.at_bifurcation == "stop" and tried.solution.negative:
@@ -194,7 +204,11 @@ class LoadControl:
         primary = found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
         iterations, note, branch = found.iterations, "", NO_BRANCH
         downhill = look and not brisk and not found.converged
-        if downhill:
+        if downhill and self.guess is not None and (near := self.guess(system, lam)) is not None:
+            # no element forces go with it: the strain of interpolated positions is large, and none of the sheet's
+            primary = found = newton.solve_full(system, near, lam, np.zeros_like(here.forces))
+            iterations += found.iterations
+        if downhill and not found.converged:
             primary = found = replace(newton, full=0, transient=None).solve(system, q, lam)
             iterations += found.iterations
         # with one state only the increments are still large, and cutting them costs less than looking

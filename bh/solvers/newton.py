@@ -351,7 +351,13 @@ def full_step(
 
 
 def line_search(
-    system: System, q: Array, lam: float, now: Evaluation, descent: Descent
+    system: System,
+    q: Array,
+    lam: float,
+    now: Evaluation,
+    descent: Descent,
+    most: int = 30,
+    refused: Callable[[Array], bool] | None = None,
 ) -> tuple[Array, Evaluation, float] | None:
     """Step along a direction that lowers the merit enough (Armijo); None if there is none.
 
@@ -363,6 +369,8 @@ def line_search(
         lam: load parameter of the step, 0 to 1.
         now: the system's evaluation there.
         descent: the direction and its slopes.
+        most: steps tried, each shorter than the one before.
+        refused: whether unknowns (n,) are none to step to, however low; None where all are.
 
     Returns:
         (n,) unknowns, their evaluation and the part of the step that was taken, or None.
@@ -376,14 +384,15 @@ def line_search(
         now = system.evaluate(start, lam)
     dq = limited(system, start, dq, lam)
     noise = 1e-13 * max(abs(now.merit), abs(slope))
+    if slope > noise:
+        return None
     length = 1.0
-    for _ in range(30):
+    for _ in range(most):
         trial = start.copy()
         trial[:p] += length * dq[:p]
         there = system.evaluate(trial, lam)
-        if np.isfinite(there.energy) and (
-            there.merit <= now.merit + 1e-4 * length * min(slope, 0.0) + noise and slope <= noise
-        ):
+        low = there.merit <= now.merit + 1e-4 * length * min(slope, 0.0) + noise
+        if np.isfinite(there.energy) and low and not (refused and refused(trial)):
             return trial, there, length
         gain = there.merit - now.merit - length * slope
         best = -0.5 * slope * length**2 / gain if np.isfinite(gain) and gain > 0.0 else 0.0

@@ -173,6 +173,17 @@ def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:
     return q, forces
 
 
+def lambda_after(lam: float, step: float) -> float:
+    """Where an increment of size `step` leads to; it leaves no crumb for the end of the step at 1.
+
+    Args:
+        lam: of the last state, below 1.
+        step: increment of lambda that is wanted.
+    """
+    left = 1.0 - lam
+    return 1.0 if step > 0.999 * left else lam + (0.5 * left if step > 0.7 * left else step)
+
+
 def fold_ahead(points: Sequence[Point], primal: int) -> float:
     """Estimated lambda of the limit point that the path runs into, from its last three points; inf if none is seen.
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from bh.solvers.factor import Factor
 from bh.solvers.load_control import jump
 from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted
-from bh.solvers.newton import NEAR_SADDLE, Newton, Solution, roll_off
+from bh.solvers.newton import NEAR_SADDLE, Newton, Solution, line_search, roll_off
 from bh.solvers.outcome import Outcome
-from bh.solvers.points import Increment, Point, extrapolate, point
+from bh.solvers.points import Increment, Point, extrapolate, lambda_after, point
 from bh.solvers.system import Evaluation, Hinged, System
 
 Array = NDArray[np.float64]
@@ -27,6 +27,7 @@ NOTE = "settled: moved downhill to rest"
 STILL = 1e-10  # relative fall of the energy in a step that no longer moves the sheet
 CALM = 1e-6  # imbalance of a state at rest whose energy has stopped falling, in steps as soft as rounding
 STUCK = 40  # such steps, after which a face has collapsed and what moves is rounding
+TRIED = 14  # lengths of a step downhill, before the shift is raised
 KEPT = 0.2  # of the way of a hinge to closed that a step leaves
 MISMATCH = 0.2  # of the energy gained in an increment and the work done, behind which there is a jump
 GROWTH = 1.6  # of an increment behind one that Newton's method took
@@ -69,8 +70,7 @@ class Settling:
         iterations, cuts = 0, []
         while points[-1].lam < 1.0:
             here = points[-1]
-            left = 1.0 - here.lam
-            lam = 1.0 if step > 0.999 * left else here.lam + (0.5 * left if step > 0.7 * left else step)
+            lam = lambda_after(here.lam, step)
             found, note = self._at(system, points, lam)
             iterations += found.iterations
             if not found.converged:
@@ -161,29 +161,16 @@ def _guess(points: Sequence[Point], lam: float) -> tuple[Array, float, Array]:
 def _downhill(
     system: System, q: Array, lam: float, now: Evaluation, factor: Factor
 ) -> tuple[Array, Evaluation, float] | None:
-    """A step along which the merit falls enough (Armijo) and no hinge turns too far; None if there is none.
-
-    Multipliers are changed before and held while looking.
-    """
-    descent, p = factor.descend(now.residual), system.primal
-    start = q
-    if len(q) > p:
-        start = q.copy()
-        start[p:] += descent.direction[p:]
-        now = system.evaluate(start, lam)
-    noise = 1e-13 * max(abs(now.merit), abs(descent.slope))
-    length = 1.0
-    for _ in range(14):
-        trial = start.copy()
-        trial[:p] += length * descent.direction[:p]
-        there = system.evaluate(trial, lam)
-        low = there.merit <= now.merit + 1e-4 * length * min(descent.slope, 0.0) + noise
-        if np.isfinite(there.energy) and low and not _too_far(system, q, trial, lam):
-            return trial, there, length
-        gain = there.merit - now.merit - length * descent.slope
-        best = -0.5 * descent.slope * length**2 / gain if np.isfinite(gain) and gain > 0.0 else 0.0
-        length = min(max(best, 0.1 * length), 0.5 * length)
-    return None
+    """A step along which the merit falls enough and no hinge turns too far; None if there is none."""
+    return line_search(
+        system,
+        q,
+        lam,
+        now,
+        factor.descend(now.residual),
+        TRIED,
+        lambda trial: _too_far(system, q, trial, lam),
+    )
 
 
 def _too_far(system: System, q: Array, trial: Array, lam: float) -> bool:

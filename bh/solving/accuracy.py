@@ -89,7 +89,8 @@ def solve(
     ):
         name, step = turn
         try:
-            path, trial = task.solve(ladders[name], name, race.tried[name][-1], step)
+            coarser = found[-1].path if found and found[-1].formulation == name else None
+            path, trial = task.solve(ladders[name], name, race.tried[name][-1], step, coarser)
         except MeshError as error:
             failed = failed or error
             race.out[name] = f"{name} has no mesh of this sheet ({error.args[0].split(';')[0]})"
@@ -127,8 +128,10 @@ class _Task:
     symmetry: Plane | None
     levels: Levels | None
 
-    def solve(self, ladder: Ladder, name: str, level: float, step: int) -> tuple[Path, Trial]:
-        """Solve mesh number `step` of a ladder."""
+    def solve(
+        self, ladder: Ladder, name: str, level: float, step: int, coarser: Path | None
+    ) -> tuple[Path, Trial]:
+        """Solve mesh number `step` of a ladder; `coarser` is the path on the one before."""
         clock = time.perf_counter()
 
         def on_mesh(mesh: SheetMesh, cells: Cells) -> Path:
@@ -141,6 +144,7 @@ class _Task:
                 symmetry=self.symmetry,
                 file=file,
                 resume=file is not None and file.exists(),
+                coarser=coarser if self.symmetry is None else None,
             )
 
         path, cells = ladder.solve(step, on_mesh)

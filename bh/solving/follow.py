@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -11,8 +12,11 @@ from typing import TYPE_CHECKING
 
 from bh.errors import ModelError, PathFileError
 from bh.formulations.observables import measure
+from bh.loading.builder import load_steps
+from bh.loading.load_step import same_until_here
+from bh.model.compare import differing_keys, first_differing_step, in_words
 from bh.model.model import Model
-from bh.model.serialise import fingerprint
+from bh.model.serialise import describe, fingerprint
 from bh.paths.path import Path, new_file
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import PathFile
@@ -23,6 +27,7 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import LOAD, Point, point
 from bh.solvers.trace import Strategy, Walk, walk
+from bh.solving.coarser import Coarser
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -39,6 +44,7 @@ def follow(
     file: str | FilePath | None = None,
     resume: bool = False,
     after: Path | None = None,
+    coarser: Path | None = None,
 ) -> Path:
     """Follow the equilibrium of a model on its own mesh through all its steps; arguments as of `bh.trace`.
 
@@ -50,6 +56,7 @@ def follow(
         file: path file that every state is written to.
         resume: go on from what the file has.
         after: path whose end this one begins at.
+        coarser: path of the same sheet and formulation on a coarser mesh (`bh.solving.coarser`).
 
     Returns:
         the path up to where it got.
@@ -62,17 +69,20 @@ def follow(
     report = meter(progress)
     with nullcontext() if file is None else only_writer(FilePath(file)):
         path, target = _opened(model, symmetry, file, resume, after)
-        _walk(path, target, strategy, report)
+        _walk(path, target, strategy, report, None if coarser is None else Coarser(coarser))
     return path
 
 
-def _walk(path: Path, target: PathFile | None, strategy: Strategy, report: ProgressMeter) -> None:
+def _walk(
+    path: Path, target: PathFile | None, strategy: Strategy, report: ProgressMeter, coarser: Coarser | None
+) -> None:
     """Solve the steps that are left."""
     model = path.model
     try:
         for step in range(len(path.steps), len(model.steps)):
             with one_blas_thread():
-                end = _run_step(path, step, strategy, report, target)
+                way = strategy if coarser is None else coarser.guiding(strategy, model.mesh, step)
+                end = _run_step(path, step, way, report, target)
                 if end.reached and step == len(model.steps) - 1:
                     end = _stable_end(path, strategy)
             path.steps.append(end)
@@ -204,14 +214,62 @@ def _continued(after: Path, model: Model, symmetry: Plane | None) -> Path:
 def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path, PathFile]:
     path = Path.load(file)
     if path.provenance.get("input") != fingerprint(model):
-        raise PathFileError(
-            f"'{file}' holds another model; run without --resume, or choose another output folder"
-        )
+        return _resume_before(path, _kept_steps(path, model, file), model, file, symmetry)
     path = _with_model(path, model, symmetry)
     target = PathFile.open(file)
     target.forget_failed_steps()
     path.steps = [step for step in path.steps if step.reached]
     return path, target
+
+
+def check_resumable(file: FilePath, model: Model) -> None:
+    """See that a path file has steps that a model can go on from.
+
+    Args:
+        file: the path file.
+        model: to be solved.
+
+    Raises:
+        PathFileError: it has none; one line that names what differs.
+    """
+    _kept_steps(Path.load(file), model, file)
+
+
+def _kept_steps(path: Path, model: Model, file: FilePath) -> int:
+    """How many steps of a stored path are steps of the model, too.
+
+    Raises:
+        PathFileError: more than later steps differ, or no step is left to go on from; one line that names the keys.
+    """
+    data, arrays = describe(path.model)
+    keys = differing_keys(json.loads(json.dumps(data)), arrays, model)
+    first = first_differing_step(keys)
+    done = sum(step.reached for step in path.steps)
+    kept = min(first or 0, done)
+    if kept > 0 and all(
+        same_until_here(one, other)
+        for one, other in zip(load_steps(path.model)[:kept], load_steps(model)[:kept], strict=True)
+    ):
+        return kept
+    raise PathFileError(
+        f"'{file}' holds another model: it differs in {in_words(keys)}; run with --force (without resume), or "
+        "choose another output folder"
+    )
+
+
+def _resume_before(
+    path: Path, kept: int, model: Model, file: FilePath, symmetry: Plane | None
+) -> tuple[Path, PathFile]:
+    """Go on from the last state of the first `kept` steps, in a file that holds these only."""
+    fresh = Path(model, symmetry=symmetry)
+    fresh.records = [record for record in path.records if record.step < kept]
+    fresh.steps = path.steps[:kept]
+    target = new_file(fresh, file)
+    for index in range(len(fresh)):
+        target.add(fresh.row(index))
+    for step, end in enumerate(fresh.steps):
+        target.finish_step(step, *astuple(end))
+    return fresh, target
 
 
 def _with_model(path: Path, model: Model, symmetry: Plane | None) -> Path:

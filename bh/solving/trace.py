@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
-from bh.errors import ModelError
+from bh.errors import ModelError, NotReachedWarning
 from bh.model.model import Model
 from bh.paths.path import Path
 from bh.runtime.compiling import compilation_told
@@ -29,6 +30,7 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
     accuracy: float | Goal | None = None,
     estimate: bool = False,
     after: Path | None = None,
+    warn: bool = True,
 ) -> Path:
     """Follow the equilibrium of `model` through all its steps.
 
@@ -48,10 +50,11 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
         estimate: solve one coarser mesh, too, for an estimate of the error (`path.accuracy`), at about a quarter of the
             cost; where it cannot be had, `path.estimate_reason` says why.
         after: a solved path of the same model with fewer steps, whose states this one begins with.
+        warn: give a `bh.NotReachedWarning` where the path ends early; False where the caller looks at its outcome.
 
     Returns:
         the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
-        its reason and keeps everything up to there.
+        its reason and keeps everything up to there; `path.require()` raises then.
 
     Raises:
         ModelError: the model has no steps, or cannot be solved as described.
@@ -69,22 +72,25 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
     report = meter(progress)
     with compilation_told(report):
         if accuracy is not None:
-            return _to_accuracy(model, accuracy, symmetry, report, strategy, file, resume)
-        path = follow(
-            model,
-            symmetry=symmetry,
-            progress=report,
-            strategy=strategy,
-            file=file,
-            resume=resume,
-            after=after,
-        )
+            path = _to_accuracy(model, accuracy, symmetry, report, strategy, file, resume)
+        else:
+            path = follow(
+                model,
+                symmetry=symmetry,
+                progress=report,
+                strategy=strategy,
+                file=file,
+                resume=resume,
+                after=after,
+            )
         if estimate and path.accuracy is None:
             from bh.solving.given_mesh import add_estimate
 
             add_estimate(path, progress=report, strategy=strategy, symmetry=symmetry)
             if file is not None:
                 path.save_accuracy(file)
+    if warn and not path.reached:
+        warnings.warn(path.early_end, NotReachedWarning, stacklevel=2)
     return path
 
 

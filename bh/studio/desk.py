@@ -128,11 +128,11 @@ class Desk:
         now = self.sheet.model.sheet
         if message.name is not None:
             young, nu, t, _ = material_of(message.name)
-            self.material = message.name
-        else:
-            young, nu, t = now.E, now.nu, now.t
-        nu = nu if self.sheet.model.formulation != "bars-and-hinges" else 0.0
-        sheet = Sheet(E=message.E or young, nu=nu if message.nu is None else message.nu, t=message.t or t)
+            self.material, now = message.name, Sheet(E=young, nu=nu, t=t)
+        nu = now.nu if self.sheet.model.formulation != "bars-and-hinges" else 0.0
+        sheet = replace(
+            now, E=message.E or now.E, nu=nu if message.nu is None else message.nu, t=message.t or now.t
+        )
         self.put(self.sheet.of(sheet), self.session.wanted)
 
     def _check(self) -> Json:
@@ -140,7 +140,7 @@ class Desk:
         frame = self.session.rest(20.0)
         if not any(step.actuations for step in self.session.scene().steps):
             return _line("there is nothing to check yet")
-        path = trace(self.session.scene(), estimate=True)
+        path = trace(self.session.scene(), estimate=True, warn=False)
         off = float(np.abs(path[-1].points - frame.points).max())
         error = path.accuracy
         estimate = (

@@ -6,6 +6,7 @@ import io
 import json
 import tempfile
 import zipfile
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +84,8 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
         )
     model = session.scene()
     lines = [f"# {sheet.name} as it stood in bh studio; run it by `bh run`. mm, N, rad.", "", sheet.tables]
-    lines += ["[sheet]", f"E = {model.sheet.E!r}", f"nu = {model.sheet.nu!r}", f"t = {model.sheet.t!r}", ""]
+    values = {item.name: getattr(model.sheet, item.name) for item in fields(model.sheet)}
+    lines += ["[sheet]", *(f"{key} = {value!r}" for key, value in values.items() if value is not None), ""]
     for support in model.supports:
         assert isinstance(support, Support)
         at = support.at if isinstance(support.at, str) else list(support.at)

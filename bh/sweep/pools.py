@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
@@ -206,6 +208,8 @@ class Dask:
             security = _temporary_certificate(Security)
             self._cluster = _local_cluster(LocalCluster, workers, security)
         try:
+            if address is not None:
+                reach(address)
             self._client: Client = Client(
                 self._cluster or address, timeout=ANSWER_S, set_as_default=False, security=security
             )
@@ -213,7 +217,7 @@ class Dask:
             if self._cluster is not None:
                 self._cluster.close(timeout=2)
             raise
-        except (OSError, ValueError) as error:  # a time-out is an OSError
+        except (OSError, TypeError, ValueError) as error:  # a time-out is an OSError
             raise SweepError(
                 f"the scheduler '{address}' does not answer ({' '.join(str(error).split())}); start it with "
                 "`dask scheduler` or check its address"
@@ -280,6 +284,42 @@ class Dask:
         if self._cluster is not None:
             with contextlib.suppress(Exception):
                 self._cluster.close(timeout=5)
+
+
+def reach(address: str) -> None:
+    """Shake hands with a scheduler, and leave again.
+
+    A `Client` that is refused is one more thing to be collected, and where that happens while another one starts, both
+    wait for the same lock for ever: so none is made before the scheduler has answered.
+
+    Args:
+        address: of the scheduler; Dask's own settings say which keys are shown.
+
+    Raises:
+        OSError: nobody answers within `ANSWER_S`.
+        TypeError: the address is one with keys, and there are none.
+        ValueError: no address.
+    """
+    from distributed import Security
+    from distributed.comm import connect
+
+    keys: dict[str, object] = Security().get_connection_args("client")
+    answer: Future[None] = Future()
+
+    async def shake_hands() -> None:
+        connection = await connect(address, timeout=ANSWER_S, **keys)
+        await connection.close()
+
+    def wait() -> None:
+        try:
+            answer.set_result(asyncio.run(shake_hands()))
+        except BaseException as error:
+            answer.set_exception(error)
+
+    threading.Thread(
+        target=wait, daemon=True
+    ).start()  # the caller's own thread may run a loop, as a notebook's does
+    answer.result()
 
 
 def _temporary_certificate(kind: type[Security]) -> Security:

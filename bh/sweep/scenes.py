@@ -91,7 +91,7 @@ class SceneTask:
     def __call__(self, parameters: Mapping[str, Value]) -> Measured:
         """Solve the scene of a point and measure its last state."""
         scene = self.scene(parameters)
-        path = trace(scene.model, accuracy=scene.accuracy, strategy=scene.strategy)
+        path = trace(scene.model, accuracy=scene.accuracy, strategy=scene.strategy, warn=False)
         if not path.reached:
             where = f"step {len(path.steps)}, lambda {path.records[-1].lam:.6g}"
             return Measured({}, path.outcome, f"{where}: {path.reason}")

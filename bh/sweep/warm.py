@@ -34,16 +34,16 @@ def line(models: Sequence[Model]) -> list[Path]:
     Returns:
         The solved paths, in order.
     """
-    cold = {0: trace(models[0])}
+    cold = {0: trace(models[0], warn=False)}
     paths = list(_warm(models, cold[0]))
     checked = [i for i in (1, len(models) - 1) if i < len(paths) and len(paths) == len(models)]
     for i in checked:
-        cold[i] = trace(models[i])
+        cold[i] = trace(models[i], warn=False)
         if not same(paths[i], cold[i]) or paths[i].iterations >= cold[i].iterations:
             checked = []
             break
     if not checked and len(models) > 1:
-        return [cold[i] if i in cold else trace(model) for i, model in enumerate(models)]
+        return [cold[i] if i in cold else trace(model, warn=False) for i, model in enumerate(models)]
     return paths
 
 

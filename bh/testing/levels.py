@@ -199,7 +199,7 @@ def _traced(model: Model) -> tuple[Path, bool]:
     folder = None if test is None else test.cache
     key = None if folder is None else _key(model)
     if folder is None or key is None:
-        return trace(model), False
+        return trace(model, warn=False), False
     file = folder / f"{key}.bh"
     if file.is_file():
         try:
@@ -208,7 +208,7 @@ def _traced(model: Model) -> tuple[Path, bool]:
                 return found, True
         except (PathFileError, ModelError):
             file.unlink(missing_ok=True)
-    path = trace(model)
+    path = trace(model, warn=False)
     if path.reached:
         _keep(path, file)
     return path, False

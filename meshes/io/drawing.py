@@ -85,7 +85,7 @@ def read_drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) 
         **options: as for `read_pattern`.
 
     Raises:
-        FileFormatError: as for `read_pattern`; also lines that end inside the sheet.
+        FileFormatError: as for `read_pattern`.
     """
     return _naming_the_file(path, lambda: _drawn(path, **options))
 
@@ -109,6 +109,7 @@ def _pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) ->
 def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> SheetMesh:
     from meshes.io.fold import sheet_of_frame
     from meshes.io.fold_frame import Frame
+    from meshes.io.loose_ends import tie_ends
 
     graph, lines, remarks = read_graph(path, **options)
     region = region_of(graph, lines)
@@ -126,7 +127,13 @@ def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> S
     kept = np.setdiff1d(np.arange(len(graph.edges)), region.stubs).tolist()
     edges = [(int(a), int(b)) for a, b in graph.edges[kept].tolist()]
     letters, angles = [letters[e] for e in kept], [angles[e] for e in kept]
-    mesh = sheet_of_frame(Frame(points, edges, letters, angles if known else None, []))
+    frame = Frame(points, edges, letters, angles if known else None, [])
+    tied = tie_ends(frame, "MVFUC")
+    if more := len(tied.edges) - len(edges):
+        remarks.append(
+            f"facet lines ({more}) lead on where lines end inside the sheet, to cut its faces into triangles"
+        )
+    mesh = sheet_of_frame(tied)
     return replace(mesh, kind="drawn", remarks=(*remarks, *region.remarks, *mesh.remarks))
 
 

@@ -23,7 +23,7 @@ from meshes.errors import FileFormatError, InputError
 from meshes.io.export import replacing, shown
 from meshes.io.fold_faces import area, faces_of_graph, orient, sides_of, triangulate
 from meshes.io.fold_frame import UNITS, Frame, Side, check, laid_flat, load, select, show, side
-from meshes.io.loose_cuts import tie_cuts
+from meshes.io.loose_ends import tie_ends
 from meshes.io.sizes import check_lengths, size_remarks
 from meshes.mesh import SheetMesh
 from meshes.pattern import FoldKind
@@ -104,7 +104,7 @@ def sheet_of_frame(frame: Frame) -> SheetMesh:
     Raises:
         FileFormatError: the frame is not one manifold sheet, or lies over itself.
     """
-    frame = frame if frame.faces else tie_cuts(frame)
+    frame = frame if frame.faces else tie_ends(frame)
     faces = frame.faces or faces_of_graph(frame)
     sides = sides_of(faces)
     _check_edges(frame, sides)

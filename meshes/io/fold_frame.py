@@ -7,13 +7,14 @@ import math
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from meshes.curves import Array
 from meshes.errors import FileFormatError
+from meshes.io.files import drawing_bytes
+from meshes.limits import check_limit
 
 UNITS = {
     "unit": 1.0,
@@ -101,14 +102,10 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise FileFormatError(f"{constant} is not JSON; write a number")
 
     try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
+        text = drawing_bytes(path, "FOLD").decode("utf-8-sig")
         if not text.strip():
             raise FileFormatError("the file is empty; give a FOLD file")
         data = json.loads(text, parse_constant=refuse)
-    except IsADirectoryError as error:
-        raise FileFormatError("this is a folder; name a .fold file in it") from error
-    except OSError as error:
-        raise FileFormatError(f"cannot be read ({error.strerror}); check the name and rights") from error
     except UnicodeDecodeError as error:
         raise FileFormatError(f"byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
     except RecursionError as error:
@@ -195,6 +192,8 @@ def check(frame: dict[str, Any]) -> Frame:
     Raises:
         FileFormatError: one line that names the key, the place in it and the mend.
     """
+    for key in ("vertices_coords", "edges_vertices", "faces_vertices"):
+        check_limit("entities", len(_list(frame, key)), f"{key} of this frame", FileFormatError)
     points = _points(frame)
     count = len(points)
     edges: list[Side] = []

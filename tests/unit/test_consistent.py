@@ -87,6 +87,18 @@ def test_patch_tests(kind: Kind, nu: float) -> None:
             assert max(error.energy, error.inside) < 1e-10
 
 
+@pytest.mark.parametrize("degrees", [0.0, 25.0, 90.0])
+def test_patch_tests_of_a_sheet_with_a_grain(degrees: float) -> None:
+    sheet = Sheet.orthotropic(E1=1000.0, E2=300.0, G12=200.0, nu12=0.6, grain=f"{degrees}deg", t=0.1)
+    mesh = distorted("staggered", 1)
+    for F in STRETCHES.values():
+        error = stretching_error(mesh, sheet, np.array(F))
+        assert max(error.energy, error.inside) < 1e-10
+    for curvature in CURVATURES.values():
+        error = bending_error(mesh, sheet, np.array(curvature))
+        assert max(error.energy, error.inside) < 1e-10
+
+
 def test_patch_test_can_fail() -> None:
     """A sheet with another Poisson's ratio than the exact state has."""
     mesh = distorted("staggered", 1)

@@ -10,6 +10,7 @@ import sys
 from importlib import util
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 from urllib.parse import unquote
 
 import pytest
@@ -17,7 +18,7 @@ import pytest
 import bh
 from bh.formulations.protocols import Formulation
 from bh.solvers.system import System
-from reports.pdf import browser
+from tests.unit.browsers import needs_browser
 from tests.unit.test_plotting import needs_opengl
 from tests.unit.test_report import Page
 
@@ -173,15 +174,11 @@ def test_scripts_of_the_gallery_run(file: Path, site: Path) -> None:
 
 
 @needs_opengl
-@pytest.mark.skipif(browser() is None, reason="no chromium or chrome on this machine; .ci/run installs it")
-def test_sheets_of_the_gallery_turn(site: Path) -> None:
-    from tests.unit.test_report_browser import HARMLESS, OPTIONS, visit
+@needs_browser
+def test_sheets_of_the_gallery_turn(chromium: Any, site: Path) -> None:
+    from tests.unit.test_report_browser import HARMLESS, visit
 
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with api.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=browser(), args=[*OPTIONS, "--no-sandbox"])
-        seen = visit(chromium, site / "gallery" / "pleats.html")
-        seen.settle()
-        assert [told for told in seen.told if HARMLESS not in told] == []
-        assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)
-        chromium.close()
+    seen = visit(chromium, site / "gallery" / "pleats.html")
+    seen.settle()
+    assert [told for told in seen.told if HARMLESS not in told] == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)

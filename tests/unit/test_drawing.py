@@ -528,3 +528,23 @@ def test_svg_groups_uses_and_transforms(tmp_path: Path) -> None:
     pattern = read_pattern(svg(tmp_path, body))
     found = {crease.name: sample(crease.curve)[0, 0] for crease in pattern.creases}
     assert found == pytest.approx({"m1": 30.0, "v1": 70.0, "m2": 90.0})
+
+
+class TestLinesThatEndInside:
+    """Faces of drawings whose creases end in the middle of a panel are cut there by facet lines."""
+
+    BODY = '<rect width="100" height="60" stroke="black" fill="none"/>'
+
+    def test_a_crease_that_ends_inside_is_kept_and_tied(self, tmp_path: Path) -> None:
+        mesh = read_drawn(svg(tmp_path, self.BODY + '<path d="M0 30 H50" stroke="red"/>'))
+        assert mesh.areas.sum() == pytest.approx(6000.0)
+        (pair,) = mesh.crease_edges("m1")
+        assert sorted(mesh.points[pair][:, 0]) == pytest.approx([0.0, 50.0])
+        assert any(remark.startswith("facet lines (1) lead on") for remark in mesh.remarks)
+        assert len(mesh.points) == 6  # no node is added
+
+    def test_a_crease_that_floats_is_tied_at_both_ends(self, tmp_path: Path) -> None:
+        mesh = read_drawn(svg(tmp_path, self.BODY + '<path d="M30 30 H70" stroke="blue"/>'))
+        assert mesh.areas.sum() == pytest.approx(6000.0)
+        assert len(mesh.crease_edges("v1")) == 1
+        assert any(remark.startswith("facet lines (2) lead on") for remark in mesh.remarks)

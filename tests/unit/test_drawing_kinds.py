@@ -418,9 +418,9 @@ def test_bombs_are_refused_within_seconds(tmp_path: Path) -> None:
     for name, text in bombs.items():
         file = tmp_path / f"{name}.svg"
         file.write_text(text, encoding="utf-8")
-        began = time.perf_counter()
+        began = time.process_time()
         refused(partial(read_pattern, file))
-        assert time.perf_counter() - began < 20.0, name  # a bomb that goes off takes hours
+        assert time.process_time() - began < 20.0, name  # a bomb that goes off takes hours
     packed = io.BytesIO()
     with gzip.GzipFile(fileobj=packed, mode="wb") as file_:
         file_.write(bytes(80 * 2**20))

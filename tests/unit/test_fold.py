@@ -516,7 +516,7 @@ def test_bad_sheets(read: Read, coords: list[list[float]], faces: list[Any], wor
         (b"", "the file is empty"),
         (b" \n\t", "the file is empty"),
         (b"{", "this is not JSON"),
-        (b"\x89PNG\r\n", "byte 0 is not UTF-8"),
+        (b"\x89PNG\r\n", "a picture in PNG, not FOLD"),
         (b'{"a": "\xff"}', "byte 7 is not UTF-8"),
         (b"[1, 2]", "the top of the file is a list of 2"),
         (b"null", "the top of the file is null"),

@@ -14,7 +14,7 @@ from bh.commands.cli import main
 from bh.commands.fold import TimeUpError, _Clock
 from bh.errors import InputError
 from bh.runtime.progress import Silent
-from bh.scene.folding import proposals
+from bh.scene.folding import Wish, proposals
 from bh.scene.load import load_scene, parse_scene
 from meshes import unstructured
 from meshes.errors import FileFormatError
@@ -118,6 +118,35 @@ class TestOneCommand:
         assert 'formulation = "consistent"' in softer.text
         assert all('kind = "drawn"' in offer.text for offer in (only, softer))
         assert 'kind = "drawn"' in only.text
+
+    def test_turns_where_creases_cross_are_no_curve(self, tmp_path: Path) -> None:
+        """A spiral of a net turns by 11 degrees at every vertex, where others meet it."""
+        zigzag = '<path d="M0 30 L20 26 L40 26 L60 30 L80 38" stroke="red" fill="none"/>'
+        others = "".join(
+            f'<path d="M{x} 0 L{x} {y} L{x} 60" stroke="blue" fill="none"/>'
+            for x, y in ((20, 26), (40, 26), (60, 30))
+        )
+        assert [offer.mesh for offer in proposals(svg(tmp_path, RIM + zigzag + others))] == [
+            "the faces of the drawing",
+            "the faces of the drawing, which may bend",
+        ]
+        assert "gmsh" in proposals(svg(tmp_path, RIM + zigzag))[-3].text
+
+    def test_lines_that_nearly_meet_are_joined_as_the_remark_advises(self, tmp_path: Path) -> None:
+        knee = '<path d="M0 30 H39.8" stroke="red"/><path d="M40 0 V60" stroke="blue"/>'
+        first = proposals(svg(tmp_path, RIM + knee))[0]
+        assert "gap = 0.21" in first.text
+        assert any(line.startswith("lines that end close to others (1) are joined") for line in first.assumed)
+        mesh = parse_scene(first.text, tmp_path).model.mesh
+        assert mesh.points[mesh.crease_edges("m1")][..., 0].max() == pytest.approx(40.0)
+
+    def test_paper_is_taken_where_card_is_thick(self, tmp_path: Path) -> None:
+        narrow = "".join(
+            f'<path d="M{x} 0 V60" stroke="{"red" if x % 4 else "blue"}"/>' for x in range(2, 80, 2)
+        )
+        assert "t = 0.1" in proposals(svg(tmp_path, RIM + narrow))[0].text
+        assert "t = 0.3" in proposals(svg(tmp_path))[0].text
+        assert "t = 0.3" in proposals(svg(tmp_path, RIM + narrow), Wish(material="card"))[0].text
 
     @pytest.mark.parametrize(
         ("arguments", "words"),

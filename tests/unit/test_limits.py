@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ezdxf.filemanagement import new
 
 import bh
 import meshes
+from meshes.choices import first_mesh
 from meshes.errors import InputError
 from meshes.io import read_fold, read_pattern
 from meshes.limits import Limits, limits
@@ -51,16 +53,23 @@ SCENES = {
         ),
         "9,000 pieces, more than 1,000",
     ),
-    "along": (scene(ANNULUS.format(40.0), "along = 999999"), "some 4e+06 triangles, more than 1,000,000"),
+    "along": (scene(ANNULUS.format(40.0), "along = 999999"), "some 4e+06 triangles, more than 250,000"),
     "rows": (scene(ANNULUS.format(40.0), "along = 600\nrows = 999"), "some 2.4e+06 triangles"),
     "aspect": (
         scene(ANNULUS.format(40.0), "aspect_ratio = 1e4\nrows = 99"),
-        "triangles, more than 1,000,000",
+        "triangles, more than 250,000",
     ),
-    "size": (scene(ANNULUS.format(40.0), 'kind = "gmsh"\nsize = 1e-4'), "triangles, more than 1,000,000"),
+    "size": (scene(ANNULUS.format(40.0), 'kind = "gmsh"\nsize = 1e-4'), "triangles, more than 250,000"),
     "near": (
         scene(ANNULUS.format(40.0), 'kind = "gmsh"\nsize = 5.0\nnear = { "crease:crease" = 1e-6 }'),
-        "triangles, more than 1,000,000",
+        "triangles, more than 250,000",
+    ),
+    "growth": (
+        scene(
+            ANNULUS.format(40.0),
+            'kind = "gmsh"\nsize = 5.0\nnear = { "crease:crease" = 0.05 }\ngrowth = 1e-9',
+        ),
+        "triangles, more than 250,000",
     ),
     "steps": (scene(ANNULUS.format(40.0), steps=2_000), "2,000 steps, more than 1,000"),
 }
@@ -157,6 +166,35 @@ def test_rows_of_a_cp_file_are_counted_first(tmp_path: Path) -> None:
     file.write_text("2 0 0 1 1\n" * 30_000, encoding="utf-8")
     with pytest.raises(InputError, match="30,000 entities, more than 20,000"):
         read_pattern(file)
+
+
+def test_vertices_edges_and_faces_of_a_fold_file_are_counted_first(tmp_path: Path) -> None:
+    file = tmp_path / "bomb.fold"
+    corners = [[0, 0], [1, 0], [0, 1]]
+    frames = {
+        "vertices_coords": {"vertices_coords": [[0, 0]] * 30_000},
+        "edges_vertices": {"vertices_coords": corners, "edges_vertices": [[0, 0]] * 30_000},
+        "faces_vertices": {"vertices_coords": corners, "faces_vertices": [[0, 0, 0]] * 30_000},
+    }
+    for key, frame in frames.items():
+        file.write_text(json.dumps(frame), encoding="utf-8")
+        with pytest.raises(InputError, match=f"{key} of this frame has 30,000 entities, more than 20,000"):
+            read_fold(file)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_a_pipe_is_no_fold_file(tmp_path: Path) -> None:
+    """It would be waited for."""
+    os.mkfifo(tmp_path / "pipe.fold")
+    with pytest.raises(InputError, match="no plain file"):
+        read_fold(tmp_path / "pipe.fold")
+
+
+def test_a_thousand_sines_are_meshed_in_seconds() -> None:
+    """Lengths along a curve of 2,049 vertices are added up once, not with every point that is asked for."""
+    began = time.process_time()
+    first_mesh(meshes.sine_tessellation(creases=250, amplitude=0.001))
+    assert time.process_time() - began < 5.0
 
 
 def test_limits_are_raised_and_lowered_by_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:

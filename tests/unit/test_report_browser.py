@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,15 +13,10 @@ import bh
 import meshes
 from bh.plotting import interactive
 from reports.build import build
-from reports.pdf import browser
+from tests.unit.browsers import needs_browser
 from tests.unit.test_report import results, write
 
-PROGRAM = browser()
-pytestmark = pytest.mark.skipif(
-    PROGRAM is None, reason="no chromium or chrome on this machine; .ci/run installs it"
-)
-# WebGL without a graphics card; root may start it only without its sandbox
-OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+pytestmark = needs_browser
 PAGES = ("report.html", "report/chapter-3.html", "report/appendix-b.html", "report/solver.html")
 PATIENCE = 120_000  # ms; on a busy machine plotly takes its time
 HARMLESS = "willReadFrequently"  # advice to plotly about its speed
@@ -67,16 +60,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write(found, data)
     build(found, found / "report.html")
     return found
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    alone = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-    with api.sync_playwright() as driver:
-        found = driver.chromium.launch(executable_path=PROGRAM, args=[*OPTIONS, *alone])
-        yield found
-        found.close()
 
 
 def visit(chromium: Any, file: Path, width: int = 1200, **options: Any) -> Visit:

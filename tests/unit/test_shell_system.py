@@ -22,8 +22,13 @@ from fem.state import ShellState
 from fem.system import ShellSystem
 from meshes import SheetMesh
 from meshes.curved import lift
+from verification.studies.solver.patch_tests import strain_energy_density
 from verification.theory.shell_benchmarks import rectangle
 
+PATCHES = (
+    Sheet(E=10.0, nu=0.3, t=0.5),
+    Sheet.orthotropic(E1=10.0, E2=4.0, G12=2.5, nu12=0.4, grain=0.5, t=0.5),
+)
 MYLAR = Sheet(E=4000.0, nu=0.38, t=0.127)
 SECTOR = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.6), along=5, rows=2, kind="mirrored")
 
@@ -140,17 +145,16 @@ def test_carried_frames_change_nothing() -> None:
     assert np.abs(c.alpha(here.components)).max() > 0.5
 
 
-def test_membrane_patch() -> None:
+@pytest.mark.parametrize("sheet", PATCHES)
+def test_membrane_patch(sheet: Sheet) -> None:
     """A homogeneous deformation has the energy of its constant Green strain: exactly in straight triangles, whose
     pulled-back strain is constant, and nearly in those with a curved edge."""
-    sheet = Sheet(E=10.0, nu=0.3, t=0.5)
     elements = shell_elements(lift(distorted(SECTOR)), sheet)
     A = np.array([[1.1, 0.05], [-0.1, 0.9], [0.3, 0.2]])
     x = elements.mesh.nodes[:, :2] @ A.T
     strain, _ = elements.measures(x, np.zeros((len(elements.areas), 3, 2)), flat_frames(elements.mesh))
     green = 0.5 * (A.T @ A - np.eye(2))
-    density = sheet.E * sheet.t / (2 * (1 - sheet.nu**2))
-    density *= (1 - sheet.nu) * (green**2).sum() + sheet.nu * np.trace(green) ** 2
+    density = strain_energy_density(sheet, green)
     energy = 0.5 * np.einsum("tk,tkl,tl->t", strain, elements.membrane, strain)
     np.testing.assert_allclose(energy, density * elements.areas, rtol=3e-4)
     straight = (
@@ -164,9 +168,9 @@ def test_membrane_patch() -> None:
     np.testing.assert_allclose(energy[straight], (density * elements.areas)[straight], rtol=1e-12)
 
 
-def test_bending_patch() -> None:
+@pytest.mark.parametrize("sheet", PATCHES)
+def test_bending_patch(sheet: Sheet) -> None:
     """Small quadratic deflections of a distorted mesh have the energy of their constant curvature, exactly."""
-    sheet = Sheet(E=10.0, nu=0.3, t=0.5)
     mesh = distorted(rectangle(4.0, 3.0, 4, 3))
     elements = shell_elements(lift(mesh), sheet)
     x, size = elements.mesh.nodes.copy(), 1e-6
@@ -181,7 +185,7 @@ def test_bending_patch() -> None:
     gamma = np.where(elements.loops.sides[..., None] > 0, gamma, gamma[..., ::-1])
     _, curvature = elements.measures(x, gamma, flat_frames(elements.mesh))
     energy = 0.5 * np.einsum("tk,tkl,tl->t", curvature, elements.bending, curvature)
-    density = sheet.bending_stiffness() / 2 * ((1 - sheet.nu) * (H**2).sum() + sheet.nu * np.trace(H) ** 2)
+    density = sheet.t**2 / 12.0 * strain_energy_density(sheet, H)
     np.testing.assert_allclose(energy, density * elements.areas, rtol=1e-6)
 
 

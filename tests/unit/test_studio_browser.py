@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import threading
 import zipfile
 from collections.abc import Iterator
@@ -16,13 +15,9 @@ import pytest
 import bh
 from bh.scene.load import load_scene
 from bh.studio.server import Studio
-from reports.pdf import browser
+from tests.unit.browsers import needs_browser
 
-PROGRAM = browser()
-pytestmark = pytest.mark.skipif(
-    PROGRAM is None, reason="no chromium or chrome on this machine; .ci/run installs it"
-)
-OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+pytestmark = needs_browser
 PATIENCE = 15_000  # ms
 DATA = Path(__file__).resolve().parents[1] / "data"
 
@@ -59,16 +54,6 @@ def address() -> Iterator[str]:
     yield found[0]
     loop.call_soon_threadsafe(tasks[0].cancel)
     thread.join(10.0)
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    alone = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-    with api.sync_playwright() as driver:
-        found = driver.chromium.launch(executable_path=PROGRAM, args=[*OPTIONS, *alone])
-        yield found
-        found.close()
 
 
 class Visit:

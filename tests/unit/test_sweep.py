@@ -196,8 +196,10 @@ def _address(file: Path) -> str:
 
 
 def test_a_silent_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And no client was made, whose end can wait for ever for the start of another."""
     pytest.importorskip("distributed")
     monkeypatch.setattr("bh.sweep.pools.ANSWER_S", 0.5)
+    monkeypatch.setattr("distributed.Client.__init__", lambda *_, **__: pytest.fail("a client was made"))
     with pytest.raises(bh.sweep.SweepError, match="does not answer") as told:
         bh.sweep.Dask("tcp://127.0.0.1:9")
     assert "\n" not in str(told.value)

@@ -56,7 +56,9 @@ def fold(
     if isinstance(mesh, CreasePattern):
         mesh = structured(mesh, along=along, rows=rows)
     model = Model(mesh, sheet, formulation=formulation).support("rigid-body")
-    path = trace(model.fold("all", by=SHARPEST, Lstar=Lstar, until=depth(depth_mm)), strategy=strategy)
+    path = trace(
+        model.fold("all", by=SHARPEST, Lstar=Lstar, until=depth(depth_mm)), strategy=strategy, warn=False
+    )
     if not path.reached:
         raise ModelError(
             f"the corrugation cannot be folded {depth_mm:g} mm deep ({path.outcome}: {path.reason})"

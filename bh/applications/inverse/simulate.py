@@ -179,7 +179,7 @@ def simulate(
     Raises:
         DesignError: the path ended early.
     """
-    path = trace(model(k0, lengths, pinched, setting))
+    path = trace(model(k0, lengths, pinched, setting), warn=False)
     if not path.reached:
         raise DesignError(f"the strip cannot be folded and pinched: {path.outcome} ({path.reason})")
     start, end = frames(path[-1])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
 from bh.mechanics.bars_and_hinges.stiffness import (
     bending_hinge_stiffness,
@@ -61,8 +62,16 @@ def sheet_elements(
         load_step: actuations of the step.
         prescribed_start: (m,) dihedral angles of all hinges at the start, rad.
         moment_start: (m,) total moments of all hinges at the start, N mm; zero off creases.
+
+    Raises:
+        ModelError: a sheet with a grain.
     """
     mesh, sheet = model.mesh, model.sheet
+    if sheet.grain is not None:
+        raise ModelError(
+            "bars and hinges are alike in all directions; fold a sheet with a grain in the formulation 'consistent' or "
+            "'shell', or leave out E2, G12 and grain"
+        )
     topology = mesh.topology
     points = mesh.points
     edge_vector = points[topology.edges[:, 1]] - points[topology.edges[:, 0]]

@@ -205,9 +205,7 @@ class BarsAndHingesSystem(SupportedSheet):
         e = self.elements
         bars = len(e.bars)
         x = self.positions(q, lam)
-        touching = None if self.barrier is None else self.barrier.blocks(x)
-        if touching is not None and not self.contact_blocks.known(touching[0]):
-            vars(self).pop("_pattern", None)
+        touching = self._touching(x)
         pattern = self._pattern
         data = np.zeros(pattern.size)
         linear = Linearised(np.empty((bars, 3)), np.empty((len(e.hinges), 12)), np.empty(len(e.hinges)))

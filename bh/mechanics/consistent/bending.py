@@ -23,7 +23,7 @@ class Bending:
     """Energy of the angles theta (c, a) of patches; its element forces are the moments M (c, a), N mm.
 
     Args:
-        law: of the curvature.
+        law: of the curvature, in the frame of the first triangle of every patch.
         maps: (t, 3, 3) curvatures (xx, yy, 2 xy) of triangles from the angles at their edges, 1 / mm.
         area: (t,) of the triangles that counts, mm^2.
         quad, ghost, rotation: of the angles, see `bh.mechanics.consistent.kernels`.

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
-from bh.materials import Constant, LinearElastic, Material
+from bh.materials import Constant, Directed, Law, LinearElastic, Material
+from bh.materials.protocols import in_axes
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.bending import Bending
 from bh.mechanics.consistent.kernels import OWN, TURN
@@ -19,6 +20,7 @@ from bh.mechanics.consistent.patches import (
     Patches,
     bending_matrices,
     curvature_maps,
+    frame_angles,
     patches,
     triangle_frames,
 )
@@ -28,6 +30,7 @@ from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
 from bh.model.ramp import Ramp
+from bh.model.sheet import Sheet
 from bh.solvers.matrices import reverse_cuthill_mckee
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -107,7 +110,8 @@ def consistent_elements(
         material: laws of strain and of curvature.
 
     Raises:
-        ModelError: given element stiffness, or a couple on a crease that is no spring.
+        ModelError: given element stiffness, a couple on a crease that is no spring, or a grain that the material does
+            not know.
     """
     if model.stiffness is not None:
         raise ModelError("given bar and hinge stiffness is of bars-and-hinges only; use that formulation")
@@ -115,8 +119,9 @@ def consistent_elements(
     _check_moments(mesh, load_step)
     topology = mesh.topology
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
-    maps, of_curvature = curvature_maps(edges, areas), material.bending(sheet)
-    B = bending_matrices(maps, areas, of_curvature.moduli(np.zeros((1, 3)))[0])
+    of_strain, of_curvature = _laws(material, sheet)
+    maps, angle = curvature_maps(edges, areas), frame_angles(mesh.points, mesh.triangles)
+    B = bending_matrices(maps, areas, in_axes(of_curvature, angle).moduli(np.zeros((len(areas), 3))))
     clamped = np.zeros(len(topology.edges), dtype=bool)
     clamped[topology.find_edges(load_step.constraints.clamped)] = True
     spring = law == SPRING
@@ -129,7 +134,8 @@ def consistent_elements(
         joined = half_patches(joined, spring, plane)
     rotation, turns, rotations = _number_rotations(mesh, joined, spring, plane)
     part_area = areas if part is None else part * areas
-    membrane, law_of_strain = measure(mesh, creased(mesh, law)), material.stretching(sheet)
+    membrane = measure(mesh, creased(mesh, law))
+    bending_law = in_axes(of_curvature, angle[joined.members[:, 0]])
     quad, ghost = _quads(mesh, joined)
     nodes, place = _rows(joined, quad)
     has = rotation >= 0
@@ -139,12 +145,7 @@ def consistent_elements(
     # local axes are turned in blocks of three rows: there must be as many nodes, be they none
     nodes = np.pad(nodes, ((0, 0), (0, -(-int(width.max()) // 3) - nodes.shape[1])), constant_values=-1)
 
-    reference = dihedral_angles(mesh.points, topology.hinges)
     prescribed = load_step.prescribed_angles(prescribed_start)
-    rest = [
-        np.append(np.where(law == PRESCRIBED, at, reference), np.pi)[joined.hinge]
-        for at in (prescribed.start, prescribed.end)
-    ]
     springs = np.flatnonzero(spring)
     ends = mesh.points[topology.hinges[:, 1:3]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -156,10 +157,12 @@ def consistent_elements(
     begin = np.where(np.isnan(load_step.rest.start[springs]), begin, load_step.rest.start[springs])
     whole = ConsistentElements(
         members=np.arange(len(mesh.triangles)), triangles=mesh.triangles,
-        heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2), stretching=Stretching(membrane, law_of_strain),
-        bending=Bending(joined, of_curvature, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
-        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, rest=Ramp(*rest), nodes=nodes,
-        width=width, springs=springs, hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
+        heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2),
+        stretching=Stretching(membrane, of_strain, mesh.points),
+        bending=Bending(joined, bending_law, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
+        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, width=width, nodes=nodes,
+        rest=_rest(mesh, joined, law, prescribed), springs=springs,
+        hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=Ramp(begin, load_step.rest.end[springs]),
         couple=couple,
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
@@ -204,6 +207,16 @@ def lock_stiffness(model: Model, load_step: LoadStep) -> Array:
         until_closed(dihedral_angles(mesh.points, topology.hinges)) < ZONE
     )
     return np.where(without, 0.0, np.maximum(spring, sheet))
+
+
+def _laws(material: Material, sheet: Sheet) -> tuple[Law, Law]:
+    """Laws of strain and curvature; a material that knows no directions would take a grain for nothing."""
+    laws = material.stretching(sheet), material.bending(sheet)
+    if sheet.grain is not None and not all(isinstance(law, Directed) for law in laws):
+        raise ModelError(
+            f"the material {type(material).__name__} is alike in all directions; take a sheet without grain, E2 and G12"
+        )
+    return laws
 
 
 def _check_moments(mesh: SheetMesh, load_step: LoadStep) -> None:
@@ -273,6 +286,16 @@ def _quads(mesh: SheetMesh, joined: Patches) -> tuple[Ints, Array]:
     return quad, ghost
 
 
+def _rest(mesh: SheetMesh, joined: Patches, law: Ints, prescribed: Ramp) -> Ramp:
+    """(c, a) rest dihedral angles of the patches: imposed, of the stress-free sheet, pi at clamps, rad."""
+    reference = dihedral_angles(mesh.points, mesh.topology.hinges)
+    start, end = (
+        np.append(np.where(law == PRESCRIBED, at, reference), np.pi)[joined.hinge]
+        for at in (prescribed.start, prescribed.end)
+    )
+    return Ramp(start, end)
+
+
 def _rows(joined: Patches, quad: Ints) -> tuple[Ints, Ints]:
     """Nodes (c, p) that the angles of a patch depend on, then -1; and the place (c, a, 4) of each quad among them."""
     count = len(quad)
@@ -299,7 +322,7 @@ def _half(e: ConsistentElements, plane: Mirror) -> ConsistentElements:
     by = by[spring]
     return replace(
         e, members=e.members[triangle], triangles=np.ascontiguousarray(e.triangles[triangle]),
-        heights=e.heights[triangle], stretching=Stretching(membrane, e.stretching.law),
+        heights=e.heights[triangle], stretching=Stretching(membrane, e.stretching.law, e.stretching.points),
         B_triangle=(weight[:, None, None] * e.B_triangle)[triangle], springs=e.springs[spring],
         hinges=np.ascontiguousarray(e.hinges[spring]), turns=e.turns[spring],
         spring_stiffness=by * e.spring_stiffness[spring],

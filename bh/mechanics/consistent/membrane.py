@@ -51,6 +51,15 @@ class Cells:
     area: Array
     share: Array
 
+    def angle(self, points: Array) -> Array:
+        """(c,) from the drawing's x axis to the cells', along their bar 0, in a sheet flat in z = const, rad.
+
+        Args:
+            points: (n, 3) of the stress-free sheet, mm.
+        """
+        along = points[self.nodes[:, 2]] - points[self.nodes[:, 1]]
+        return np.arctan2(along[:, 1], along[:, 0])
+
     def stiffness(self, moduli: Array) -> Array:
         """(c, k, k) of 1/2 gamma.K.gamma for moduli (3, 3) or (c, 3, 3), N / mm^3."""
         K = np.swapaxes(self.strain, 1, 2) @ (self.area[:, None, None] * moduli) @ self.strain

@@ -35,6 +35,17 @@ def triangle_frames(points: Array, triangles: Ints) -> tuple[Array, Array]:
     )
 
 
+def frame_angles(points: Array, triangles: Ints) -> Array:
+    """(t,) angles from the drawing's x axis to the first axis of `triangle_frames`, in a sheet flat in z = const, rad.
+
+    Args:
+        points: (n, 3) stress-free positions, mm.
+        triangles: (t, 3) node indices.
+    """
+    along = points[triangles[:, 2]] - points[triangles[:, 1]]
+    return np.arctan2(along[:, 1], along[:, 0])
+
+
 def curvature_maps(edges: Array, areas: Array) -> Array:
     """(t, 3, 3) curvature (xx, yy, 2 xy) of triangles from the angles at their edges, 1 / mm.
 
@@ -50,12 +61,12 @@ def curvature_maps(edges: Array, areas: Array) -> Array:
 
 
 def bending_matrices(maps: Array, areas: Array, moduli: Array) -> Array:
-    """(t, 3, 3) B of 1/2 theta.B.theta = 1/2 A kappa.C.kappa, N mm, with moduli C (3, 3) of curvatures, N mm.
+    """(t, 3, 3) B of 1/2 theta.B.theta = 1/2 A kappa.C.kappa, N mm, with moduli C of curvatures, N mm.
 
     Args:
         maps: (t, 3, 3) from `curvature_maps`, 1 / mm.
         areas: (t,) mm^2.
-        moduli: (3, 3) N mm.
+        moduli: (3, 3), or (t, 3, 3) in the frame of each triangle, N mm.
     """
     B = np.swapaxes(maps, 1, 2) @ (areas[:, None, None] * moduli) @ maps
     return np.asarray(0.5 * (B + np.swapaxes(B, 1, 2)))

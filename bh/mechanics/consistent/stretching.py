@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.materials import Constant, Law
+from bh.materials.protocols import in_axes
 from bh.mechanics.consistent import membrane_kernels as kernels
 from bh.mechanics.consistent.membrane import Cells, Membrane
 from bh.mechanics.shared.sparsity import Slots
@@ -21,16 +22,23 @@ Array = NDArray[np.float64]
 class Stretching:
     """Energy of the membrane at positions x (n, 3), mm. Its element forces are N (b,), N / mm: d energy / d gamma."""
 
-    def __init__(self, membrane: Membrane, law: Law) -> None:
-        """A membrane, and the law of the strains that it measures."""
-        self.membrane, self.law = membrane, law
+    def __init__(self, membrane: Membrane, law: Law, points: Array) -> None:
+        """A membrane and the law of the strains that it measures.
+
+        Args:
+            membrane: bars and cells.
+            law: in the axes of the drawing.
+            points: (n, 3) of the stress-free sheet, mm.
+        """
+        self.membrane, self.law, self.points = membrane, law, points
         self.constant = isinstance(law, Constant)
         self._at: Array | None = None
         self._last: tuple[Array, ...] = ()
-        self._K: tuple[Array, ...] = (
-            tuple(cells.stiffness(law.matrix) for cells in membrane.cells)
-            if isinstance(law, Constant)
-            else ()
+        self._laws = tuple(in_axes(law, cells.angle(points)) for cells in membrane.cells)
+        self._K: tuple[Array, ...] = tuple(
+            cells.stiffness(own.matrix)
+            for cells, own in zip(membrane.cells, self._laws, strict=True)
+            if isinstance(own, Constant)
         )
 
     def gamma(self, x: Array) -> Array:
@@ -46,7 +54,8 @@ class Stretching:
         if self._at is not x:  # the tangent and the forces that it predicts ask at the same positions
             gamma = self.gamma(x)
             self._last = tuple(
-                cells.stiffness(self.law.moduli(cells.strains(gamma))) for cells in self.membrane.cells
+                cells.stiffness(law.moduli(cells.strains(gamma)))
+                for cells, law in zip(self.membrane.cells, self._laws, strict=True)
             )
             self._at = x
         return self._last
@@ -65,18 +74,12 @@ class Stretching:
             energy = 0.5 * float(N @ gamma)
         else:
             N[:] = 0.0
-            energy = sum(self._by_law(cells, gamma, N) for cells in m.cells)
+            energy = sum(_by_law(*of, gamma, N) for of in zip(m.cells, self._laws, strict=True))
         return energy, kernels.bar_forces(x, m.bars, m.rest_square, N, f)
 
     def _by_stiffness(self, K: tuple[Array, ...], gamma: Array, N: Array) -> None:
         three, five = self.membrane.cells
         kernels.cell_forces(three.bars, K[0], five.bars, K[1], gamma, N)
-
-    def _by_law(self, cells: Cells, gamma: Array, N: Array) -> float:
-        strain = cells.strains(gamma)
-        force = cells.area[:, None] * np.einsum("cik,ci->ck", cells.strain, self.law.stress(strain))
-        np.add.at(N, cells.bars, force)
-        return float(cells.area @ self.law.energy(strain))
 
     def tangent(
         self, x: Array, N: Array, frame_of: Ints, frames: Array, triangles: Slots, hinges: Slots, data: Array
@@ -135,7 +138,10 @@ class Stretching:
             beside: (m, 2) triangles on both sides of every hinge.
         """
         gamma = self.gamma(x)
-        three, five = (cells.area * self.law.energy(cells.strains(gamma)) for cells in self.membrane.cells)
+        three, five = (
+            cells.area * law.energy(cells.strains(gamma))
+            for cells, law in zip(self.membrane.cells, self._laws, strict=True)
+        )
         out = np.zeros(triangles)
         np.add.at(out, self.membrane.triangles.source, three)
         sides, share = beside[self.membrane.edges.source], self.membrane.edges.share
@@ -148,7 +154,14 @@ class Stretching:
         """Largest stiffness of a bar in the stress-free sheet, N / mm."""
         m = self.membrane
         total = np.zeros(len(m.bars))
-        for cells in m.cells:
-            K = cells.stiffness(self.law.moduli(np.zeros((len(cells.area), 3))))
+        for cells, law in zip(m.cells, self._laws, strict=True):
+            K = cells.stiffness(law.moduli(np.zeros((len(cells.area), 3))))
             np.add.at(total, cells.bars, np.einsum("ckk->ck", K))
         return float((total * m.rest_square).max())
+
+
+def _by_law(cells: Cells, law: Law, gamma: Array, N: Array) -> float:
+    """Energy of cells, N mm; adds their forces to those of the bars."""
+    strain = cells.strains(gamma)
+    np.add.at(N, cells.bars, cells.area[:, None] * np.einsum("cik,ci->ck", cells.strain, law.stress(strain)))
+    return float(cells.area @ law.energy(strain))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +15,7 @@ from bh.loading.load_step import LoadStep
 from bh.materials import Material
 from bh.mechanics.consistent import kernels, setup
 from bh.mechanics.consistent.elements import LINEAR, consistent_elements, lock_stiffness
+from bh.mechanics.consistent.forces import ElementForces, Internal
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.sparsity import rotation_pattern
 from bh.mechanics.shared import penetration as closings
@@ -41,36 +42,6 @@ class Solver(Protocol):
     def solve(self, b: Array) -> Array:
         """Solution x of A x = b, both (n,)."""
         ...
-
-
-class ElementForces(NamedTuple):
-    """Bar forces N (b,), N/mm; moments of patches M (c, a), spring creases S (h,) and locks L (m,), N mm."""
-
-    N: Array
-    M: Array
-    S: Array
-    L: Array
-
-
-class Internal(NamedTuple):
-    """Energies (N mm), their gradients to positions f (n, 3) and rotations r (r,), and element forces.
-
-    `stretching` and `bending` are the whole, `springs` that of the springs and their couples,
-    `lock` that of locks.
-    `size` is a typical element force (N), `theta` (c, a) are the angles of the patches and `turns` (h,) what the
-    springs have turned (rad).
-    """
-
-    stretching: float
-    bending: float
-    springs: float
-    lock: float
-    size: float
-    f: Array
-    r: Array
-    forces: Array
-    theta: Array
-    turns: Array
 
 
 class ConsistentSystem(SupportedSheet):
@@ -140,6 +111,18 @@ class ConsistentSystem(SupportedSheet):
         q = np.zeros(self.size)
         q[: self.moving] = self.displacements.start()
         q[self.moving :] = self.rotations_at(self._start_points, 0.0)
+        return q
+
+    def unknowns_at(self, x: Array, lam: float) -> Array:
+        """(size,) unknowns of positions x (n, 3), mm, as far as supports allow; rotations are those of least energy.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        q = np.zeros(self.size)
+        q[: self.moving] = self.displacements.components(x - self.positions(q, lam))
+        q[self.moving :] = self.rotations_at(self.positions(q, lam), lam)
         return q
 
     def rotations_at(self, x: Array, lam: float) -> Array:
@@ -285,9 +268,7 @@ class ConsistentSystem(SupportedSheet):
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, joined = self.elements, self.elements.patches
         x = self.positions(q, lam)
-        touching = None if self.barrier is None else self.barrier.blocks(x)
-        if touching is not None and not self.contact_blocks.known(touching[0]):
-            vars(self).pop("_pattern", None)
+        touching = self._touching(x)
         pattern = self._pattern
         N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)

@@ -20,6 +20,7 @@ from bh.model.supports import MOTIONS, TURNED, rigid_motions
 from bh.solvers.outcome import Outcome
 from bh.solvers.system import System, grows_ahead
 from meshes import SheetMesh
+from meshes.topology import Ints
 
 if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
@@ -90,6 +91,18 @@ class SupportedSheet:
         if self.barrier.clear(x_new) and self.barrier.free_part(x, x_new) >= 1.0:
             return ""
         return "panels would pass through each other on the straight way there"
+
+    def _touching(self, x: Array) -> tuple[Ints, Array] | None:
+        """What panels in contact add to the tangent at positions x (`SheetBarrier.blocks`); None without contact.
+
+        A pair that the pattern of the tangent has no place for makes it be built anew.
+        """
+        if self.barrier is None:
+            return None
+        found = self.barrier.blocks(x)
+        if not self.contact_blocks.known(found[0]):
+            vars(self).pop("_pattern", None)
+        return found
 
     def free_part(self, q: Array, dq: Array, lam: float) -> float:
         """How much of a step dq (size,) from q no panels stand in, 0 to 1; see `bh.solvers.system.Limited`."""

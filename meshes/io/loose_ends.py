@@ -1,4 +1,4 @@
-"""Cuts that end inside a face of a plane graph: tied to it by facet lines, so that the face has one rim."""
+"""Lines that end inside a face of a plane graph: tied to its rim by facet lines, so that it is cut into plain faces."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from meshes.curves import Array
 from meshes.io.fold_frame import Frame, Side, side
 
 
-def tie_cuts(frame: Frame) -> Frame:
-    """The frame with a flat edge (F) from every loose end of its cuts (C) to the nearest vertex that it sees.
+def tie_ends(frame: Frame, kinds: str = "C") -> Frame:
+    """The frame with a flat edge (F) from every loose end of its cuts to the nearest vertex that it sees.
 
     Args:
         frame: flat, without faces.
+        kinds: letters of the edges whose loose ends are tied.
     """
-    if "C" not in frame.letters or not frame.flat:
+    if not set(kinds) & set(frame.letters) or not frame.flat:
         return frame
     import shapely
 
@@ -29,7 +30,7 @@ def tie_cuts(frame: Frame) -> Frame:
     ends = [
         v
         for edge, letter in zip(edges, letters, strict=True)
-        if letter == "C"
+        if letter in kinds
         for v in edge
         if degree[v] == 1
     ]
