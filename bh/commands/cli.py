@@ -31,7 +31,7 @@ except KeyboardInterrupt:  # `main` tells of it from here on
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
     "design": "Find a crease for a target, and check it by simulation.",
-    "segments": "Make the data set of pinched segments for inverse design.",
+    "segments": "Make the data set of strips for inverse design.",
     "studio": "Fold a sheet by sliders, in a window of the browser.",
     "sweep": "Solve a scene for many parameters into a labelled data set.",
     "verify": "Check the solvers against theory and published numbers.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from bh.applications.inverse.fit import fit_curve, move_tip
+from bh.applications.inverse.forward import Forward
+from bh.applications.inverse.judge import Verdict, judge
+from bh.applications.inverse.models import Name, model, read
 from bh.applications.inverse.problems import CURVES, Design
 from bh.applications.inverse.reach import Library, Reach
 from bh.applications.inverse.segments import DesignError
-from bh.applications.inverse.simulate import Simulated, simulate
-from bh.applications.inverse.surrogate import Surrogate, read, shipped
+from bh.applications.inverse.simulate import Landing, Simulated
 from bh.errors import InputError
 from bh.paths.provenance import versions
 from bh.runtime.terminal import say
@@ -62,6 +64,7 @@ class SearchTable(Table):
     )
     tolerance: Scale = Field(1.0, description="of a point, mm, a positive number")
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
+    model: Name = Field("converged", description="converged, or source for one row of bars and hinges")
     data: str | None = Field(
         None, description="the name of a data set of `bh segments`, from the folder of this file"
     )
@@ -73,16 +76,39 @@ class Answer:
 
     Attributes:
         design: crease and pinches.
-        strip: the simulated strip.
+        landing: of the simulated strip.
         measure: name, value and unit of what was asked for, by the surrogate and by the simulation of the
             strip.
         goal: (k, 3) point or curve to be drawn beside it, mm.
+        point: the goal is a point to be reached.
+        surrogate: the model that it was made with.
+        verdict: the shell's, where that was asked for.
     """
 
     design: Design
-    strip: Simulated
+    landing: Landing
     measure: dict[str, tuple[float, str]]
     goal: Array
+    surrogate: Forward
+    point: bool = False
+    verdict: Verdict | None = None
+
+    @property
+    def strip(self) -> Simulated:
+        """The strip on the mesh on which it was simulated."""
+        return self.landing.strip
+
+    def judged(self) -> Answer:
+        """With the shell's word on it.
+
+        Raises:
+            DesignError: the shell does not get there.
+        """
+        verdict = judge(*self.design.lists(), self.surrogate.setting)
+        more = {"end by the shell, change with its mesh": (verdict.change, "mm")}
+        if self.point:
+            more = {"distance of the strip by the shell": (verdict.missed(self.goal[0]), "mm"), **more}
+        return replace(self, verdict=verdict, measure={**self.measure, **more})
 
 
 def solve(file: str | Path) -> Answer:
@@ -100,7 +126,9 @@ def solve(file: str | Path) -> Answer:
         target = read_table(TargetTable, data["target"], "target")
         search = read_table(SearchTable, data.get("search", {}), "search")
         surrogate = (
-            shipped() if search.data is None else read(inside(file.parent, search.data, "search.data"))
+            model(search.model)
+            if search.data is None
+            else read(inside(file.parent, search.data, "search.data"))
         )
         if target.point is not None:
             return _point(target.point, search, surrogate)
@@ -116,25 +144,27 @@ def solve(file: str | Path) -> Answer:
         ) from error
 
 
-def _point(point: list[float], search: SearchTable, surrogate: Surrogate) -> Answer:
+def _point(point: list[float], search: SearchTable, surrogate: Forward) -> Answer:
     books = tuple(Library(surrogate, n, seed=search.seed) for n in range(1, search.segments + 1))
     found = Reach(most=search.segments, tolerance=search.tolerance, seed=search.seed, libraries=books)(point)
-    assert found.simulated is not None
+    assert found.landing is not None
     measure = {
         "distance by interpolation": (found.missed, "mm"),
         "distance of the simulated strip": (found.missed_simulated, "mm"),
+        "its error bar": (found.landing.bar, "mm"),
         "clears itself in space": (float(found.clear), "1 yes, 0 no"),
     }
-    return Answer(found.design, found.simulated, measure, np.array([point], dtype=float))
+    goal = np.array([point], dtype=float)
+    return Answer(found.design, found.landing, measure, goal, surrogate, point=True)
 
 
-def _curve(name: str, search: SearchTable, folder: Path, surrogate: Surrogate) -> Answer:
+def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> Answer:
     curve = CURVES[name] if name in CURVES else read_curve(inside(folder, name, "target.curve"))
     problem, top = fit_curve(curve, search.segments, seed=search.seed)[-1]
     design = problem.design(top.x)
-    strip = simulate(*design.lists(), surrogate.setting)
+    landing = surrogate.land(*design.lists())
     at = np.linspace(0.0, 1.0, problem.samples)
-    crease = strip.crease()
+    crease = landing.strip.crease()
     s = arc_lengths(crease)
     points = interpolated(at * s[-1], s, crease)
     goal = np.column_stack((problem.goal, np.zeros(problem.samples)))
@@ -143,22 +173,23 @@ def _curve(name: str, search: SearchTable, folder: Path, surrogate: Surrogate) -
         "mean distance of the simulated strip": (float(np.linalg.norm(points - goal, axis=1).mean()), "mm"),
         "length of the curve": (problem.size, "mm"),
     }
-    return Answer(design, strip, measure, goal)
+    return Answer(design, landing, measure, goal, surrogate)
 
 
-def _tip(search: SearchTable, surrogate: Surrogate) -> Answer:
+def _tip(search: SearchTable, surrogate: Forward) -> Answer:
     problem, top = move_tip(search.segments, seed=search.seed, surrogate=surrogate)[-1]
     design = problem.design(top.x, top.on)
     k0, length, _ = design.lists()
-    strip, before = (
-        simulate(*design.lists(), surrogate.setting),
-        simulate(k0, length, [False] * design.n, surrogate.setting),
+    after, before = (
+        surrogate.land(*design.lists()),
+        surrogate.land(k0, length, [False] * design.n),
     )
     measure = {
         "movement of the tip by interpolation": (-top.value, "mm"),
-        "movement of the tip of the simulated strip": (float(np.linalg.norm(strip.t - before.t)), "mm"),
+        "movement of the tip of the simulated strip": (float(np.linalg.norm(after.end - before.end)), "mm"),
+        "its error bar": (after.bar + before.bar, "mm"),
     }
-    return Answer(design, strip, measure, before.t[None])
+    return Answer(design, after, measure, before.end[None], surrogate)
 
 
 def read_curve(file: str | Path) -> Array:
@@ -215,7 +246,9 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
         about = {
             "segments": answer.design.rows(),
             "total_length_mm": answer.design.total,
-            "end_mm": answer.strip.t.tolist(),
+            "end_mm": answer.landing.end.tolist(),
+            "error_bar_mm": answer.landing.bar,
+            "model": {"formulation": answer.surrogate.setting.formulation, **answer.surrogate.about()},
             "measures": {
                 name: {"value": value, "unit": unit} for name, (value, unit) in answer.measure.items()
             },
@@ -278,9 +311,14 @@ def design(
         typer.Option("--output", "-o", metavar="DIR", help="Output folder; default TARGET-design."),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    by_shell: Annotated[
+        bool,
+        typer.Option("--judge", help="Also simulate the answer by the shell, which no design is made with."),
+    ] = False,
 ) -> int:
     """Find a crease for a target, and check it by simulation."""
     answer = solve(target)
+    answer = answer.judged() if by_shell else answer
     folder = Path(f"{target.stem}-design") if output is None else output
     files = write(answer, folder)
     if not quiet:

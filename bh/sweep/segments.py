@@ -1,4 +1,4 @@
-"""The data set of pinched segments that inverse design interpolates in (source 6.2.4): a sweep of its own kind.
+"""Data sets that inverse design interpolates in: pieces of strips, or the segments of the source (6.2.4).
 
 bh segments -o mine.nc --zone 12
 """
@@ -14,6 +14,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
+from bh.applications.inverse.models import Name
+from bh.applications.inverse.pieces import CONVERGING, PIECES, PieceTask
+from bh.applications.inverse.pieces import table as piece_table
 from bh.applications.inverse.segments import Domain, beyond, grid
 from bh.applications.inverse.simulate import SETTING, SegmentTask, Setting
 from bh.applications.inverse.surrogate import FORMAT, Surrogate
@@ -38,6 +41,21 @@ LABELS = {
     "energy": Label("N mm", "elastic energy"),
     "stable": Label("", "1: the state is stable"),
     "critical_points": Label("", "limit and bifurcation points on the way"),
+}
+PIECE_LABELS = {
+    "kind": Label("", "arc, pinch or joint"),
+    "before": Label("1/mm", "curvature of the crease before folding, positive to the left"),
+    "after": Label("1/mm", "the same behind a joint"),
+    "edge": Label("mm", "cells of the mesh along the crease"),
+    "rows": Label("", "rows of cells a panel"),
+    "t": Label("mm", "from the free end to the first section, and from there to the second", ("way", "xyz")),
+    "r": Label("", "the same, rotations", ("way", "row", "column")),
+    "to_middle": Label(
+        "mm", "from the free end to the first section, and from there to the middle", ("way",)
+    ),
+    "energy": LABELS["energy"],
+    "stable": LABELS["stable"],
+    "critical_points": LABELS["critical_points"],
 }
 
 
@@ -89,6 +107,43 @@ def build(
         resume=resume,
         progress=progress,
         labels=LABELS,
+        attributes=about,
+    )
+
+
+def build_pieces(
+    file: str | Path,
+    setting: Setting = CONVERGING,
+    *,
+    pool: Pool | Executor | int | None = None,
+    resume: bool = False,
+    progress: bool | Meter = False,
+) -> Dataset:
+    """Simulate all pieces of strips (`bh.applications.inverse.pieces`) and write the data set.
+
+    Args:
+        file: of the data set (netCDF-4).
+        setting: sheet, fold and pinch; the levels have their own meshes.
+        pool: see `bh.sweep.run`.
+        resume: see `bh.sweep.run`.
+        progress: see `bh.sweep.run`.
+
+    Raises:
+        SweepError: see `bh.sweep.run`.
+    """
+    about = {
+        "title": "Pieces of folded strips: arcs, free ends, pinches and joints",
+        "format": PIECES,
+        "setting": json.dumps(asdict(setting)),
+    }
+    return run(
+        PieceTask(setting),
+        table(piece_table()),
+        file,
+        pool=pool,
+        resume=resume,
+        progress=progress,
+        labels=PIECE_LABELS,
         attributes=about,
     )
 
@@ -149,15 +204,22 @@ def segments(
     zone: Annotated[
         float, typer.Option("--zone", metavar="40mm", parser=a_length, help="Length of the pinched zone.")
     ] = SETTING.zone,
+    model: Annotated[
+        Name, typer.Option("--model", help="converged, or source for one row of bars and hinges.")
+    ] = "converged",
     workers: Annotated[int | None, typer.Option("--workers", "-w", min=0, help="Local processes.")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the points that are finished.")
     ] = False,
 ) -> int:
-    """Make the data set of pinched segments for inverse design."""
+    """Make the data set of strips for inverse design."""
     from dataclasses import replace
 
-    data = build(output, replace(SETTING, zone=zone), pool=workers, resume=resume, progress=True)
+    if model == "source":
+        what, setting, make = "segments", SETTING, build
+    else:
+        what, setting, make = "pieces", CONVERGING, build_pieces
+    data = make(output, replace(setting, zone=zone), pool=workers, resume=resume, progress=True)
     failed = int((data["outcome"] != Outcome.REACHED).sum())
-    say(f"{data.sizes['point'] - failed:,} of {data.sizes['point']:,} segments; wrote {output}")
+    say(f"{data.sizes['point'] - failed:,} of {data.sizes['point']:,} {what}; wrote {output}")
     return 1 if failed else 0

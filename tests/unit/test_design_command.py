@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bh.applications.inverse.judge import judge
 from bh.applications.inverse.segments import DesignError
 
 pytest.importorskip("xarray")
@@ -19,16 +22,25 @@ from bh.paths.path import Path as Trace
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "design" / "reach.toml"
 
 
-def test_example(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Pattern, picture and path of the strip that reaches a point."""
+def test_example(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pattern, picture and path of the strip that reaches a point, and what a (here coarse) shell says."""
     folder = tmp_path / "out"
-    assert main(["design", str(EXAMPLE), "-o", str(folder)]) == 0
-    assert "distance of the simulated strip: 0." in capsys.readouterr().out
+    monkeypatch.setattr(bh.commands.design, "judge", partial(judge, meshes=((10.0, 1), (5.0, 1))))
+    assert main(["design", str(EXAMPLE), "--judge", "-o", str(folder)]) == 0
+    told = capsys.readouterr().out
+    assert "distance of the simulated strip: 0." in told
+    assert re.search(r"distance of the strip by the shell: \d+\.\d+ mm", told)
     names = ["design.json", "design.png", "path.bh", "pattern.dxf", "pattern.svg"]
     assert sorted(file.name for file in folder.iterdir()) == names
     about = json.loads((folder / "design.json").read_text())
     assert math.dist(about["end_mm"], (-80.0, 100.0, -5.0)) < 1.0
-    assert about["measures"]["distance of the simulated strip"]["value"] < 1.0
+    measured = {name: row["value"] for name, row in about["measures"].items()}
+    assert measured["distance of the simulated strip"] == pytest.approx(
+        math.dist(about["end_mm"], (-80.0, 100.0, -5.0))
+    )
+    assert 0.0 < about["error_bar_mm"] == measured["its error bar"] < 1.0
+    assert 0.0 < measured["distance of the strip by the shell"] < 10.0
+    assert measured["end by the shell, change with its mesh"] > 0.0
     path = Trace.load(folder / "path.bh")
     assert path.outcome == "reached"
     # the outline that is cut is that of the mesh that was simulated

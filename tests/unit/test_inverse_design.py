@@ -221,7 +221,7 @@ def test_variables_are_the_domain() -> None:
 @pytest.mark.parametrize("target", [(80.0, 80.0, 0.0), (-80.0, 80.0, -10.0)])
 def test_a_point_is_reached(target: tuple[float, float, float]) -> None:
     """By the whole simulated strip, and its mirror image by the mirrored design."""
-    found = Reach()(target)
+    found = Reach(model="source")(target)
     assert found.missed_simulated <= 1.0
     assert found.clear
     mirrored = found.design.mirrored()
@@ -231,9 +231,9 @@ def test_a_point_is_reached(target: tuple[float, float, float]) -> None:
 
 def test_out_of_reach() -> None:
     with pytest.raises(DesignError, match="no crease of up to 1 segments"):
-        Reach(most=1)((0.0, 0.0, 50.0))
+        Reach(most=1, model="source")((0.0, 0.0, 50.0))
     with pytest.raises(DesignError, match="three coordinates"):
-        Reach()((0.0, 0.0))
+        Reach(model="source")((0.0, 0.0))
 
 
 def test_projected_rule_is_the_sources() -> None:
@@ -249,18 +249,18 @@ def test_shorter_creases_miss_by_more() -> None:
     from bh.applications.inverse.pareto import pareto
 
     target = (60.0, 60.0, 10.0)
-    front = pareto(target, allowances=(0.1, 10.0), most=3, starts=6)
+    front = pareto(target, allowances=(0.1, 10.0), most=3, starts=6, name="source")
     missed, total = ([getattr(trade, name) for trade in front] for name in ("missed", "total"))
     assert len(front) > 1
     assert missed == sorted(missed)
     assert total == sorted(total, reverse=True)
     assert missed[0] <= 0.11
-    assert total[0] < 0.8 * Reach(verify=False)(target).design.total
+    assert total[0] < 0.8 * Reach(verify=False, model="source")(target).design.total
     for trade in front:
         end = shipped().forward(*trade.design.lists())[0][-1]
         assert np.linalg.norm(end - target) == pytest.approx(trade.missed, abs=1e-9)
     with pytest.raises(DesignError, match="allow more"):
-        pareto((900.0, 0.0, 0.0), most=1)
+        pareto((900.0, 0.0, 0.0), most=1, name="source")
 
 
 def test_python_of_the_page_runs() -> None:

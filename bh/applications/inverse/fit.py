@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bh.applications.inverse.forward import Forward
+from bh.applications.inverse.models import model
 from bh.applications.inverse.optimisers import Found, Genetic, Optimiser, Polished, polish
 from bh.applications.inverse.problems import FitCurve, MoveTip
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule
-from bh.applications.inverse.surrogate import Surrogate, shipped
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -94,7 +95,7 @@ def move_tip(
     optimiser: Optimiser | None = None,
     seed: int = 1,
     rules: Sequence[SelfIntersectionRule] | None = None,
-    surrogate: Surrogate | None = None,
+    surrogate: Forward | None = None,
 ) -> list[tuple[MoveTip, Found]]:
     """Problem B for 1 to `most` segments: creases whose end a pinch moves as far as it can.
 
@@ -103,7 +104,7 @@ def move_tip(
         optimiser: how the best design is searched; None for a polished genetic algorithm.
         seed: the same seed gives the same designs.
         rules: what is forbidden; None for the source's rule.
-        surrogate: of the segments; None for the shipped one.
+        surrogate: of the segments; None for the model that converges.
 
     Returns:
         For 1 to `most` segments the problem and the best design.
@@ -116,7 +117,7 @@ def move_tip(
     optimiser = optimiser or Polished(Genetic(150, 80))
     found: list[tuple[MoveTip, Found]] = []
     for n in range(1, most + 1):
-        task = MoveTip(surrogate or shipped(), n, tuple(rules) if rules is not None else (Projected(),))
+        task = MoveTip(surrogate or model(), n, tuple(rules) if rules is not None else (Projected(),))
         top = optimiser.minimise(task, seed + n)
         for x, on in _longer(found[-1][1]) if found else []:
             other = polish(task, x, on)

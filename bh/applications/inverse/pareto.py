@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
+from bh.applications.inverse.models import Name
 from bh.applications.inverse.problems import Design, ReachPoint
 from bh.applications.inverse.reach import Library, library
 from bh.applications.inverse.segments import DesignError
@@ -38,6 +39,7 @@ def pareto(
     most: int = 3,
     starts: int = 6,
     books: Sequence[Library] = (),
+    name: Name = "converged",
 ) -> list[Trade]:
     """The shortest creases found that end within some distances of a point, the nearest first; dominated ones left out.
 
@@ -46,7 +48,8 @@ def pareto(
         allowances: distances, mm, rising.
         most: segments.
         starts: library designs that each search begins with, for each number of segments.
-        books: libraries to take; those of the shipped data set where there is none of a number of segments.
+        books: libraries to take; where there is none of a number of segments, those of the model `name`.
+        name: of the model.
 
     Returns:
         the creases, with their lengths and distances, mm.
@@ -59,7 +62,7 @@ def pareto(
         raise DesignError(f"the target {target!r} is no point; give three coordinates in mm")
     found: list[Trade] = []
     for n in range(1, most + 1):
-        book = next((b for b in books if b.n == n), None) or library(n)
+        book = next((b for b in books if b.n == n), None) or library(n, name=name)
         problem = book.problem(point)
         near = list(book.nearest(point, 20 * starts))
         near.sort(key=lambda pair: float(pair[0][n:].sum()))

@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.segments import DesignError, folded
 from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule, allowed
-from bh.applications.inverse.surrogate import Surrogate
 from bh.applications.inverse.transforms import chain, matrix
 from meshes.curves import arc_lengths, interpolated
 
@@ -176,7 +176,7 @@ class _Segments:
     So constraints (1) to (3) of Eq. 6.21 and 6.22 are the box, and only self-intersection (4) is left.
     """
 
-    surrogate: Surrogate
+    surrogate: Forward
     n: int
     rules: Sequence[SelfIntersectionRule] = field(default_factory=lambda: (Projected(),))
 

@@ -2,7 +2,8 @@
 
 Genetic algorithms draw their designs anew for every target. One library of random designs serves all: its ends are in a
 k-d tree, the nearest ones are polished by least squares, and the answer is simulated whole. What the simulation misses
-is added to the aim and the design polished again, so that the distance that counts is that of the full model.
+is added to the aim and the design polished again, so that the distance that counts is that of the whole strip, with
+its error bar where the model has one.
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from bh.applications.inverse.forward import Forward
+from bh.applications.inverse.models import Name, model
 from bh.applications.inverse.optimisers import Found, polish
 from bh.applications.inverse.problems import Design, ReachPoint
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule, Swept
-from bh.applications.inverse.simulate import Simulated, simulate
-from bh.applications.inverse.surrogate import Surrogate, shipped
+from bh.applications.inverse.simulate import Landing, Simulated
 from bh.errors import InputError
 
 Array = NDArray[np.float64]
@@ -31,13 +33,14 @@ REACH = {
     2: 20.0,
     3: 40.0,
 }  # mm from a random design of so many segments; one segment has two variables only
+SAME = 0.1  # mm between chain and simulation, below which aiming again changes nothing
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
     """Random designs of n segments that their rules allow, and where they end. The seed makes them reproducible."""
 
-    surrogate: Surrogate
+    surrogate: Forward
     n: int
     size: int = 50_000
     seed: int = 1
@@ -81,14 +84,15 @@ class Library:
 
 
 @cache
-def library(n: int, seed: int = 1) -> Library:
-    """A library of the shipped data set, made once a process.
+def library(n: int, seed: int = 1, name: Name = "converged") -> Library:
+    """A library of a model with its shipped data set, made once a process.
 
     Args:
         n: segments.
         seed: of its random designs.
+        name: of the model.
     """
-    return Library(shipped(), n, seed=seed)
+    return Library(model(name), n, seed=seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +101,8 @@ class Reached:
 
     Attributes:
         target: (3,) the point asked for, mm.
-        end: (3,) where the surrogate ends, mm.
-        simulated: the whole strip by bars and hinges, or None where that was not asked for.
+        end: (3,) where the chain of its segments ends, mm.
+        landing: of the whole simulated strip, or None where that was not asked for.
         clear: the strips do not touch themselves in space (`Swept`).
         simulations: how many it took.
     """
@@ -106,19 +110,29 @@ class Reached:
     design: Design
     target: Array
     end: Array
-    simulated: Simulated | None
+    landing: Landing | None
     clear: bool
     simulations: int
 
     @property
+    def simulated(self) -> Simulated | None:
+        """The whole strip on the mesh on which it was simulated."""
+        return None if self.landing is None else self.landing.strip
+
+    @property
     def missed(self) -> float:
-        """Distance of the surrogate's end from the target, mm."""
+        """Distance of the chain's end from the target, mm."""
         return float(np.linalg.norm(self.end - self.target))
 
     @property
     def missed_simulated(self) -> float:
         """Distance of the simulated strip's end from the target, mm; nan where it was not simulated."""
-        return math.nan if self.simulated is None else float(np.linalg.norm(self.simulated.t - self.target))
+        return math.nan if self.landing is None else float(np.linalg.norm(self.landing.end - self.target))
+
+    @property
+    def missed_at_most(self) -> float:
+        """The same with its error bar, mm."""
+        return math.nan if self.landing is None else self.missed_simulated + self.landing.bar
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,9 +144,10 @@ class Reach:
         tolerance: of the end, mm.
         candidates: designs polished for each number of segments.
         verify: simulate the strip, and aim again up to `rounds` times where that misses by more than `aim`
-            (mm).
+            (mm), or with its error bar by more than the tolerance.
         clear: prefer designs whose strips clear themselves in space; of the others only where no candidate
             does.
+        model: "converged", or "source" for one row of bars and hinges; of no use where libraries are given.
     """
 
     most: int = 4
@@ -144,6 +159,7 @@ class Reach:
     clear: bool = True
     seed: int = 1
     libraries: tuple[Library, ...] = ()
+    model: Name = "converged"
 
     def __call__(self, target: ArrayLike) -> Reached:
         """The first design that ends within the tolerance.
@@ -185,7 +201,9 @@ class Reach:
 
     def book(self, n: int) -> Library:
         """The library of designs of n segments."""
-        return next((book for book in self.libraries if book.n == n), None) or library(n, self.seed)
+        return next((book for book in self.libraries if book.n == n), None) or library(
+            n, self.seed, self.model
+        )
 
     def _candidates(self, book: Library, point: Array) -> Iterator[Found]:
         problem = book.problem(point)
@@ -203,17 +221,23 @@ class Reach:
             end = problem.end(found.x, found.on)
             if not self.verify:
                 return Reached(design, point, end, None, clear, 0)
+            if book.surrogate.bars(design.k0, design.length, design.pinched)[0] > self.tolerance:
+                break  # whatever its simulation says
             try:
-                strip = simulate(*design.lists(), book.surrogate.setting)
+                landing = book.surrogate.land(*design.lists())
             except InputError:  # a flat strip that meets itself cannot be cut: another candidate
-                return best
-            reached = Reached(design, point, end, strip, clear, count)
-            if best is None or reached.missed_simulated < best.missed_simulated:
-                best = reached
-            if best.missed_simulated <= self.aim:
                 break
-            problem = replace(problem, target=problem.target + point - strip.t)
+            reached = Reached(design, point, end, landing, clear, count)
+            if best is None or reached.missed_at_most < best.missed_at_most:
+                best = reached
+            if best.missed_simulated <= self.aim and best.missed_at_most <= self.tolerance:
+                break
+            if (
+                np.linalg.norm(landing.end - end) < SAME
+            ):  # the chain was right: its nearest design is this one
+                break
+            problem = replace(problem, target=problem.target + point - landing.end)
             found = polish(problem, found.x, found.on)
             if not found.allowed:
                 break
-        return best if best is not None and best.missed_simulated <= self.tolerance else None
+        return best if best is not None and best.missed_at_most <= self.tolerance else None

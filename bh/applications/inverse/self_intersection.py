@@ -9,9 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.applications.inverse.segments import folded
-from bh.applications.inverse.surrogate import Surrogate
-from bh.applications.inverse.transforms import matrix
+from bh.applications.inverse.forward import Forward
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -20,7 +18,7 @@ Bools = NDArray[np.bool_]
 class SelfIntersectionRule(Protocol):
     """A rule that forbids designs."""
 
-    def measure(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> Array:
+    def measure(self, surrogate: Forward, k0: Array, length: Array, pinched: Bools) -> Array:
         """(...) of designs (..., n).
 
         Args:
@@ -72,7 +70,7 @@ class Projected:
     It forbids helices, and it knows nothing of the width of the strip or of the bulge of an arc over its chord.
     """
 
-    def measure(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> Array:
+    def measure(self, surrogate: Forward, k0: Array, length: Array, pinched: Bools) -> Array:
         """(...) 1 where the chords of a design intersect in the plane, else 0; see the rule's protocol."""
         met = planar(surrogate.forward(k0, length, pinched, check=False)[0][..., :2])
         met |= planar(surrogate.unpinched(k0, length)[0][..., :2])
@@ -95,7 +93,7 @@ class Swept:
         """Set width and cell, mm."""
         self.width, self.cell = width, cell
 
-    def measure(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> Array:
+    def measure(self, surrogate: Forward, k0: Array, length: Array, pinched: Bools) -> Array:
         """(...) 1 where the strips of a design intersect themselves, else 0; see the rule's protocol."""
         k0, length, on = (np.asarray(x) for x in np.broadcast_arrays(k0, length, pinched))
         found = np.empty(k0.shape[:-1])
@@ -103,7 +101,7 @@ class Swept:
             found[at] = float(self.meets(surrogate, k0[at], length[at], on[at]))
         return found
 
-    def meets(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> bool:
+    def meets(self, surrogate: Forward, k0: Array, length: Array, pinched: Bools) -> bool:
         """Whether one design, (n,) each, meets itself, flat, folded or pinched.
 
         Args:
@@ -145,7 +143,7 @@ class Swept:
         return True
 
     def strip(
-        self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools
+        self, surrogate: Forward, k0: Array, length: Array, pinched: Bools
     ) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
         """Points (m, 3), triangles (t, 3) and the number (t,) of the cell along the crease that each belongs to.
 
@@ -171,7 +169,7 @@ class Swept:
         triangles = np.vstack([np.column_stack(corners) for corners in sides])  # left panel, right panel
         return np.vstack((points, left, right)), triangles, np.tile(i, 4)
 
-    def crease(self, surrogate: Surrogate, k0: Array, length: Array, pinched: Bools) -> tuple[Array, Array]:
+    def crease(self, surrogate: Forward, k0: Array, length: Array, pinched: Bools) -> tuple[Array, Array]:
         """(m, 3) points and (m, 3, 3) frames along the whole crease, one a cell.
 
         Args:
@@ -182,25 +180,24 @@ class Swept:
         """
         ends, starts = surrogate.forward(k0, length, pinched, check=False)
         points, frames = [ends[:1]], [starts[:1]]
-        for i, (k, size, on) in enumerate(zip(k0, length, pinched, strict=True)):
+        for i, (k, size) in enumerate(zip(k0, length, strict=True)):
             cells = 2 * max(1, round(0.5 * size / self.cell))
             s = size * np.arange(1, cells + 1) / cells
-            t, uvw = folded(np.full(cells, k), s, surrogate.setting.fold)
-            r = matrix(uvw)
-            if on:  # the second half is the arc that ends where the segment ends
-                back_t, back_uvw = folded(np.full(cells, k), s - size, surrogate.setting.fold)
-                last = starts[i].T @ starts[i + 1]
-                end = starts[i].T @ (ends[i + 1] - ends[i])
-                behind = s > 0.5 * size
-                t[behind] = end + back_t[behind] @ last.T
-                r[behind] = last @ matrix(back_uvw[behind])
+            t, r = surrogate.arc(np.full(cells, k), s)
+            # the second half is the arc that ends where the segment ends, behind a pinch if there is one
+            back_t, back_r = surrogate.arc(np.full(cells, k), s - size)
+            last = starts[i].T @ starts[i + 1]
+            end = starts[i].T @ (ends[i + 1] - ends[i])
+            behind = s > 0.5 * size
+            t[behind] = end + back_t[behind] @ last.T
+            r[behind] = last @ back_r[behind]
             points.append(ends[i] + t @ starts[i].T)
             frames.append(starts[i] @ r)
         return np.concatenate(points), np.concatenate(frames)
 
 
 def allowed(
-    rules: Sequence[SelfIntersectionRule], surrogate: Surrogate, k0: Array, length: Array, pinched: Bools
+    rules: Sequence[SelfIntersectionRule], surrogate: Forward, k0: Array, length: Array, pinched: Bools
 ) -> Array:
     """(...) sum of the measures of some rules, 0 where a design is allowed.
 

@@ -187,6 +187,21 @@ def simulate(
     return Simulated(path, t, r, path[-1].dihedral("crease")[[0, -1]])
 
 
+@dataclass(frozen=True, eq=False)
+class Landing:
+    """Where a whole strip ends by simulation.
+
+    Attributes:
+        strip: that was simulated, on one mesh.
+        end: (3,) of the crease in the frame at its start, mm; of `strip`, or in the limit of fine meshes.
+        bar: error bar of `end`, mm; 0 where there is none.
+    """
+
+    strip: Simulated
+    end: Array
+    bar: float
+
+
 class SegmentValues(TypedDict):
     """What is measured of a segment.
 

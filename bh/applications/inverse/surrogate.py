@@ -1,4 +1,4 @@
-"""Pinched segments between those that were simulated: interpolation in the data set (source 6.2.4).
+"""The source's model: pinched segments by bars and hinges, between those that were simulated by interpolation (6.2.4).
 
 The domain is not a rectangle in (k0, length), so splines run over (s, length) with s = k0 over the largest k0 of that
 length: first along k0 for every length of the grid, then across by a bicubic tensor spline. docs/inverse_design.md has
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, NdBSpline, RectBivariateSpline
 
 from bh.applications.inverse.segments import DesignError, Domain, folded, folded_transforms
-from bh.applications.inverse.simulate import SETTING, Setting
+from bh.applications.inverse.simulate import SETTING, Landing, Setting, simulate
 from bh.applications.inverse.transforms import chain, matrix
 
 if TYPE_CHECKING:
@@ -191,6 +191,40 @@ class Surrogate:
         """
         return chain(*folded_transforms(k0, length, self.setting.fold))
 
+    def arc(self, k0: ArrayLike, s: ArrayLike) -> tuple[Array, Array]:
+        """Motions along folded arcs, see `Forward.arc`.
+
+        Args:
+            k0: (...) curvatures before folding, 1/mm.
+            s: (...) arc lengths, mm, of any sign.
+        """
+        return folded_transforms(k0, s, self.setting.fold)
+
+    def land(self, k0: Sequence[float], length: Sequence[float], pinched: Sequence[bool]) -> Landing:
+        """Simulate a whole strip on the source's one mesh, which has no error bar.
+
+        Args:
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+            pinched: (n,).
+
+        Raises:
+            DesignError: the path ended early.
+        """
+        strip = simulate(k0, length, pinched, self.setting)
+        return Landing(strip, strip.t, 0.0)
+
+    def bars(self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array]:
+        """Zero: one mesh has no error bars, see `Forward.bars`.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+            pinched: (..., n) truth values.
+        """
+        shape = np.broadcast_shapes(np.shape(k0), np.shape(length), np.shape(pinched))[:-1]
+        return np.zeros(shape), np.zeros(shape)
+
     def about(self) -> Mapping[str, object]:
         """The setting as plain data."""
         return asdict(self.setting)
@@ -198,7 +232,7 @@ class Surrogate:
 
 @cache
 def shipped() -> Surrogate:
-    """The surrogate of the data set that comes with the package.
+    """The source's model by the data set that comes with the package.
 
     Raises:
         DesignError: xarray is not installed.
@@ -207,7 +241,16 @@ def shipped() -> Surrogate:
 
 
 def read(file: str | Path) -> Surrogate:
-    """The surrogate of a data set of `bh segments`.
+    """The surrogate of a data set of `bh segments --model source`.
+
+    Raises:
+        DesignError: it cannot be read.
+    """
+    return Surrogate.of(loaded(file))
+
+
+def loaded(file: str | Path) -> Dataset:
+    """A data set of `bh segments`, of any model.
 
     Raises:
         DesignError: it cannot be read.
@@ -223,7 +266,7 @@ def read(file: str | Path) -> Surrogate:
         raise DesignError(f"there is no data set '{file}'; make one: bh segments -o {file}")
     try:
         with xarray.open_dataset(file, engine="h5netcdf") as data:
-            loaded = data.load()
+            found: Dataset = data.load()
     except (OSError, ValueError) as error:
         raise DesignError(f"'{file}' is no data set that can be read ({error})") from error
-    return Surrogate.of(loaded)
+    return found

@@ -12,6 +12,7 @@ from bh.applications.inverse.fit import arc_length, curvature, fit_curve, move_t
 from bh.applications.inverse.optimisers import Genetic, Polished
 from bh.applications.inverse.problems import CURVES
 from bh.applications.inverse.simulate import simulate
+from bh.applications.inverse.surrogate import shipped
 from verification.framework.checks import CaseResult, Context, line, plot
 
 CURVES_IN = "source 6.4.1, Fig. 6.15"
@@ -137,7 +138,7 @@ def run_b(context: Context) -> CaseResult:
     )
     context.tell("problem_b")
     most = 2 if context.quick else 4
-    found = move_tip(most, Polished(Genetic(100, 60)))
+    found = move_tip(most, Polished(Genetic(100, 60)), surrogate=shipped())
     moved = [-float(f.value) for _, f in found]
     for n, (problem, top) in enumerate(found, 1):
         design = problem.design(top.x, top.on)

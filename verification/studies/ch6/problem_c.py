@@ -32,7 +32,7 @@ MOST = 4
 class ReachTask:
     """A target with y >= 0, and its mirror image where y > 0: the mirrored design is simulated, too."""
 
-    reach: Reach = field(default_factory=Reach)
+    reach: Reach = field(default_factory=lambda: Reach(model="source"))
 
     @property
     def identity(self) -> str:

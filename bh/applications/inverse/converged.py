@@ -1,0 +1,261 @@
+"""Where folded and pinched creases end by the formulation that converges: chains of pieces, with error bars.
+
+A strip is: free end, arc of half a segment, pinch, the other half, joint, ..., free end (`pieces`). Frames are those of
+cross-sections; within arcs their first two axes lie in the plane of the crease, at free ends they are turned about the
+crease by up to 1.4 degrees, since edges bow.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bh.applications.inverse.levels import Limit, Series
+from bh.applications.inverse.motions import ALONG, exponential
+from bh.applications.inverse.piece_data import PieceData
+from bh.applications.inverse.pieces import LARGEST, LEVELS, PIECES
+from bh.applications.inverse.segments import DesignError, Domain
+from bh.applications.inverse.simulate import Landing, Setting, simulate
+from bh.applications.inverse.transforms import chain
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+ANEW = "make it anew: bh segments"
+STRIP = 1  # level on which whole strips are simulated
+SHARE = 0.5  # of what a strip does beside the chain of its pieces, on a mesh that is not fine, is doubt
+
+
+class Converged:
+    """Strips of one setting as chains of pieces.
+
+    Attributes:
+        domain: of the segments that designs are made of.
+        setting: sheet, fold and pinch.
+        mesh: of whole strips that are simulated.
+    """
+
+    def __init__(
+        self,
+        series: Mapping[str, Series],
+        setting: Setting,
+        limits: Mapping[str, Limit] | None = None,
+        same: Converged | None = None,
+    ) -> None:
+        """Take functions "arc" (rate of its motion), "end", "pinch" and "joint" of the curvatures.
+
+        Args:
+            series: the functions.
+            setting: sheet, fold and pinch.
+            limits: what they are limits of, with error bars; None where they are those of one mesh.
+            same: the model of one mesh, on which whole strips are simulated.
+        """
+        self.setting, self.domain = setting, Domain(k0=LARGEST, fold=setting.fold)
+        self.mesh = LEVELS["pinch"][STRIP]
+        self._series, self._limits, self._same = series, limits or {}, same or self
+
+    @classmethod
+    def of(cls, data: Dataset) -> Converged:
+        """From a data set of `bh segments`.
+
+        Raises:
+            DesignError: it is of another version, or lacks something.
+        """
+        if data.attrs.get("format") != PIECES:
+            raise DesignError(
+                f"the data set has format {data.attrs.get('format')}, pieces have {PIECES}; {ANEW}"
+            )
+        try:
+            setting = Setting(**json.loads(data.attrs["setting"]))
+            read = PieceData(data)
+            values = {name: limit.value for name, limit in read.limits.items()}
+            return cls(values, setting, read.limits, cls(read.series(STRIP), setting))
+        except (KeyError, TypeError, ValueError) as error:
+            raise DesignError(f"the data set is incomplete ({error}); {ANEW}") from error
+
+    def sector_bound(self, length: ArrayLike) -> Array:
+        """Curvature before folding at which the sector is as large as it may be, 1/mm.
+
+        Returns:
+            of the shape of `length` (mm).
+        """
+        bound = self.domain.sector * math.sin(0.5 * self.setting.fold)
+        return np.asarray(bound / np.asarray(length, dtype=float))
+
+    def arc(self, k0: ArrayLike, s: ArrayLike) -> tuple[Array, Array]:
+        """Motions along arcs, translations (..., 3) in mm and rotations (..., 3, 3).
+
+        Args:
+            k0: (...) curvatures before folding, 1/mm.
+            s: (...) arc lengths, mm, of any sign.
+        """
+        k0, s = np.broadcast_arrays(np.asarray(k0, dtype=float), np.asarray(s, dtype=float))
+        rate = self._at("arc", k0)
+        turn, size = rate[..., 5] * s, rate[..., 0] * s
+        t = np.zeros((*s.shape, 3))
+        t[..., 0] = size * np.sinc(turn / np.pi)
+        t[..., 1] = 0.5 * size * turn * np.sinc(0.5 * turn / np.pi) ** 2
+        r = np.zeros((*s.shape, 3, 3))
+        r[..., 0, 0] = r[..., 1, 1] = np.cos(turn)
+        r[..., 1, 0] = np.sin(turn)
+        r[..., 0, 1], r[..., 2, 2] = -r[..., 1, 0], 1.0
+        return t, r
+
+    def curvature(self, k0: ArrayLike) -> Array:
+        """Curvature of folded arcs, 1/mm.
+
+        Args:
+            k0: (...) before folding, 1/mm.
+
+        Returns:
+            of the shape of `k0`.
+        """
+        return np.asarray(self._at("arc", np.asarray(k0, dtype=float))[..., 5])
+
+    def _at(self, name: str, *k0: Array) -> Array:
+        return self._series[name](*(np.clip(k / LARGEST, -1.0, 1.0) for k in k0))
+
+    def motions(self, k0: Array, length: Array, pinched: Bools) -> tuple[Array, Array]:
+        """(..., 4 n + 1, 3) and (..., 4 n + 1, 3, 3) motions of the pieces of strips (..., n), in order.
+
+        Args:
+            k0: curvatures before folding, 1/mm.
+            length: mm.
+            pinched: truth values.
+        """
+        n = k0.shape[-1]
+        t = np.zeros((*k0.shape[:-1], 4 * n + 1, 3))
+        r = np.zeros((*k0.shape[:-1], 4 * n + 1, 3, 3))
+        arcs = self.arc(k0, 0.5 * length)
+        jumps = exponential(self._at("joint", k0[..., :-1], k0[..., 1:]))
+        pinches = exponential(self._at("pinch", k0) * pinched[..., None])
+        for first, moves in ((1, arcs), (2, pinches), (3, arcs), (4, jumps)):
+            t[..., first:-1:4, :], r[..., first:-1:4, :, :] = moves
+        t[..., 0, :], r[..., 0, :, :] = exponential(self._at("end", k0[..., 0]))
+        t[..., -1, :], r[..., -1, :, :] = exponential(ALONG * self._at("end", k0[..., -1]))
+        return t, r
+
+    def forward(
+        self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike, check: bool = True
+    ) -> tuple[Array, Array]:
+        """Points and frames of whole strips: start, joints and end.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+            pinched: (..., n) truth values.
+            check: refuse segments outside the domain; else they are taken at its edge.
+
+        Returns:
+            (..., n + 1, 3) points P_0 to P_n, mm, and (..., n + 1, 3, 3) frames.
+
+        Raises:
+            DesignError: a segment outside the domain (unless `check` is off).
+        """
+        k0, length, on = _design(k0, length, pinched)
+        if check:
+            self._check(k0, length, on)
+        points, frames = chain(*self.motions(k0, length, on))
+        n = k0.shape[-1]
+        at = [0, *(4 * i for i in range(1, n)), 4 * n + 1]
+        return points[..., at, :], frames[..., at, :, :]
+
+    def unpinched(self, k0: ArrayLike, length: ArrayLike) -> tuple[Array, Array]:
+        """Points and frames of strips before they are pinched, see `forward`.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+
+        Returns:
+            (..., n + 1, 3) points, mm, and (..., n + 1, 3, 3) frames.
+        """
+        return self.forward(k0, length, np.zeros(np.shape(k0), dtype=bool), check=False)
+
+    def _check(self, k0: Array, length: Array, on: Bools) -> None:
+        low, high = self.domain.length
+        inside = (np.abs(k0) <= LARGEST * (1.0 + 1e-9)) & (~on | self.domain.holds(k0, length))
+        if not inside.all():
+            worst = np.flatnonzero(~inside.ravel())[0]
+            raise DesignError(
+                f"a segment of k0 = {k0.ravel()[worst]:.4g} /mm and {length.ravel()[worst]:.4g} mm is outside the "
+                f"data set; |k0| <= {LARGEST} /mm, and where it is pinched {low:g} to {high:g} mm and a folded sector "
+                "of at most half a turn"
+            )
+
+    def bars(self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array]:
+        """Error bars of the ends of strips (...): of the position, mm, and of the orientation, rad.
+
+        Those of all pieces are added up as if all pulled the same way.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+            pinched: (..., n) truth values.
+        """
+        k0, length, on = _design(k0, length, pinched)
+        points, frames = chain(*self.motions(k0, length, on))
+        doubt = self._bars(k0, length, on)
+        lever = points[..., -1:, :] - points[..., :-1, :]
+        moved = np.cross(np.swapaxes(frames[..., :-1, :, :], -1, -2), lever[..., None, :])
+        size = np.linalg.norm(moved, axis=-1)
+        position = (doubt[..., :3] + size * doubt[..., 3:]).sum(axis=(-1, -2))
+        return position, doubt[..., 3:].sum(axis=(-1, -2))
+
+    def _bars(self, k0: Array, length: Array, on: Bools) -> Array:
+        """(..., 4 n + 1, 6) error bars of the vectors of all pieces."""
+
+        def of(name: str, *k: Array) -> Array:
+            limit = self._limits.get(name)
+            at = [np.clip(each / LARGEST, -1.0, 1.0) for each in k]
+            return np.zeros((*k[0].shape, 6)) if limit is None else limit.bar(*at)
+
+        n = k0.shape[-1]
+        found = np.zeros((*k0.shape[:-1], 4 * n + 1, 6))
+        found[..., 1::4, :][..., :n, :] = 0.5 * length[..., None] * of("arc", k0)
+        found[..., 3::4, :][..., :n, :] = found[..., 1::4, :][..., :n, :]
+        found[..., 2::4, :][..., :n, :] = of("pinch", k0) * on[..., None]
+        if n > 1:
+            found[..., 4:-1:4, :] = of("joint", k0[..., :-1], k0[..., 1:])
+        found[..., 0, :], found[..., -1, :] = of("end", k0[..., 0]), of("end", k0[..., -1])
+        return found
+
+    def land(self, k0: Sequence[float], length: Sequence[float], pinched: Sequence[bool]) -> Landing:
+        """Simulate a whole strip, and say where it ends in the limit of fine meshes.
+
+        What the strip does beside the chain of its pieces is read from one mesh, the same for both, and added to
+        the limit of the chain. Half of it is doubt, beside the error bars of the pieces.
+
+        Args:
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+            pinched: (n,).
+
+        Raises:
+            DesignError: the path ended early.
+        """
+        strip = simulate(k0, length, pinched, replace(self.setting, edge=self.mesh.edge, rows=self.mesh.rows))
+        design = np.asarray(k0), np.asarray(length), np.asarray(pinched)
+        beside = strip.t - self._same.forward(*design, check=False)[0][-1]
+        end = self.forward(*design, check=False)[0][-1] + beside
+        bar = float(self.bars(*design)[0]) + SHARE * float(np.linalg.norm(beside))
+        return Landing(strip, end, bar)
+
+    def about(self) -> Mapping[str, object]:
+        """The setting as plain data."""
+        return asdict(self.setting)
+
+
+def _design(k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array, Bools]:
+    k, size, on = np.broadcast_arrays(
+        np.asarray(k0, dtype=float), np.asarray(length, dtype=float), np.asarray(pinched, dtype=bool)
+    )
+    return k, size, on

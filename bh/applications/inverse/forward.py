@@ -1,0 +1,84 @@
+"""What a model of folded and pinched strips offers to those who design with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bh.applications.inverse.segments import Domain
+from bh.applications.inverse.simulate import Landing, Setting
+
+Array = NDArray[np.float64]
+
+
+class Forward(Protocol):
+    """What designs are computed with: where strips of folded and pinched segments end.
+
+    Attributes:
+        domain: of the segments that designs are made of.
+        setting: sheet, fold and pinch.
+    """
+
+    domain: Domain
+    setting: Setting
+
+    def forward(
+        self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike, check: bool = True
+    ) -> tuple[Array, Array]:
+        """Points (..., n + 1, 3), mm, and frames (..., n + 1, 3, 3) of designs (..., n).
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+            pinched: (..., n) truth values.
+            check: refuse segments outside the domain.
+        """
+        ...
+
+    def unpinched(self, k0: ArrayLike, length: ArrayLike) -> tuple[Array, Array]:
+        """The same before the pinch.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+
+        Returns:
+            (..., n + 1, 3) points, mm, and (..., n + 1, 3, 3) frames.
+        """
+        ...
+
+    def arc(self, k0: ArrayLike, s: ArrayLike) -> tuple[Array, Array]:
+        """Motions along folded arcs: translations (..., 3), mm, and rotations (..., 3, 3).
+
+        Args:
+            k0: (...) curvatures before folding, 1/mm.
+            s: (...) arc lengths, mm, of any sign.
+        """
+        ...
+
+    def land(self, k0: Sequence[float], length: Sequence[float], pinched: Sequence[bool]) -> Landing:
+        """Simulate a whole strip.
+
+        Args:
+            k0: (n,) curvatures before folding, 1/mm.
+            length: (n,), mm.
+            pinched: (n,).
+        """
+        ...
+
+    def bars(self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array]:
+        """Error bars (...) of the ends: of the position, mm, and of the orientation, rad.
+
+        Args:
+            k0: (..., n) curvatures before folding, 1/mm.
+            length: (..., n), mm.
+            pinched: (..., n) truth values.
+        """
+        ...
+
+    def about(self) -> Mapping[str, object]:
+        """The setting as plain data."""
+        ...

@@ -1,0 +1,107 @@
+"""Functions of one or two curvatures from levels of meshes: Chebyshev sums of what each level adds, extrapolated.
+
+Arguments are curvatures over the largest, in [-1, 1]; values are vectors of motions (..., 6). A level is interpolated
+as the level before plus a polynomial through the differences, which are smoother than the values: so it may have fewer
+points. Errors of the formulation go with the square of the width of the cells once the layers along the crease and the
+edges are resolved, so the limit is f + (f - f') / 3 of the last two levels. Its error bar is all of what is added
+there, and the distance to the limit that the levels before the last would have given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """A Chebyshev sum: coefficients (d + 1, 6) of one argument, or (d + 1, d + 1, 6) of two."""
+
+    coefficients: Array
+
+    @classmethod
+    def through(cls, values: Array) -> Series:
+        """Through values (d + 1, 6) or (d + 1, d + 1, 6) at Chebyshev points, increasing."""
+        c = values
+        for axis in range(values.ndim - 1):
+            c = np.moveaxis(_matrix(values.shape[axis]) @ np.moveaxis(c, axis, -2), -2, axis)
+        return cls(np.asarray(c))
+
+    def __call__(self, *x: Array) -> Array:
+        """(..., 6) values at one or two arguments (...) in [-1, 1]."""
+        each = [_vander(np.asarray(x_i), self.coefficients.shape[0] - 1) for x_i in x]
+        found = np.tensordot(each[0], self.coefficients, axes=(-1, 0))
+        if len(x) == 2:
+            found = (each[1][..., None] * found).sum(axis=-2)
+        return np.asarray(found)
+
+    def __add__(self, other: Series) -> Series:
+        """The sum of both, of any degrees."""
+        size = max(self.coefficients.shape[0], other.coefficients.shape[0])
+        return Series(self._padded(size) + other._padded(size))
+
+    def times(self, factor: float) -> Series:
+        """The same times a number."""
+        return Series(factor * self.coefficients)
+
+    def _padded(self, size: int) -> Array:
+        c = self.coefficients
+        return np.pad(c, [(0, size - n) for n in c.shape[:-1]] + [(0, 0)])
+
+
+def points(count: int) -> Array:
+    """(count,) Chebyshev points in [-1, 1], increasing; with an odd count symmetric to the last bit."""
+    d = count - 1
+    found: Array = np.sin(0.5 * np.pi * np.arange(-d, d + 1, 2) / d)
+    return found
+
+
+def _vander(x: Array, degree: int) -> Array:
+    """(..., degree + 1) Chebyshev polynomials at arguments (...)."""
+    return np.asarray(chebyshev.chebvander(x, degree).reshape(*x.shape, degree + 1))
+
+
+def _matrix(count: int) -> Array:
+    """From values at Chebyshev points to coefficients."""
+    return np.asarray(np.linalg.inv(chebyshev.chebvander(points(count), count - 1)), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """A function known on levels of meshes.
+
+    Attributes:
+        levels: the function on each of them, coarse first, three or more.
+        value: the limit.
+        doubts: what error bars are made of: the step from the last level to the limit, and that from the limit
+            of the levels before.
+    """
+
+    levels: tuple[Series, ...]
+    value: Series
+    doubts: tuple[Series, ...]
+
+    @classmethod
+    def of(cls, values: list[Array]) -> Limit:
+        """From values at the Chebyshev points of every level, coarse first; see `Series.through`."""
+        levels: list[Series] = []
+        for each in values:
+            at = points(each.shape[0])
+            grid = np.meshgrid(*([at] * (each.ndim - 1)), indexing="ij")
+            before = levels[-1] if levels else Series(np.zeros((1,) * (each.ndim - 1) + (6,)))
+            added: Array = each - before(*grid)
+            levels.append(before + Series.through(added))
+        last, other = (
+            fine + (fine + coarse.times(-1.0)).times(1.0 / 3.0)
+            for coarse, fine in ((levels[-2], levels[-1]), (levels[-3], levels[-2]))
+        )
+        return cls(tuple(levels), last, (last + levels[-1].times(-1.0), last + other.times(-1.0)))
+
+    def bar(self, *x: Array) -> Array:
+        """(..., 6) error bars at one or two arguments (...) in [-1, 1], not negative."""
+        return np.asarray(sum(np.abs(doubt(*x)) for doubt in self.doubts))

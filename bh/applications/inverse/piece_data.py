@@ -1,0 +1,141 @@
+"""From a data set of simulated pieces to functions of the curvatures: on levels of meshes, and in their limit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.applications.inverse.levels import Limit, Series
+from bh.applications.inverse.motions import ACROSS, ALONG, exponential, logarithm, then
+from bh.applications.inverse.pieces import LARGEST, LEVELS, Kind, Level, curvatures
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+Array = NDArray[np.float64]
+Motion = tuple[Array, Array]
+Arc = Callable[[float, float], Motion]  # of a curvature before folding, 1/mm, and an arc length, mm
+OWN = {
+    "pinch": np.array(
+        [1.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+    ),  # what symmetry leaves of a piece that is its own image
+    "arc": np.array([1.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PieceData:
+    """Simulated pieces by kind, mesh and curvatures.
+
+    Attributes:
+        data: of `bh.sweep.segments.build_pieces`.
+    """
+
+    data: Dataset
+
+    @cached_property
+    def _rows(self) -> dict[tuple[str, int, float, float], tuple[Array, Array, Array]]:
+        d = {
+            name: self.data[name].values
+            for name in ("kind", "rows", "before", "after", "t", "r", "to_middle")
+        }
+        return {
+            (str(kind), int(rows), float(before), float(after)): (t, r, to)
+            for kind, rows, before, after, t, r, to in zip(*d.values(), strict=True)
+        }
+
+    def _row(self, kind: Kind, level: Level, before: float, after: float) -> tuple[Motion, Motion, Array]:
+        """Motions from the free end to the first section and from there to the second, and the distances.
+
+        Raises:
+            KeyError: it is not in the data set.
+            ValueError: it could not be simulated.
+        """
+        key = (kind, level.rows, float(np.round(before, 12)), float(np.round(after, 12)))
+        t, r, to = self._rows[key]
+        if not np.isfinite(t).all():
+            raise ValueError(f"the piece {key} was not simulated")
+        return (t[0], r[0]), (t[1], r[1]), to
+
+    def series(self, number: int) -> dict[str, Series]:
+        """Functions of one level of meshes (from 0), by name: arc (rate), end, pinch, joint."""
+        arc = Series.through(self._arcs(number))
+        found = {"arc": arc}
+        for name, values in (("end", self._ends), ("pinch", self._pinches), ("joint", self._joints)):
+            found[name] = Series.through(values(number, going(arc)))
+        return found
+
+    @cached_property
+    def limits(self) -> dict[str, Limit]:
+        """Limits of the same functions; what lies between arcs is read with the limit of the arcs."""
+        arcs = Limit.of([self._arcs(i) for i in range(len(LEVELS["arc"]))])
+        found = {"arc": arcs}
+        for name, kind, values in (
+            ("end", "arc", self._ends),
+            ("pinch", "pinch", self._pinches),
+            ("joint", "joint", self._joints),
+        ):
+            count = len(LEVELS[kind])  # type: ignore[index]
+            found[name] = Limit.of([values(i, going(arcs.value)) for i in range(count)])
+        return found
+
+    def _halved(self, level: Level, value: Callable[[float], Array]) -> Array:
+        """(degree + 1, 6) values at all curvatures from those at the ones from zero."""
+        k0 = curvatures(level.degree)
+        half = np.array([value(float(k)) for k in k0[level.degree // 2 :]])
+        return np.concatenate((half[:0:-1] * ACROSS, half))
+
+    def _arcs(self, number: int) -> Array:
+        level = LEVELS["arc"][number]
+
+        def rate(k0: float) -> Array:
+            _, across, to = self._row("arc", level, k0, k0)
+            return np.asarray(OWN["arc"] * logarithm(*across) / (2.0 * to[1]))
+
+        return self._halved(level, rate)
+
+    def _ends(self, number: int, arc: Arc) -> Array:
+        level = LEVELS["arc"][number]
+
+        def end(k0: float) -> Array:
+            first, _, to = self._row("arc", level, k0, k0)
+            return logarithm(*then(first, arc(k0, -float(to[0]))))
+
+        return self._halved(level, end)
+
+    def _pinches(self, number: int, arc: Arc) -> Array:
+        level = LEVELS["pinch"][number]
+
+        def pinch(k0: float) -> Array:
+            _, across, to = self._row("pinch", level, k0, k0)
+            back = arc(k0, -float(to[1]))
+            return np.asarray(OWN["pinch"] * logarithm(*then(then(back, across), back)))
+
+        return self._halved(level, pinch)
+
+    def _joints(self, number: int, arc: Arc) -> Array:
+        """(degree + 1, degree + 1, 6) of both curvatures; equal ones need no piece."""
+        level = LEVELS["joint"][number]
+        k0 = curvatures(level.degree)
+        found = np.zeros((len(k0), len(k0), 6))
+        for i, a in enumerate(k0):
+            for j, b in enumerate(k0):
+                if i < j and a + b >= -1e-12:
+                    _, across, to = self._row("joint", level, float(a), float(b))
+                    sides = (arc(float(k), -float(to[1])) for k in (a, b))
+                    value = logarithm(*then(then(next(sides), across), next(sides)))
+                    found[i, j], found[j, i] = value, ALONG * value
+                    last = len(k0) - 1
+                    found[last - i, last - j] = ACROSS * value
+                    found[last - j, last - i] = ACROSS * ALONG * value
+        return found
+
+
+def going(rate: Series) -> Arc:
+    """Motions along arcs of a rate."""
+    return lambda k0, s: exponential(s * rate(np.asarray(k0 / LARGEST)))

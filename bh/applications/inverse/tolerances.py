@@ -1,0 +1,182 @@
+"""How the end of a design moves with what cannot be made exactly: an ellipsoid for given spreads.
+
+Sheet, fold and pinch are varied one at a time in the whole strip, simulated on one mesh: one standard deviation up and
+one down. Errors of the cut crease, curvature and length of every segment, are derivatives of the model. Every energy of
+a strip is proportional to E and nothing pulls at it, so its end does not depend on E.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.applications.inverse.forward import Forward
+from bh.applications.inverse.problems import Design
+from bh.applications.inverse.simulate import Setting, simulate
+
+Array = NDArray[np.float64]
+VARIED = ("Lstar", "t", "zone", "pinch", "fold")  # of `Setting`
+STEP = 1e-4  # of a standard deviation, for derivatives of the model
+
+
+@dataclass(frozen=True)
+class Spreads:
+    """Standard deviations of what is made, independent of each other; 0 for what is exact.
+
+    Attributes:
+        Lstar: length scale of the crease, mm.
+        t: thickness, mm.
+        zone: length of the pinched zone, mm.
+        pinch: its dihedral angle, rad.
+        fold: rest dihedral angle, rad.
+        k0: curvature of the cut crease of each segment, 1/mm.
+        length: of each segment, mm.
+    """
+
+    Lstar: float = 0.05
+    t: float = 0.002
+    zone: float = 1.0
+    pinch: float = 0.02
+    fold: float = 0.02
+    k0: float = 1e-5
+    length: float = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerance:
+    """Where the end of a design lies when it is made with some spreads, to first order.
+
+    Attributes:
+        moves: (3,) movement of the end by one standard deviation of each thing, mm, by its name.
+        bent: (3,) of the same things, what two steps of opposite signs leave together, half, mm: how far the end is
+            from the straight line of `moves` one standard deviation away; of `VARIED` only.
+    """
+
+    moves: Mapping[str, Array]
+    bent: Mapping[str, Array]
+
+    @property
+    def covariance(self) -> Array:
+        """(3, 3) of the end, mm^2."""
+        columns = np.array(list(self.moves.values()))
+        return np.asarray(columns.T @ columns)
+
+    def axes(self, probability: float = 0.95) -> tuple[Array, Array]:
+        """Semi-axes of the ellipsoid that holds the end with some probability.
+
+        Args:
+            probability: between 0 and 1.
+
+        Returns:
+            (3,) lengths, mm, the longest first, and (3, 3) directions in columns.
+        """
+        from scipy.stats import chi2
+
+        square, directions = np.linalg.eigh(self.covariance)
+        size = np.sqrt(np.maximum(square, 0.0) * chi2.ppf(probability, 3))
+        return size[::-1], directions[:, ::-1]
+
+
+def tolerance(
+    model: Forward,
+    design: Design,
+    spreads: Spreads | None = None,
+    edge: float = 1.25,
+    rows: int = 4,
+) -> Tolerance:
+    """How the end of a design moves; simulates its strip up to eleven times.
+
+    Args:
+        model: that the design was made with.
+        design: crease and pinches.
+        spreads: standard deviations; None for the default ones.
+        edge: of the mesh of whole strips, mm along the crease.
+        rows: of its cells a panel.
+
+    Raises:
+        DesignError: a path ended early.
+    """
+    spreads = spreads or Spreads()
+    setting = replace(model.setting, edge=edge, rows=rows)
+    varied = [name for name in VARIED if getattr(spreads, name) > 0.0 and matters(name, design)]
+    base = _end(design, setting) if varied else np.zeros(3)
+    moves, bent = {}, {}
+    for name in varied:
+        value, step = getattr(setting, name), getattr(spreads, name)
+        up, down = (_end(design, replace(setting, **{name: value + sign * step})) for sign in (1.0, -1.0))
+        moves[name] = 0.5 * (up - down)
+        bent[name] = 0.5 * (up + down) - base
+    return Tolerance({**moves, **_cut(model, design, spreads)}, bent)
+
+
+def matters(name: str, design: Design) -> bool:
+    """Whether a field of `Setting` changes a design: zone and angle of a pinch do only where there is one.
+
+    Args:
+        name: of the field.
+        design: crease and pinches.
+    """
+    return name not in ("zone", "pinch") or bool(design.pinched.any())
+
+
+def _end(design: Design, setting: Setting) -> Array:
+    return simulate(*design.lists(), setting).t
+
+
+def _cut(model: Forward, design: Design, spreads: Spreads) -> dict[str, Array]:
+    """Movements by errors of the curvature and the length of every segment, mm."""
+    found = {}
+    for name in ("k0", "length"):
+        spread = getattr(spreads, name)
+        if spread <= 0.0:
+            continue
+        shift = STEP * spread * np.eye(design.n)
+        k0, length = (
+            getattr(design, each) + (shift if each == name else 0.0 * shift) for each in ("k0", "length")
+        )
+        back = [getattr(design, each) - (shift if each == name else 0.0 * shift) for each in ("k0", "length")]
+        on = np.tile(design.pinched, (design.n, 1))
+        up, down = (model.forward(k, size, on, check=False)[0][:, -1] for k, size in ((k0, length), back))
+        found.update({f"{name} of segment {i + 1}": row for i, row in enumerate(0.5 * (up - down) / STEP)})
+    return found
+
+
+def sampled(
+    model: Forward,
+    design: Design,
+    count: int,
+    spreads: Spreads | None = None,
+    edge: float = 1.25,
+    rows: int = 4,
+    seed: int = 1,
+) -> Array:
+    """(count, 3) ends of strips that are made with normal errors, each one simulated whole, mm.
+
+    Args:
+        model: that the design was made with.
+        design: crease and pinches.
+        count: of strips.
+        spreads: standard deviations; None for the default ones.
+        edge: of the mesh, mm along the crease.
+        rows: of its cells a panel.
+        seed: the same seed gives the same strips.
+
+    Raises:
+        DesignError: a path ended early.
+    """
+    spreads = spreads or Spreads()
+    setting = replace(model.setting, edge=edge, rows=rows)
+    rng = np.random.default_rng(seed)
+    found = np.empty((count, 3))
+    for i in range(count):
+        off = {name: getattr(setting, name) + getattr(spreads, name) * rng.normal() for name in VARIED}
+        cut = replace(
+            design,
+            k0=design.k0 + spreads.k0 * rng.normal(size=design.n),
+            length=design.length + spreads.length * rng.normal(size=design.n),
+        )
+        found[i] = _end(cut, replace(setting, **off))
+    return found
