@@ -84,12 +84,18 @@ def scenes() -> tuple[Scene, ...]:
         Scene("parabola, wide panels", canopy + SHEET.format(t=0.2, how="by = 0.8"), fine),
         Scene("three waves", drawn + springs, ((32, 4), (64, 8)), WAVES),
         Scene(
-            "card with two Bezier curves", drawn + card, fine, CARD.format(a=80, b=120, c=130, d=100, more=blue)
+            "card with two Bezier curves",
+            drawn + card,
+            fine,
+            CARD.format(a=80, b=120, c=130, d=100, more=blue),
         ),
-        Scene("ring", ring + "[sheet]\nE = 4000.0\nt = 0.127\n[[steps]]\nfold = { crease = 'crease', to = 2.2 }\n",
-              ((62, 2), (124, 4))),
+        Scene(
+            "ring",
+            ring + "[sheet]\nE = 4000.0\nt = 0.127\n[[steps]]\nfold = { crease = 'crease', to = 2.2 }\n",
+            ((62, 2), (124, 4)),
+        ),
         Scene("concentric circles", drawn + springs, ((48, 3), (96, 6)), CIRCLES),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
