@@ -44,10 +44,10 @@ class Ring(Silent):
         matrix = BandMatrix(np.array([np.diag(K), [K[1, 0], 0.0]], order="F"), np.arange(2))
         return Tangent(matrix)
 
-    def control_rate(self, q: Array, lam: float) -> Array:  # noqa: ARG002 - of the protocol
+    def control_rate(self, q: Array, lam: float) -> Array:
         return np.zeros(2)
 
-    def power(self, q: Array, lam: float) -> float:  # noqa: ARG002 - of the protocol
+    def power(self, q: Array, lam: float) -> float:
         return 0.0
 
 
