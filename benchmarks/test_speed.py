@@ -18,7 +18,7 @@ from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.points import Increment, point
-from bh.solvers.trace import Walk, walk
+from bh.solvers.walk import Walk, walk
 from verification.studies.app_b.appendix_b import model
 from verification.theory.array_annulus import ENERGIES, array_annulus
 

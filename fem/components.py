@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.model.constraints import Constraints
 from bh.model.ramp import Ramp
-from fem.connectors import Connectors
+from fem.creases import Connectors
 from fem.shell import ShellElements
 from meshes import SheetMesh
 from meshes.topology import Ints

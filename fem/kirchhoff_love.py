@@ -20,7 +20,7 @@ from bh.runtime.threads import one_blas_thread
 from bh.solvers.load_control import LoadControl
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, point
-from bh.solvers.trace import Strategy, Walk, walk
+from bh.solvers.walk import Strategy, Walk, walk
 from fem.loads import EdgeMoments
 from fem.observables import observe
 from fem.remarks import straight_edges

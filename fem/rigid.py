@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bh.model.constraints import MOTIONS, free_motions, rigid_motions
 from fem.components import Components
-from fem.connectors import Connectors
+from fem.creases import Connectors
 from fem.shell import ShellElements
 from meshes.curved import ElementMesh
 from meshes.topology import Ints

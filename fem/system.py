@@ -19,7 +19,7 @@ from bh.solvers.system import Evaluation, Tangent, grows_ahead
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
-from fem.connectors import connectors
+from fem.creases import connectors
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle

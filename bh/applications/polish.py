@@ -19,7 +19,7 @@ from bh.analysis.situation import Situation
 from bh.errors import InputError, ModelError
 from bh.paths.path import Path
 from bh.solvers.outcome import Outcome
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from bh.solving.trace import trace
 
 Array = NDArray[np.float64]

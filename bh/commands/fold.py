@@ -29,7 +29,7 @@ from bh.scene.load import Scene, parse_scene
 from bh.solvers.automatic import Automatic
 from bh.solvers.points import Increment, Point
 from bh.solvers.system import Evaluation, System
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from bh.solving.levels import folder_of, move
 from meshes.io.export import replacing
 

@@ -29,7 +29,7 @@ from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from bh.solving.follow import check_resumable
 from bh.solving.levels import folder_of, move
 from bh.solving.levels import remove as remove_levels

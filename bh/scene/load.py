@@ -54,7 +54,7 @@ from bh.scene.tables import (
 )
 from bh.scene.wanted_accuracy import wanted_accuracy
 from bh.solvers.settling import Settling
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from meshes.limits import check_limit
 
 SECTIONS = (

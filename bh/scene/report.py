@@ -17,8 +17,8 @@ from bh.model.supports import Support, select
 from bh.scene.load import Scene
 from meshes import SheetMesh
 from meshes.curves import Array, sample
-from meshes.io.draw import LOOKS, flat_lines
 from meshes.io.export import replacing
+from meshes.io.writing import LOOKS, flat_lines
 from meshes.mesh import count
 
 if TYPE_CHECKING:

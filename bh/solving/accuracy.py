@@ -34,7 +34,7 @@ from bh.paths.estimate import Accuracy, Trial
 from bh.paths.path import Path
 from bh.runtime.progress import ProgressMeter, meter, stage
 from bh.solvers.outcome import Outcome
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from bh.solving.follow import follow
 from bh.solving.levels import Levels
 from bh.solving.mesh_choice import Ladder

@@ -12,7 +12,7 @@ from bh.paths.path import Path
 from bh.solvers.automatic import Automatic
 from bh.solvers.load_control import LoadControl
 from bh.solvers.system import System
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]

@@ -26,7 +26,7 @@ from bh.runtime.threads import one_blas_thread
 from bh.solvers.automatic import Automatic
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import LOAD, Point, point
-from bh.solvers.trace import Strategy, Walk, walk
+from bh.solvers.walk import Strategy, Walk, walk
 from bh.solving.coarser import Coarser
 from meshes.mesh import count
 

@@ -21,7 +21,7 @@ from bh.model.refinement import MOST, Goal, pattern_of, with_mesh
 from bh.paths.estimate import Accuracy, Trial
 from bh.paths.path import Path
 from bh.runtime.progress import ProgressMeter, meter, stage
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from bh.solving.accuracy import ORDERS, nothing, reading, snapped
 from bh.solving.follow import follow
 from meshes.cells import Cells

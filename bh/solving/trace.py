@@ -11,7 +11,7 @@ from bh.model.model import Model
 from bh.paths.path import Path
 from bh.runtime.compiling import compilation_told
 from bh.runtime.progress import ProgressMeter, meter
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from bh.solving.follow import follow
 
 if TYPE_CHECKING:

@@ -1,10 +1,10 @@
 """File formats: FOLD, SVG and DXF in, FOLD, SVG, DXF and triangles (through meshio) out."""
 
-from meshes.io.draw import write_pattern
 from meshes.io.drawing import read_drawn, read_pattern
 from meshes.io.export import write_mesh
 from meshes.io.fold import read_fold, write_fold
 from meshes.io.gltf import write_gltf
+from meshes.io.writing import write_pattern
 
 __all__ = [
     "read_drawn",

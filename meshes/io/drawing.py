@@ -12,6 +12,7 @@ from typing import TypedDict, TypeVar, Unpack
 import numpy as np
 
 from meshes.curves import Array
+from meshes.drawn_pattern import pattern_of, region_of
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import shown
 from meshes.io.perforation import join_dashes
@@ -22,7 +23,6 @@ from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.planar import RIM, DrawnLine, Graph, check_crossings, heal
 from meshes.separate import one_sheet
-from meshes.sheet import pattern_of, region_of
 
 OUTLINES = ("drawn", "hull")
 DRAWINGS = (".svg", ".svgz", ".dxf", ".cp", ".opx")

@@ -15,11 +15,11 @@ from scipy.spatial import Delaunay
 import meshes
 from meshes import CreasePattern
 from meshes.curves import sample
+from meshes.drawn_pattern import pattern_of
 from meshes.io import read_pattern, write_pattern
-from meshes.io.draw import flat_lines
+from meshes.io.writing import flat_lines
 from meshes.pattern import FoldKind
 from meshes.planar import DrawnLine, heal
-from meshes.sheet import pattern_of
 from meshes.unstructured import sheet_area
 
 FOLDS: st.SearchStrategy[FoldKind] = st.sampled_from(get_args(FoldKind))

@@ -20,7 +20,7 @@ from bh.solvers.points import ARC, DISPLACEMENT, LOAD, Increment, Mode, Point, f
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation
-from bh.solvers.trace import Strategy, Walk, walk
+from bh.solvers.walk import Strategy, Walk, walk
 from tests.unit.test_newton import Arch, Column, Small, Stiffening
 from verification.studies.app_b.shell_folding import sheet_model
 from verification.studies.solver.benchmark_systems import VonMisesTruss

@@ -26,7 +26,7 @@ from bh.solvers.newton import Newton, Solution, line_search, slow
 from bh.solvers.points import Increment, Point, extrapolate, point
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation, Tangent
-from bh.solvers.trace import Walk, walk
+from bh.solvers.walk import Walk, walk
 from verification.studies.solver.benchmark_systems import Silent
 
 Array = NDArray[np.float64]

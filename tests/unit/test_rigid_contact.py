@@ -12,7 +12,7 @@ import meshes
 from bh import LoadControl, Model, ModelError, Sheet, trace
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.consistent.system import ConsistentSystem
-from bh.mechanics.shared.contact import RigidContact
+from bh.mechanics.shared.rigid_contact import RigidContact
 from bh.model.actuations import Indenter, Tether
 from bh.paths.path import Path
 

@@ -15,7 +15,7 @@ from bh.scene.load import parse_scene
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, point
 from bh.solvers.settling import NOTE, Settling
-from bh.solvers.trace import Walk, walk
+from bh.solvers.walk import Walk, walk
 from tests.unit.test_newton import Arch
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 

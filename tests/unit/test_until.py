@@ -16,7 +16,7 @@ from bh import Model, ModelError, Sheet, Until, trace
 from bh.formulations.observables import depth_of, measure
 from bh.formulations.state import State
 from bh.scene.load import parse_scene
-from bh.solvers.trace import Walk, _until
+from bh.solvers.walk import Walk, _until
 
 SHEET = Sheet(E=4000.0, t=0.381)
 FORMULATIONS = ["bars-and-hinges", "consistent"]

@@ -12,7 +12,7 @@ from bh.model.model import Model
 from bh.model.sheet import Sheet
 from bh.model.until import depth
 from bh.paths.path import Path
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from bh.solving.trace import trace
 from meshes import CreasePattern, SheetMesh, corrugation, structured
 

@@ -11,9 +11,9 @@ from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
 from bh.mechanics.shared import penetration as hinge_penetration
-from bh.mechanics.shared.contact import RigidContact
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
+from bh.mechanics.shared.rigid_contact import RigidContact
 from bh.model.constraints import MOTIONS, TURNED, rigid_motions
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.model import Model

@@ -19,7 +19,7 @@ from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Point, extrapolate, point
 from bh.solvers.system import System
-from bh.solvers.trace import Walk, walk
+from bh.solvers.walk import Walk, walk
 from meshes.cells import Kind
 
 SHEET = Sheet(E=4000.0, nu=0.38, t=0.127)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import meshes
 from bh import Displace, Force, Model, Path, Sheet, State, trace
-from bh.solvers.trace import Strategy
+from bh.solvers.walk import Strategy
 from meshes import CreasePattern, SheetMesh
 from verification.studies.app_b.shell_folding import ROTATE
 from verification.studies.ch3.fig3_10 import upward
