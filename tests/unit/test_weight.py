@@ -201,3 +201,15 @@ def test_scene_and_file() -> None:
     assert rebuild(data, arrays).steps == model.steps
     with pytest.raises(bh.SceneError, match=r"weight\.g = "):
         parse_scene(SCENE.format(weight="{ g = 9.81 }"))
+
+
+def test_bars_and_hinges_bear_the_same_weight() -> None:
+    """The whole weight at the edges that hold a strip, half at each; the energy balance of a small sag."""
+    mesh = strip(40.0, 10.0, 20)
+    model = Model(mesh, CARD, formulation="bars-and-hinges").support("edge:start", "xyz")
+    last = bh.trace(model.support("edge:end", "yz").step(Weight()))[-1]
+    whole = LINE * 400.0
+    for edge in ("edge:start", "edge:end"):
+        assert last.reaction(edge)[2] == pytest.approx(0.5 * whole, rel=1e-6)
+    moved = (last.points - last.mesh.points)[last.mesh.triangles].mean(axis=1)[:, 2]
+    assert last.energy.total == pytest.approx(-0.5 * LINE * float(last.mesh.areas @ moved), rel=1e-2)
