@@ -57,7 +57,7 @@ def test_a_compilation_is_told_once(
     def compile_two(model: bh.Model, **_: object) -> SimpleNamespace:
         njit(lambda x: x + 1.0)(1.0)
         njit(lambda x: x + 2.0)(1.0)
-        return SimpleNamespace(accuracy=None)
+        return SimpleNamespace(accuracy=None, reached=True)
 
     monkeypatch.setattr(module, "follow", compile_two)
     meter = Listener()
