@@ -116,10 +116,6 @@ def resolve(
     moved = np.full((n, 3), np.nan) if unknown else np.zeros((n, 3))
     if lying is not None and lying.points is not None:
         moved = lying.points - mesh.points
-    for item in prescribed:
-        for node in item.nodes.tolist():
-            direction = np.asarray(item.direction, dtype=float)
-            oblique.setdefault(node, []).append((direction, item.start, item.end, item.further))
     for group, at in ((here, moved), (supports, np.zeros((n, 3)))):  # flat places are the last word
         for nodes, direction in (pair for each in group for pair in each.fixed(mesh)):
             if np.abs(direction).max() == 1.0:
@@ -129,6 +125,10 @@ def resolve(
                 for node in nodes.tolist():
                     value = float(direction @ at[node])
                     oblique.setdefault(node, []).append((direction, value, value, 0.0))
+    for item in prescribed:
+        for node in item.nodes.tolist():
+            direction = np.asarray(item.direction, dtype=float)
+            oblique.setdefault(node, []).append((direction, item.start, item.end, item.further))
 
     start, end = place.copy(), place.copy()
     frame_of = np.full(n, -1, dtype=np.int64)

@@ -87,10 +87,10 @@ def test_a_drawing_in_this_process(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     row = fold_here(file, "a.svg", tmp_path / "out")
     assert (row.size, row.creases, row.way, row.why) == ((80.0, 60.0), 1, 1.0, "")
     assert row.angle == pytest.approx(144.0, abs=0.01)
-    file.write_text(SHEET.format('<path d="M0 30H80" stroke="#123456"/>'))
+    file.write_text(SHEET.format('<path d="M0 30H80" stroke="var(--ink)"/>'))
     row = fold_here(file, "a.svg", tmp_path / "out")
     assert not row.read
-    assert row.why.startswith("a.svg: line 2 (path) has the colour #123456")
+    assert row.why.startswith("a.svg: line 2 (path) has the colour")
     monkeypatch.setattr(drawings_folding, "fold_file", lambda *_, **__: 1 / 0)
     assert (
         fold_here(file, "a.svg", tmp_path).why == "fault of the program: ZeroDivisionError: division by zero"

@@ -243,7 +243,7 @@ def test_the_command_tells_the_error_of_any_run(
         ("[mesh]\nalong = 16", "no estimate: the panels have one row", False),
     ):
         Path("scene.toml").write_text(scene(mesh=mesh, formulation=CONSISTENT))
-        assert main(["run", "scene.toml", "-o", "out"]) == 0
+        assert main(["run", "scene.toml", "-o", "out", "--force"]) == 0
         told = capsys.readouterr().out.splitlines()[-2]
         assert told.startswith("accuracy: ")
         assert words in told

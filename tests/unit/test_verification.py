@@ -39,6 +39,10 @@ KEYS = {
 }
 SLOW = {
     "appendix_b",
+    "attack",  # half a minute to four; its parts have tests of their own, as those of the next three
+    "defaults",
+    "drawings",
+    "landing",
     "fig3_9",
     "fig3_8",
     "fig3_10",
