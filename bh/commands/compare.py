@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bh.commands.findings import check_picture, hand_out
 from bh.runtime.terminal import say
 
 if TYPE_CHECKING:
-    from bh.applications.comparison import Comparison, Stiff
+    from bh.applications.comparison import Stiff
 
 
 def compare(
@@ -37,11 +38,8 @@ def compare(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Solve a scene by every formulation on one mesh, and compare."""
-    import json
-
     from bh.applications import comparison
     from bh.scene.load import load_scene
-    from meshes.io.export import replacing
 
     check_picture(picture)
     loaded = load_scene(scene, changes or ())
@@ -54,17 +52,14 @@ def compare(
         stiffness=wanted,
         progress=not quiet,
     )
-    if not quiet:
-        for line in comparison.lines(found):
-            say(line)
-    if json_file is not None:
-        with replacing(json_file) as draft:
-            draft.write_text(json.dumps(found.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    if picture is not None:
-        _draw(found, picture)
-    for file in (json_file, picture):
-        if file is not None and not quiet:
-            say(f"wrote {file}")
+    hand_out(
+        comparison.lines(found),
+        found.as_dict(),
+        lambda: comparison.picture(found),
+        json_file,
+        picture,
+        quiet,
+    )
     missing = [member.formulation for member in found.members if not member.reached]
     if missing:
         say(f"bh: {scene}: not reached by {', '.join(missing)}", err=True)
@@ -80,27 +75,3 @@ def _stiffness(text: str) -> Stiff:
     if not place or axis not in AXES:
         raise InputError(f"--stiffness {text} is no place and axis; write it as corner:outer-end:z")
     return Stiff(place, AXES[axis])
-
-
-def check_picture(file: Path | None) -> None:
-    """See that the name of a picture is one of a kind that can be drawn.
-
-    Args:
-        file: its name, or None for no picture.
-
-    Raises:
-        InputError: it is none; one line.
-    """
-    from bh.errors import InputError
-
-    if file is not None and file.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise InputError(f"picture '{file}' is no .png, .svg or .pdf file; name it so")
-
-
-def _draw(found: Comparison, file: Path) -> None:
-    from bh.applications.comparison import picture
-    from meshes.io.export import replacing
-
-    figure = picture(found)
-    with replacing(file) as draft:
-        figure.savefig(draft, format=file.suffix.lower()[1:], dpi=150)

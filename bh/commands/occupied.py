@@ -48,7 +48,7 @@ def check_folder(folder: Path, scene: Scene) -> None:
         try:
             with contextlib.closing(PathFile.open(found)) as stored, reading(found):
                 data, arrays = stored.meta(), stored.arrays()
-                ends, states = stored.steps(), sum(1 for _ in stored.states())
+                ends, states = stored.steps(), any(True for _ in stored.states())
         except InputError:
             continue  # no path file: there is nothing to lose
         keys = differing_keys(data["model"], arrays, scene.model, chosen=scene.accuracy is not None)

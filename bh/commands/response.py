@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bh.commands.findings import check_picture, hand_out
 from bh.runtime.terminal import say
 from bh.scene.options import a_length
 
@@ -39,12 +40,8 @@ def response(  # noqa: PLR0913 - the options of a command line
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Solve a scene, move a place of it on, and show its force."""
-    import json
-
     from bh.applications import response as curve
-    from bh.commands.compare import check_picture
     from bh.scene.load import load_scene
-    from meshes.io.export import replacing
 
     check_picture(picture)
     direction = _direction(axis)
@@ -59,19 +56,7 @@ def response(  # noqa: PLR0913 - the options of a command line
         accuracy=loaded.accuracy,
         progress=not quiet,
     )
-    if not quiet:
-        for line in curve.lines(found):
-            say(line)
-    if json_file is not None:
-        with replacing(json_file) as draft:
-            draft.write_text(json.dumps(found.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    if picture is not None:
-        figure = curve.picture(found)
-        with replacing(picture) as draft:
-            figure.savefig(draft, format=picture.suffix.lower()[1:], dpi=150)
-    for file in (json_file, picture):
-        if file is not None and not quiet:
-            say(f"wrote {file}")
+    hand_out(curve.lines(found), found.as_dict(), lambda: curve.picture(found), json_file, picture, quiet)
     if not found.reached:
         say(f"bh: {scene}: the curve ended early: {found.outcome} ({found.reason})", err=True)
         raise typer.Exit(1)

@@ -107,16 +107,40 @@ def resolve(
     """
     supports, prescribed = list(supports), list(prescribed)
     here = lying.supports if lying is not None else ()
-    n = len(mesh.points)
-    fixed, place = np.zeros((n, 3), dtype=bool), np.zeros((n, 3))
-    oblique: dict[int, list[_Row]] = {}
     rigid_body = not (supports or prescribed or here)
     rigid_body |= any(isinstance(each, RigidBody) for each in (*supports, *here))
-    unknown = lying is not None and lying.points is None
-    moved = np.full((n, 3), np.nan) if unknown else np.zeros((n, 3))
-    if lying is not None and lying.points is not None:
-        moved = lying.points - mesh.points
-    for group, at in ((here, moved), (supports, np.zeros((n, 3)))):  # flat places are the last word
+    moved = np.zeros_like(mesh.points)
+    if lying is not None:
+        moved = np.full_like(moved, np.nan) if lying.points is None else lying.points - mesh.points
+    # flat places are the last word
+    fixed, place, oblique = _gathered(mesh, ((here, moved), (supports, np.zeros_like(moved))), prescribed)
+    start, end, frame_of, frames = _local_axes(fixed, place, oblique)
+    edges, as_it_lies = _clamps(mesh, supports, here)
+    constraints = Constraints(
+        fixed, start, end, frame_of, frames, rigid_body and not in_contact, edges, as_it_lies
+    )
+    if not in_contact:
+        _check_rigid_motions(mesh, constraints, lying)
+    return constraints
+
+
+def _gathered(
+    mesh: SheetMesh, held: Iterable[tuple[Iterable[Constraint], Array]], prescribed: Iterable[Prescribed]
+) -> tuple[NDArray[np.bool_], Array, dict[int, list[_Row]]]:
+    """What is held and prescribed, along x, y, z and along other directions.
+
+    Args:
+        mesh: of the sheet.
+        held: supports, and where (n, 3) they hold the nodes, mm from the stress-free place; later ones prevail.
+        prescribed: displacements.
+
+    Returns:
+        (n, 3) True where a component is held, (n, 3) where; rows of other directions by node, supports first, so that
+        a displacement that begins where it is does not make theirs unknown.
+    """
+    fixed, place = np.zeros(mesh.points.shape, dtype=bool), np.zeros(mesh.points.shape)
+    oblique: dict[int, list[_Row]] = {}
+    for group, at in held:
         for nodes, direction in (pair for each in group for pair in each.fixed(mesh)):
             if np.abs(direction).max() == 1.0:
                 axis = int(np.abs(direction).argmax())
@@ -129,9 +153,19 @@ def resolve(
         for node in item.nodes.tolist():
             direction = np.asarray(item.direction, dtype=float)
             oblique.setdefault(node, []).append((direction, item.start, item.end, item.further))
+    return fixed, place, oblique
 
+
+def _local_axes(
+    fixed: NDArray[np.bool_], place: Array, oblique: dict[int, list[_Row]]
+) -> tuple[Array, Array, Ints, Array]:
+    """Axes of their own for nodes that are held along other directions than x, y, z; `fixed` (n, 3) follows.
+
+    Returns:
+        `start`, `end`, `frame_of` and `frames` of `Constraints`.
+    """
     start, end = place.copy(), place.copy()
-    frame_of = np.full(n, -1, dtype=np.int64)
+    frame_of = np.full(len(place), -1, dtype=np.int64)
     frames: list[Array] = []
     for node, extra in oblique.items():
         aligned_rows = np.flatnonzero(fixed[node])
@@ -150,14 +184,7 @@ def resolve(
             start[node, : len(axes)], end[node, : len(axes)] = values.T
             frame_of[node] = len(frames)
             frames.append(_complete(axes))
-    stacked = np.array(frames).reshape(-1, 3, 3)
-    edges, as_it_lies = _clamps(mesh, supports, here)
-    constraints = Constraints(
-        fixed, start, end, frame_of, stacked, rigid_body and not in_contact, edges, as_it_lies
-    )
-    if not in_contact:
-        _check_rigid_motions(mesh, constraints, lying)
-    return constraints
+    return start, end, frame_of, np.array(frames).reshape(-1, 3, 3)
 
 
 def _clamps(

@@ -196,9 +196,10 @@ class Path:
     def _hidden(self) -> list[str]:
         """A line where the last state hardly moved, and rounding of the coordinates is as large as its forces."""
         last, mesh = self.records[-1], self.model.mesh
+        if float(np.abs(self[-1].points - mesh.points).max()) > TINY * mesh.size:
+            return []
         system = self.system(last.step)
-        moved = float(np.abs(self[-1].points - mesh.points).max())
-        if not isinstance(system, Rounded) or moved > TINY * mesh.size:
+        if not isinstance(system, Rounded):
             return []
         part = system.rounding(last.q, last.lam)
         if part < HIDDEN:

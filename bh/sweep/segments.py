@@ -74,6 +74,11 @@ def points(domain: Domain | None = None, step_k0: float = 5e-4, step_length: flo
     return table({"k0": np.round(k0, 12).tolist(), "length": np.round(length, 9).tolist()})
 
 
+def _about(title: str, version: int, setting: Setting) -> dict[str, str | int]:
+    """Attributes of a data set, by which it is read back."""
+    return {"title": title, "format": version, "setting": json.dumps(asdict(setting))}
+
+
 def build(
     file: str | Path,
     setting: Setting = SETTING,
@@ -94,11 +99,6 @@ def build(
     Raises:
         SweepError: see `bh.sweep.run`.
     """
-    about = {
-        "title": "Pinched segments of a folded crease",
-        "format": FORMAT,
-        "setting": json.dumps(asdict(setting)),
-    }
     return run(
         SegmentTask(setting),
         points(),
@@ -107,7 +107,7 @@ def build(
         resume=resume,
         progress=progress,
         labels=LABELS,
-        attributes=about,
+        attributes=_about("Pinched segments of a folded crease", FORMAT, setting),
     )
 
 
@@ -131,11 +131,6 @@ def build_pieces(
     Raises:
         SweepError: see `bh.sweep.run`.
     """
-    about = {
-        "title": "Pieces of folded strips: arcs, free ends, pinches and joints",
-        "format": PIECES,
-        "setting": json.dumps(asdict(setting)),
-    }
     return run(
         PieceTask(setting),
         table(piece_table()),
@@ -144,7 +139,7 @@ def build_pieces(
         resume=resume,
         progress=progress,
         labels=PIECE_LABELS,
-        attributes=about,
+        attributes=_about("Pieces of folded strips: arcs, free ends, pinches and joints", PIECES, setting),
     )
 
 

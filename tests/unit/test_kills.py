@@ -22,6 +22,7 @@ from bh.runtime.lock import only_writer
 from bh.sweep.pools import reach
 from verification.framework import run as runner
 from verification.framework.checks import CaseResult
+from verification.studies.solver.attack.programs import members
 
 ROOT = Path(__file__).resolve().parents[2]
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
@@ -53,20 +54,6 @@ if __name__ == "__main__":
         futures = [pool.submit(sleep, sys.argv[1], n) for n in range(2)]
         futures[0].result()
 """
-
-
-def members(session: int) -> list[int]:
-    """Processes of a session that have not ended."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                state, _, _, of = (entry / "stat").read_text().rsplit(")", 1)[1].split()[:4]
-            except OSError:
-                continue
-            if int(of) == session and state != "Z":
-                found.append(int(entry.name))
-    return found
 
 
 def until(done: Callable[[], bool], seconds: float) -> bool:

@@ -104,6 +104,18 @@ def test_prescribed_along_an_axis(by: float, direction: tuple[float, float, floa
     assert found.end[2, 2] == by * direction[2]
 
 
+def test_a_displacement_that_begins_where_it_is_leaves_an_oblique_support_known() -> None:
+    across, along = (-0.6, 0.0, 0.8), (0.8, 0.0, 0.6)
+    found = resolve(
+        SMALL, [Support([2], [across]), RigidBody()], [Prescribed(np.array([2]), along, math.nan, 0.5)]
+    )
+    axes = found.frames[found.frame_of[2]]
+    support, moved = (int(np.argmax(np.abs(axes @ np.array(d)))) for d in (across, along))
+    assert (found.start[2, support], found.end[2, support]) == (0.0, 0.0)
+    assert math.isnan(found.start[2, moved])
+    assert abs(found.end[2, moved]) == pytest.approx(0.5)
+
+
 def test_oblique_frames_are_orthonormal_and_carry_the_displacement() -> None:
     u = np.array([0.6, 0.0, 0.8])
     found = resolve(
