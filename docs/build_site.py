@@ -53,11 +53,16 @@ def main() -> int:
     parser.add_argument(
         "--no-gallery", action="store_true", help="leave the gallery out; its examples take a minute"
     )
+    parser.add_argument(
+        "--no-reference",
+        action="store_true",
+        help="leave the reference and the listings of source out; they take a minute",
+    )
     options = parser.parse_args()
-    return build(options.folder, gallery=not options.no_gallery)
+    return build(options.folder, gallery=not options.no_gallery, reference=not options.no_reference)
 
 
-def build(folder: Path, gallery: bool = True) -> int:
+def build(folder: Path, gallery: bool = True, reference: bool = True) -> int:
     """Write the site to `folder`/html; returns sphinx's exit code."""
     source = folder / "source"
     for old in (source, folder / "html"):
@@ -70,16 +75,17 @@ def build(folder: Path, gallery: bool = True) -> int:
     for name in ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "SECURITY.md"):
         shutil.copyfile(ROOT / name, source / name)
     shutil.copyfile(ROOT / "docs" / "conf.py", source / "conf.py")
-    write_reference(source / "reference")
+    if reference:
+        write_reference(source / "reference")
     if gallery:
         write_gallery(source / "gallery")
     (source / "viewer").mkdir(exist_ok=True)
-    write_index(source, gallery)
+    write_index(source, gallery, reference)
     command = [sys.executable, "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "-b", "html", str(source)]
     return subprocess.run([*command, str(folder / "html")], check=False, cwd=ROOT).returncode
 
 
-def write_index(source: Path, gallery: bool) -> None:
+def write_index(source: Path, gallery: bool, reference: bool) -> None:
     """The README, and what leads on from it."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     text = text.replace("](examples/)", "](gallery/index.md)" if gallery else "](examples/README.md)")
@@ -90,7 +96,8 @@ def write_index(source: Path, gallery: bool) -> None:
     trees["Use"].insert(1, "gallery/index" if gallery else "examples/README")
     trees["Use"] += [*(["examples/README"] if gallery else []), "examples/own_project/README"]
     trees["Project"] = ["CONTRIBUTING", *trees["Project"], "SECURITY", "CHANGELOG"]
-    trees["Reference"] = ["reference/index"]
+    if reference:
+        trees["Reference"] = ["reference/index"]
     for caption, pages in trees.items():
         lines = "\n".join(pages)
         text += f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{lines}\n```\n"

@@ -118,12 +118,11 @@ def test_every_example_is_in_the_readme_of_the_examples() -> None:
         assert f"`{file.name}`" in text
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(folder: Path, *options: str) -> Path:
+    """The pages of the site, built by its own command."""
     pytest.importorskip("sphinx", reason="sphinx is not installed")
-    folder = tmp_path_factory.mktemp("docs")
     done = subprocess.run(
-        [sys.executable, str(ROOT / "docs" / "build_site.py"), str(folder)],
+        [sys.executable, str(ROOT / "docs" / "build_site.py"), str(folder), *options],
         capture_output=True,
         text=True,
         check=False,
@@ -133,8 +132,14 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "html"
 
 
-@needs_opengl
-def test_pages_link_to_each_other_and_load_nothing_from_elsewhere(site: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pages and the gallery; the reference, which takes longer than both, is in `test_the_whole_site`."""
+    return built(tmp_path_factory.mktemp("docs"), "--no-reference")
+
+
+def links_lead_somewhere(site: Path) -> None:
+    """Every link of every page, and every name in a page that a link leads to; nothing comes from elsewhere."""
     files = {file: Page(file.read_text(encoding="utf-8")) for file in site.rglob("*.html")}
     shown = {file: page for file, page in files.items() if "_downloads" not in file.parts}
     assert len(shown) > 30
@@ -153,8 +158,21 @@ def test_pages_link_to_each_other_and_load_nothing_from_elsewhere(site: Path) ->
                 # listings of source link back to the page, at times with the name that another page gives it
                 if anchor and there in ids and tag == "a" and "_modules" not in file.parts:
                     assert anchor in ids[there], f"{file.name}: {link}"
+
+
+@needs_opengl
+def test_pages_link_to_each_other_and_load_nothing_from_elsewhere(site: Path) -> None:
+    links_lead_somewhere(site)
     gallery = {file.stem for file in (site / "gallery").glob("*.html")}
     assert gallery == {"index", *(file.stem for file in (*SCENES, *SCRIPTS))}
+
+
+@pytest.mark.slow
+def test_the_whole_site(tmp_path: Path) -> None:
+    """With the reference, whose docstrings give no warning, and the listings of source."""
+    site = built(tmp_path, "--no-gallery")
+    links_lead_somewhere(site)
+    assert len(list((site / "reference").glob("*.html"))) > 50
 
 
 @needs_opengl

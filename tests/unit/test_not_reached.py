@@ -48,6 +48,14 @@ def early() -> bh.Model:
     return model.crease("crease", stiffness=0.1).fold("crease", rest=3.0).moment("crease", to=5.0)
 
 
+@pytest.fixture(scope="module")
+def early_path() -> bh.Path:
+    """Without a word, as asked."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return bh.trace(early(), warn=False)
+
+
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -65,14 +73,10 @@ def test_an_early_end_warns_raises_and_shows() -> None:
     assert path[-1] is path[-1]
     with pytest.raises(bh.NotReachedError, match="the path ended early, limit-point"):
         path.require()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        bh.trace(early(), warn=False)
 
 
-def test_an_early_end_is_still_told_when_it_is_loaded(tmp_path: Path) -> None:
-    path = bh.trace(early(), warn=False)
-    path.save(tmp_path / "x.bh")
+def test_an_early_end_is_still_told_when_it_is_loaded(early_path: bh.Path, tmp_path: Path) -> None:
+    early_path.save(tmp_path / "x.bh")
     assert "ENDED EARLY: limit-point" in repr(bh.Path.load(tmp_path / "x.bh")[-1])
 
 

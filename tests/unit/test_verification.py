@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,15 @@ SLOW = {
     "three_point",
     "appendix_b_shell",  # test_shell_convergence.py has the same figures
     "shell_benchmarks",  # the same
+    "appendix_b_cross",
+    "appendix_b_fields",
+    "fig3_11",
+    "forward",
+    "honesty",
+    "problem_c",
+    "sheets_3",
+    "speed_error",
+    "top_down",
 }  # over some five seconds on a slow machine; `bh verify` runs them all
 
 
@@ -456,6 +466,13 @@ def test_strips_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp
 # --------------------------------------------------------------------------------------- long cases
 
 
+@pytest.fixture
+def played_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes of the campaign are played in this process: its workers have tests of their own, and start slowly."""
+    monkeypatch.setattr(campaign, "Workers", lambda _: ThreadPoolExecutor(1))
+
+
+@pytest.mark.usefixtures("played_here")
 def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Results that are stored are not played again; a half-written line and those of other versions are."""
     monkeypatch.setattr(campaign, "environment", lambda: {"python": "x"})
@@ -478,6 +495,7 @@ def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytes
     assert [r.iterations for r in anew] == [r.iterations for r in whole]
 
 
+@pytest.mark.usefixtures("played_here")
 def test_long_cases_come_from_the_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run without them shows the kept run, with its own date; a run of them replaces it."""
     few = campaign.scenes(2)
