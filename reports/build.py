@@ -18,8 +18,10 @@ from reports.changes import MOST, changes
 from reports.claims import Claim, claims, claims_csv
 from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
 from reports.records import Case, CaseInfo, Frames, Results, known_cases, read, schema, shortfall, validated
+from reports.verdicts import counted, groups, tally, verdicts_csv
 from verification.framework.chapters import CHAPTERS, OTHER, Chapter, chapter_of
 from verification.framework.folder import refuse_links
+from verification.framework.source_claims import Verdict
 
 SOURCE = (
     "Equation numbers, “the source” and “App. B” refer to the dissertation “How Curved Creases Enhance the "
@@ -118,6 +120,7 @@ class Site:
         self.results = read(folder / "checks.json")
         self.cases = _cases(self.results, folder)
         self.changes = changes(folder, self.results)
+        self.verdicts = groups(self.results.checks)
         ran = [case.name for case in self.cases]
         self.missing = [name for name in known_cases() if name not in ran]
         self.pages = [self._page(chapter) for chapter in (*CHAPTERS, OTHER)]
@@ -152,8 +155,12 @@ class Site:
                 seeds=_seeds(every),
                 machine=_machine(self.results.machine),
                 style=(TEMPLATES / "style.css").read_text(encoding="utf-8") + interactive.style(),
-                judged=sum(case.judged for case in every),
                 reported=sum(case.count(None) for case in every),
+                verdicts=self.verdicts,
+                counted=counted(self.verdicts),
+                unrun=sum(len(group.rows) for group in self.verdicts if group.verdict is Verdict.UNRUN),
+                verdicts_csv=verdicts_csv(self.verdicts),
+                tally=tally(self.results.checks),
                 failed=failed,
                 most_failures=MOST_FAILURES,
                 most_moves=MOST,

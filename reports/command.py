@@ -37,6 +37,7 @@ def report(
     """
     from reports.build import build
     from reports.records import read, shortfall
+    from reports.verdicts import told
 
     page = results / "report.html" if out is None else out
     if not reuse:
@@ -57,6 +58,7 @@ def report(
         f"{sum(judged)} of {len(judged)} checks passed, {len(found.checks) - len(judged)} reported"
         + (f" ({less})" if less else "")
     )
+    say(f"claims of the source: {told(found.checks)}")
     say(f"report: {written}")
     if printed is not None:
         say(f"PDF: {printed}")

@@ -263,7 +263,7 @@ def test_pictures_and_plots_say_what_they_show(page: Page) -> None:
 
 def test_tables_have_captions_and_headers(page: Page) -> None:
     tables = len(page.all("table"))
-    assert tables == 5
+    assert tables == 6
     assert len(page.all("caption")) == tables
     assert all(header.get("scope") for header in page.all("th"))
 
@@ -289,7 +289,9 @@ def test_failed_records_are_shown_as_failed(html: str, page: Page) -> None:
 def test_a_clean_run_says_so(tmp_path: Path) -> None:
     results(tmp_path, failing=0)
     page = Page(one_page(tmp_path))
-    assert "No check failed: 17 of 17 are within their tolerances." in page.text
+    assert "17 of 17 checks against closed forms, published values and the shell" in page.text
+    assert "0 of 0 checks against the program itself" in page.text
+    assert "failed." not in page.text
     assert "✗" not in page.text
     assert "What differs, and why" in page.text
 
@@ -322,7 +324,7 @@ def test_unreached_states_name_their_outcome(tmp_path: Path) -> None:
 
 def test_data_behind_plots_can_be_had(page: Page) -> None:
     links = {a["download"]: a["href"] for a in page.all("a") if a.get("download")}
-    assert set(links) == {"strips-bending.csv", "strips.csv", "cone.csv", "derivatives.csv"}
+    assert set(links) == {"strips-bending.csv", "strips.csv", "cone.csv", "derivatives.csv", "verdicts.csv"}
     lines = base64.b64decode(str(links["strips-bending.csv"]).split(",")[1]).decode().splitlines()
     assert lines[0] == "series,aspect ratio alpha = H / W,U_BH / U_Th"
     assert len(lines) == 1 + 25

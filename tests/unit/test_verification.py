@@ -18,7 +18,9 @@ from verification.framework import command, environment
 from verification.framework import run as runner
 from verification.framework.cases import ALL_CASES, CASES, LONG_CASES, case
 from verification.framework.checks import CaseResult, Check, Context, line, plot
+from verification.framework.records import Record
 from verification.framework.run import run, write_json
+from verification.framework.source_claims import unclaimed, unheard
 from verification.studies.solver import campaign
 
 # the keys of a stored record
@@ -228,6 +230,11 @@ def test_case_in_quick_mode(name: str, tmp_path: Path) -> None:
         assert record["value"] is not None or record["outcome"] not in (None, "reached")
         assert (record["error"] is None) == (record["reference"] is None)
         assert record["passed"] is not False, record
+    records = [Record(**record) for record in stored["checks"]]
+    assert (
+        unclaimed(records) == []
+    )  # verification/claims.toml has a claim for each quantity that the source prints
+    assert unheard(records) == []
     (summary,) = stored["cases"]
     assert summary["name"] == name
     assert summary["verdict"] == "holds"
