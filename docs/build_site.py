@@ -74,6 +74,10 @@ def build(folder: Path, gallery: bool = True, reference: bool = True) -> int:
         page.write_text(text.replace("](../examples/)", "](../examples/README.md)"), encoding="utf-8")
     for name in ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "SECURITY.md"):
         shutil.copyfile(ROOT / name, source / name)
+    shutil.copytree(
+        ROOT / "verification" / "records", source / "verification" / "records"
+    )  # figures lead to them
+    shutil.copyfile(ROOT / "verification" / "claims.toml", source / "verification" / "claims.toml")
     shutil.copyfile(ROOT / "docs" / "conf.py", source / "conf.py")
     if reference:
         write_reference(source / "reference")

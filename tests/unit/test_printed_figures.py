@@ -1,0 +1,69 @@
+"""Numbers that README and docs print are what the kept records say, and lead to them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from verification.framework.printed import Printed, printed
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+FIGURES = [figure for page in PAGES for figure in printed(page)]
+FEWEST = 14  # figures that lead to records; more may be linked, none may be lost
+
+
+def test_every_printed_figure_is_what_its_record_says() -> None:
+    wrong = [problem for figure in FIGURES if (problem := figure.wrong())]
+    assert not wrong, "\n".join(wrong)
+    assert len(FIGURES) >= FEWEST
+
+
+def check(quantity: str, value: float | None, **params: Any) -> dict[str, Any]:
+    return {"quantity": quantity, "value": value, "error": 0.5, "params": params}
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Path:
+    folder = tmp_path / "verification" / "records"
+    folder.mkdir(parents=True)
+    checks = [check("size", 0.08833, a=1), check("size", 12345.6, a=2), check("none", None)]
+    (folder / "c.json").write_text(json.dumps({"checks": checks}))
+    (tmp_path / "docs").mkdir()
+    return tmp_path / "docs" / "page.md"
+
+
+@pytest.mark.parametrize(
+    ("words", "title", "problem"),
+    [
+        ("0.088 mm", "size | a=1", ""),
+        ("0.09", "size | a=1", ""),
+        ("8.83 %", "size | a=1 | times 100", ""),
+        ("12,346", "size | a=2", ""),
+        ("1.2e4 mm", "size | largest", ""),
+        ("2", "size | number", ""),
+        ("0.5", "size | a=1 | read error", ""),
+        ("a = 2", "size | a=2 | read params.a", ""),
+        ("0.089 mm", "size | a=1", "the record says 0.08833"),
+        ("0.09", "size", "2 records"),
+        ("0.09", "size | a=3", "no records"),
+        ("0.09", "length", "no records"),
+        ("0.09", "size | a=1 | twice", "'twice' says neither"),
+        ("0.09", "none", "is no number"),
+        ("small", "size | a=1", "has no number"),
+    ],
+)
+def test_a_figure_has_to_be_the_records(page: Path, words: str, title: str, problem: str) -> None:
+    page.write_text(f'First.\n\nIt is [{words}](../verification/records/c.json "{title}").\n')
+    (figure,) = printed(page)
+    assert figure.line == 3
+    found = figure.wrong()
+    assert (problem in found) if problem else found == ""
+
+
+def test_a_file_that_is_not_there_is_told(page: Path) -> None:
+    found = Printed(page, 1, "1", "../verification/records/d.json", "size").wrong()
+    assert "no records in '../verification/records/d.json'" in found
