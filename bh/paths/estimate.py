@@ -27,8 +27,9 @@ class Trial:
         triangles, unknowns, iterations, wall_time_s: what it took.
         outcome: of the path.
         value: of the goal: (k,), nan if not reached.
-        snapped: the path jumped to another branch, or ended where it is not stable.
-        doubtful: it snapped where a finer mesh does not; its value does not enter the estimate.
+        snaps: numbers of the steps, from 1, in which the path passed a limit point, jumped to another branch, or
+            ended where it is not stable.
+        doubtful: it snapped in a step where the next mesh does not; its value does not enter the estimate.
     """
 
     formulation: str
@@ -40,7 +41,7 @@ class Trial:
     wall_time_s: float
     outcome: Outcome
     value: Array
-    snapped: bool = False
+    snaps: tuple[int, ...] = ()
     doubtful: bool = False
 
 
@@ -102,7 +103,12 @@ class Accuracy:
             "wall_time_s": self.wall_time_s,
             "notes": list(self.notes),
             "trials": [
-                {**asdict(t), "level": t.level if math.isfinite(t.level) else None, "value": _plain(t.value)}
+                {
+                    **asdict(t),
+                    "level": t.level if math.isfinite(t.level) else None,
+                    "value": _plain(t.value),
+                    "snaps": list(t.snaps),
+                }
                 for t in self.trials
             ],
         }
@@ -138,8 +144,10 @@ def _trial(data: Mapping[str, Any]) -> Trial:
         "level": math.nan if level is None else level,
         "value": np.array([math.nan] if value is None else value),
         "outcome": Outcome(data["outcome"]),
+        "snaps": tuple(data.get("snaps", ())),
     }
-    return Trial(**{**data, **told})
+    older = {"snapped"}  # once whether, not where
+    return Trial(**{**{key: data[key] for key in data if key not in older}, **told})
 
 
 def _plain(value: Array) -> list[float] | None:

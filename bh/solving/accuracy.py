@@ -8,14 +8,14 @@ two values v1, v2 and the order p that the last three show, but not more than `O
 
 where |v2 - v1| counts as at least what second order leaves of the difference before it: values that go up and then
 down are close to each other once without being close to their limit. Where they turn back, or the differences do not
-fall, p is `ORDERS[0]`. A coarse mesh that snaps to another branch where the next one does not is left out.
+fall, p is `ORDERS[0]`. Meshes that snap to another branch in other steps than the last one does are left out.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -33,7 +33,7 @@ from bh.model.refinement import Goal, Refinement, pattern_of, with_mesh
 from bh.paths.estimate import Accuracy, Trial
 from bh.paths.path import Path
 from bh.runtime.progress import ProgressMeter, meter, stage
-from bh.solvers.outcome import Outcome
+from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.walk import Strategy
 from bh.solving.follow import follow
 from bh.solving.levels import Levels
@@ -162,7 +162,7 @@ class _Task:
             spent,
             path.outcome,
             value,
-            snapped(path),
+            snaps(path),
         )
 
 
@@ -194,16 +194,40 @@ def _notes(race: Race, ladders: dict[str, Ladder], trials: Sequence[Trial], why:
         for t in trials
         if t.doubtful
     ]
+    if len(trials) > 1 and (alone := set(trials[-1].snaps) - set(trials[-2].snaps)):
+        notes.append(
+            f"doubtful: {trials[-1].formulation}, {trials[-1].mesh}: it snaps to another branch in "
+            f"{steps_in_words(alone)}, which the mesh before does not, and no finer one was solved"
+        )
     return notes + [f"ended: {text}" for text in dict.fromkeys([*race.out.values(), *([why] if why else [])])]
 
 
-def snapped(path: Path) -> bool:
-    """Whether a path jumped to another branch on its way, or ends where it is not stable."""
-    return any(record.jumped for record in path.records) or path.stable is False
+def snaps(path: Path) -> tuple[int, ...]:
+    """In which steps a path passes a limit point or jumps to another branch, or ends where it is not stable.
+
+    A mesh that repeats the snap of another one does so in the same step; that both snap somewhere says nothing.
+
+    Returns:
+        their numbers, from 1, in order.
+    """
+    found = {
+        record.step
+        for record in path.records
+        if record.jumped or any(passed.kind is Critical.LIMIT for passed in record.critical)
+    }
+    if path.stable is False:
+        found.add(path.records[-1].step)
+    return tuple(step + 1 for step in sorted(found))
+
+
+def steps_in_words(steps: Iterable[int]) -> str:
+    """What stands in a remark: "step 2", or "steps 1 and 3"."""
+    *before, last = sorted(steps)
+    return f"steps {', '.join(map(str, before))} and {last}" if before else f"step {last}"
 
 
 def mark_doubtful(trials: Sequence[Trial]) -> list[Trial]:
-    """The trials, marked where one snapped and the next mesh of its formulation, which was reached, did not.
+    """The trials, marked where one snapped in a step in which the next of its formulation, which was reached, did not.
 
     Returns:
         the trials in order.
@@ -212,14 +236,16 @@ def mark_doubtful(trials: Sequence[Trial]) -> list[Trial]:
     for k, trial in enumerate(found):
         after = next((t for t in found[k + 1 :] if t.formulation == trial.formulation), None)
         doubtful = (
-            trial.snapped and after is not None and after.outcome is Outcome.REACHED and not after.snapped
+            after is not None
+            and after.outcome is Outcome.REACHED
+            and not set(trial.snaps) <= set(after.snaps)
         )
         found[k] = replace(trial, doubtful=doubtful)
     return found
 
 
 def trusted(trials: Sequence[Trial], name: str) -> list[Array]:
-    """Values of a formulation that an estimate may be made of, coarse to fine.
+    """Values of a formulation that an estimate may be made of, coarse to fine: those that snap in the same steps.
 
     Args:
         trials: coarse to fine.
@@ -228,7 +254,8 @@ def trusted(trials: Sequence[Trial], name: str) -> list[Array]:
     Returns:
         one vector a trial.
     """
-    return [t.value for t in trials if t.formulation == name and not t.doubtful]
+    own = [trial for trial in trials if trial.formulation == name]
+    return [trial.value for trial in own if not trial.doubtful and trial.snaps == own[-1].snaps]
 
 
 def estimate(values: Sequence[Array], nothing: float = 0.0) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from bh.paths.estimate import Accuracy, Trial
 from bh.paths.path import Path
 from bh.runtime.progress import ProgressMeter, meter, stage
 from bh.solvers.walk import Strategy
-from bh.solving.accuracy import ORDERS, nothing, reading, snapped
+from bh.solving.accuracy import ORDERS, nothing, reading, snaps, steps_in_words
 from bh.solving.follow import follow
 from meshes.cells import Cells
 from meshes.choices import cut
@@ -70,13 +70,25 @@ def add_estimate(
         return
     if not other.reached:
         path.estimate_reason = f"the path on a coarser mesh to compare with ended early ({other.outcome})"
-    elif snapped(other) != snapped(path):
-        which = (
-            "this mesh and not on a coarser one" if snapped(path) else "a coarser mesh and not on this one"
-        )
-        path.estimate_reason = f"doubtful: the sheet snaps to another branch on {which}; use a finer mesh"
+    elif why := _not_repeated(set(snaps(path)), set(snaps(other))):
+        path.estimate_reason = why
     else:
         path.accuracy = _compared(other, coarse, path, cells, time.perf_counter() - began)
+
+
+def _not_repeated(here: set[int], coarse: set[int]) -> str:
+    """What is doubtful where two meshes snap in different steps (numbers from 1); empty if they do not."""
+    found = [
+        f"in {steps_in_words(steps)} on {which}"
+        for steps, which in (
+            (here - coarse, "this mesh and not on a coarser one"),
+            (coarse - here, "a coarser mesh and not on this one"),
+        )
+        if steps
+    ]
+    if not found:
+        return ""
+    return f"doubtful: the sheet snaps to another branch {', and '.join(found)}; use a finer mesh"
 
 
 def _why_not(path: Path) -> str:
@@ -136,5 +148,5 @@ def _trial(path: Path, cells: Cells) -> Trial:
         path.wall_time_s,
         path.outcome,
         reading(path, ENERGY),
-        snapped(path),
+        snaps(path),
     )
