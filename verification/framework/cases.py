@@ -68,6 +68,7 @@ STUDIES = (
     Study("shell_benchmarks", "solver"),
     Study("tables4", "4"),
     Study("speed_error", "solver", long=True),
+    Study("map", "solver", long=True),
     Study("defaults", "solver", long=True),
     Study("honesty", "solver", long=True),
     Study("campaign", "solver", long=True),
