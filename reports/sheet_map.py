@@ -51,6 +51,8 @@ def sheet_map(cases: Iterable[Case]) -> SheetMap | None:
     quantities: dict[str, None] = {}
     for number, check in case.checks:
         kind, model = str(check.params.get("kind", "")), str(check.params.get("model", ""))
+        if not model:
+            continue  # a judgement of a kind, in the chapter
         row = kinds.setdefault(kind, {}).setdefault(model, Row(kind, model))
         if check.quantity == NO_FIGURES:
             row.why, row.without = str(check.params.get("why", "")), int(check.value or 0)

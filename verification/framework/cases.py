@@ -66,6 +66,7 @@ STUDIES = (
     Study("appendix_b_fields", "B", part_of="appendix_b"),
     Study("appendix_b_sheets", "B", part_of="appendix_b"),
     Study("shell_benchmarks", "solver"),
+    Study("published", "solver"),
     Study("tables4", "4"),
     Study("speed_error", "solver", long=True),
     Study("map", "solver", long=True),
