@@ -16,8 +16,9 @@ from meshes.io.export import replacing
 from reports import formatting
 from reports.changes import MOST, changes
 from reports.claims import Claim, claims, claims_csv
-from reports.figures import ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
+from reports.figures import Plot, ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
 from reports.records import Case, CaseInfo, Frames, Results, known_cases, read, schema, shortfall, validated
+from reports.sheet_map import CASE, sheet_map
 from reports.verdicts import counted, groups, tally, verdicts_csv
 from verification.framework.chapters import CHAPTERS, OTHER, Chapter, chapter_of
 from verification.framework.folder import refuse_links
@@ -164,6 +165,8 @@ class Site:
                 failed=failed,
                 most_failures=MOST_FAILURES,
                 most_moves=MOST,
+                sheets=sheet_map(every),
+                map_plots=_shown_twice(every, CASE, lambda _plot: True),
                 pareto=_pareto(every),
                 claims_csv=claims_csv(claim for shown in self.pages for claim in shown.claims),
                 odd=[item for case in every for item in case.checks if item[1].passed and item[1].use > 1.0],
@@ -250,16 +253,19 @@ def _seeds(cases: Sequence[Case]) -> str:
     return ", ".join(few) or "none"
 
 
-def _pareto(cases: Iterable[Case]) -> tuple[Case, list[dict[str, Any]]] | None:
+def _pareto(cases: Sequence[Case]) -> tuple[Case, list[dict[str, Any]]] | None:
     """Plots of error against time of the case `speed_error`, if it has been run: those of the energy, if it has any."""
-    for case in cases:
-        if case.name != "speed_error":
-            continue
-        against_time = [item for item in case.plots if item["plot"].id.endswith("-time")]
-        energies = [item for item in against_time if "energy" in item["plot"].id]
-        shown = (energies or against_time or case.plots)[:MOST_PARETO]
-        return (case, [_renamed(item, "front-") for item in shown]) if shown else None
-    return None
+    case = next((case for case in cases if case.name == "speed_error"), None)
+    shown = _shown_twice(cases, "speed_error", lambda plot: plot.id.endswith("-time"))
+    energies = [item for item in shown if "energy" in item["plot"].id]
+    found = energies or shown or _shown_twice(cases, "speed_error", lambda _plot: True)
+    return (case, found[:MOST_PARETO]) if case is not None and found else None
+
+
+def _shown_twice(cases: Iterable[Case], name: str, wanted: Callable[[Plot], bool]) -> list[dict[str, Any]]:
+    """Plots of a case that the front page shows too, with ids of their own."""
+    items = [item for case in cases if case.name == name for item in case.plots if wanted(item["plot"])]
+    return [_renamed(item, "front-") for item in items]
 
 
 def _renamed(item: dict[str, Any], prefix: str) -> dict[str, Any]:

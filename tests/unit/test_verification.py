@@ -46,6 +46,8 @@ SLOW = {
     "defaults",
     "drawings",
     "landing",
+    "map",
+    "published",
     "fig3_9",
     "fig3_8",
     "fig3_10",

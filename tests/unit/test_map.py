@@ -1,0 +1,91 @@
+"""The map of kinds of sheets: sheets are drawn the same again, cells say what they are of, empty ones why."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from reports.records import Case, CaseInfo, Check
+from reports.sheet_map import sheet_map
+from verification.framework.checks import CaseResult
+from verification.studies.solver import map as case
+from verification.studies.solver.map import MEMBERS, QUANTITIES, OutOfTime, within_time
+from verification.studies.solver.map_sheets import KINDS, UNMEASURED, sample
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_sheets_are_drawn_the_same_again_and_have_meshes(kind: str) -> None:
+    one, again, other = sample(kind, 0), sample(kind, 0), sample(kind, 1)
+    assert one.words == again.words
+    assert np.array_equal(one.model.mesh.points, again.model.mesh.points)
+    assert one.words != other.words
+    sizes = [len(next(iter(member.meshes(one))).triangles) for member in MEMBERS]
+    assert sizes == sorted(set(sizes))
+
+
+def found(value: float, **why: Any) -> dict[str, Any]:
+    errors = dict.fromkeys(QUANTITIES, float("nan")) | {"energy": value, "shape": 0.1 * value}
+    models = {
+        member.name: {"errors": dict(errors), "time_s": 0.1, "unknowns": 100, "why": ""} for member in MEMBERS
+    }
+    return {"words": "a sheet", "bars": dict(errors) | {"energy": 0.01}, "models": models} | why
+
+
+def mapped(*sheets: dict[str, Any]) -> CaseResult:
+    result = CaseResult("map", "t", "q", "the shell")
+    case._cells(result, "narrow ring", list(sheets))
+    return result
+
+
+def test_a_cell_is_the_median_with_its_bar_and_empty_ones_say_why() -> None:
+    refused = found(0.3)
+    refused["models"]["bars and hinges"] = {
+        "errors": None,
+        "time_s": float("nan"),
+        "unknowns": None,
+        "why": "refused: a grain",
+    }
+    late = {"words": "a sheet", "why": "more than 60 s of processor time"}
+    result = mapped(found(0.1), found(0.2), refused, late)
+    checks = [(n, Check(**check.record())) for n, check in enumerate(result.checks, 1)]
+    shown = sheet_map([Case(CaseInfo(name="map"), checks)])
+    assert shown is not None
+    assert shown.quantities == ["energy", "shape"]  # nothing pulls, nothing is held
+    bars, two, _ = shown.kinds["narrow ring"]
+    assert [row.model for row in (bars, two)] == ["bars and hinges", "consistent, 2 rows"]
+    assert two.cells["energy"][1].value == pytest.approx(0.2)
+    assert two.cells["energy"][1].bar == pytest.approx(0.01)
+    assert two.cells["energy"][1].params["largest"] == pytest.approx(0.3)
+    assert two.time_s == pytest.approx(0.1)
+    assert bars.cells["energy"][1].params["sheets"] == 2
+    assert (bars.without, two.without) == (2, 1)
+    assert bars.why == "more than 60 s of processor time; refused: a grain"
+    assert all(check.passed is None for check in result.checks)  # reported: a map judges nobody
+
+
+def test_a_mesh_that_does_not_converge_fails() -> None:
+    for coarse, fine, passed in ((0.2, 0.1, True), (0.1, 0.2, False), (0.001, 0.005, True)):
+        sheet = found(coarse)
+        sheet["models"]["consistent, 4 rows"]["errors"]["energy"] = fine
+        result = mapped(sheet)
+        case._converges(result, "narrow ring")
+        assert result.checks[-1].passed is passed
+
+
+def test_a_kind_without_any_figure_has_no_cells() -> None:
+    result = mapped({"words": "a sheet", "why": "the shell does not reach its end"})
+    assert {check.quantity for check in result.checks} == {"sheets without figures"}
+    assert set(UNMEASURED) & set(KINDS) == set()
+
+
+def test_a_sheet_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    def endless(_kind: str, _number: int) -> dict[str, Any]:
+        while True:
+            pass
+
+    monkeypatch.setattr(case, "examine", endless)
+    monkeypatch.setattr(case, "LIMIT_S", 0.05)
+    assert within_time("twisted", 0)["why"] == "more than 0.05 s of processor time"
+    assert not issubclass(OutOfTime, Exception)  # nothing on the way down takes it for an error of its own
