@@ -133,7 +133,7 @@ def test_mutations_are_sheets_or_one_line(
     assert values["mutations that keep a reader busy for more than 20 s"] == (0.0, True)
     assert told == ["drawings: 20 mutations from 0: 0 faults", "drawings: 20 mutations from 20: 0 faults"]
     # a fault is found, and a run that was stopped goes on
-    monkeypatch.setattr(mutations, "read_pattern", lambda file: [][file])  # type: ignore[call-overload]
+    monkeypatch.setattr(mutations, "read_pattern", lambda file: [][file])
     monkeypatch.setattr(drawings, "MUTATIONS", 60)
     again = CaseResult("drawings", "", "", "")
     drawings._mutated(again, context(tmp_path, told), store)

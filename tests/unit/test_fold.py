@@ -585,7 +585,7 @@ def test_a_rigidly_folded_form() -> None:
             assert height * sign > 0
 
 
-CURVED = {
+CURVED: dict[str, Any] = {
     "vertices_coords": [[0, 0], [50, 0], [100, 0], [100, 60], [50, 60], [0, 60]],
     "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 0], [1, 4]],
     "edges_assignment": list("BBBBBBM"),

@@ -83,14 +83,15 @@ def _mutated(result: CaseResult, context: Context, store: Store) -> None:
             with tempfile.TemporaryDirectory() as scratch:
                 files = seeds(OWN, Path(scratch))
         rows = [(number, read(*mutant(files, number))) for number in range(first, min(first + BLOCK, wanted))]
+        faults = [f"{number} ({row.file}): {row.fault}" for number, row in rows if row.fault]
         kept = {
             "count": len(rows),
             "sheets": sum(row.sheet for _, row in rows),
             "slow": [f"{number} ({row.file})" for number, row in rows if row.seconds > SLOW],
             "longest": max(row.seconds for _, row in rows),
-            "faults": [f"{number} ({row.file}): {row.fault}" for number, row in rows if row.fault],
+            "faults": faults,
         }
-        context.tell(f"{CASE}: {len(rows)} {key}: {len(kept['faults'])} faults")
+        context.tell(f"{CASE}: {len(rows)} {key}: {len(faults)} faults")
         store.keep(key, kept)
     blocks = [store.runs[f"mutations from {first}"] for first in range(0, wanted, BLOCK)]
     counted = {"mutations": sum(block["count"] for block in blocks)}

@@ -160,7 +160,7 @@ def _number(text: bytes, chance: np.random.Generator, _: bytes) -> bytes:
 
 def _exchanged(text: bytes, chance: np.random.Generator, kin: bytes) -> bytes:
     """A word becomes one of a file of the kind."""
-    found, others = list(WORD.finditer(text)), WORD.findall(kin)
+    found, others = list(WORD.finditer(text)), [word[0] for word in WORD.finditer(kin)]
     if not found or not others:
         return text
     one = found[int(chance.integers(len(found)))]
