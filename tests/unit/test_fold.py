@@ -13,6 +13,7 @@ import meshio
 import numpy as np
 import pytest
 
+from bh.scene.folding import proposals
 from meshes import CreasePattern, FileFormatError, SheetMesh, annulus_sector, full_annulus, strip, structured
 from meshes.io import FoldedFrame, read_fold, read_pattern, write_fold, write_mesh
 from meshes.io.export import FORMATS
@@ -622,6 +623,12 @@ class TestCurvedEdges:
         self.pattern(tmp_path, edges_controlPoints=[None] * 6 + [[[70, 30]]])
         (remark,) = read_fold(tmp_path / "curved.fold").remarks
         assert "1 edge of the file drawn as curves" in remark
+
+    def test_bh_fold_meshes_the_curves(self, tmp_path: pathlib.Path) -> None:
+        self.pattern(tmp_path, edges_controlPoints=[None] * 6 + [[[70, 30]]])
+        assert "faces" not in proposals(tmp_path / "curved.fold")[0].mesh
+        self.pattern(tmp_path, edges_controlPoints=[None] * 7)
+        assert "faces" in proposals(tmp_path / "curved.fold")[0].mesh
 
     @pytest.mark.parametrize(
         "bends", [[None] * 6, [[[1, 2]] * 3] * 7, [[["x", 2]]] * 7, [3] * 7, "x", [[[1]]] * 7]
