@@ -167,19 +167,29 @@ def lift(mesh: SheetMesh) -> QuadraticMesh:
         MeshError: the sheet is not flat, an edge set does not lie on its curve, or a curved edge turns a
             triangle inside out (the mesh is too coarse for its curves).
     """
+    middle = edge_middles(mesh)
+    lifted = QuadraticMesh(mesh, np.vstack((mesh.points, middle)), _with_edges(mesh))
+    _check_orientation(lifted)
+    return lifted
+
+
+def edge_middles(mesh: SheetMesh) -> Array:
+    """(e, 3) the middle of every edge of the topology, mm: on the curve that the edge lies on, else of its chord.
+
+    Raises:
+        MeshError: the sheet is not flat, or an edge set does not lie on its curve.
+    """
     plane_axes(mesh)
     try:
-        middle = _middles(mesh, mesh.points, NEAR * mesh.size)
+        return _middles(mesh, mesh.points, NEAR * mesh.size)
     except MeshError:
         move = _moved(mesh)
         if move is None:
             raise
         scale, turn, shift = move
         assert mesh.drawn is not None
-        middle = scale * _middles(mesh, mesh.drawn, NEAR * mesh.size / scale) @ turn.T + shift
-    lifted = QuadraticMesh(mesh, np.vstack((mesh.points, middle)), _with_edges(mesh))
-    _check_orientation(lifted)
-    return lifted
+        middle: Array = scale * _middles(mesh, mesh.drawn, NEAR * mesh.size / scale) @ turn.T + shift
+        return middle
 
 
 def _middles(mesh: SheetMesh, points: Array, near: float) -> Array:

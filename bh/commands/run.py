@@ -15,14 +15,12 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from bh.analysis.contact import Contact, first_contact
 from bh.commands.occupied import FINISHED, UNFINISHED, changed, check_folder
 from bh.commands.result import result
 from bh.errors import InputError
 from bh.model.serialise import fingerprint
-from bh.paths.export import FOLDED, write_flat, write_state
+from bh.paths.export import FOLDED, folded_frame, write_flat, write_state
 from bh.paths.path import Path as Trace
 from bh.paths.storage import PathFile, reading
 from bh.runtime.lock import only_writer
@@ -345,11 +343,8 @@ def extras(
     def fold() -> None:
         from meshes.io import write_fold
 
-        mesh, last = path.model.mesh, path[-1]
-        angles = np.zeros(len(mesh.topology.edges))
-        angles[mesh.topology.hinge_edges] = np.pi - last.dihedral_angles
-        frame = ("folded", last.points, angles)
-        write_fold(folder / f"folded{mark}.fold", mesh, frames=[frame], title=scene.name)
+        frame = folded_frame(path[-1], "folded")
+        write_fold(folder / f"folded{mark}.fold", path.model.mesh, frames=[frame], title=scene.name)
 
     wanted = {
         f"folded{mark}.png": (draw, pictures or scene.outputs.pictures),

@@ -15,6 +15,7 @@ from meshes import SheetMesh
 
 if TYPE_CHECKING:
     from bh.formulations.state import State
+    from meshes.io import FoldedFrame
 
 FOLDED = (".fold", ".glb", ".obj", ".off", ".ply", ".stl", ".vtk", ".vtu", ".msh", ".inp")
 FLAT = (".svg", ".dxf", ".fold")
@@ -23,8 +24,9 @@ FLAT = (".svg", ".dxf", ".fold")
 def write_state(file: str | os.PathLike[str], states: Sequence[State], title: str = "sheet") -> FilePath:
     """Write the last of some states of a path; a FOLD file gets all of them as frames behind the flat key frame.
 
-    .vtu, .vtk and .msh hold the displacement (mm) and the energy densities (N mm / mm^2); .glb has them as colours,
-    bending from none (dark) to the most there is.
+    Its energies and energy densities go with each frame, see `folded_frame`. .vtu, .vtk and .msh hold the displacement
+    (mm) and the energy densities (N mm / mm^2); .glb has them as colours, bending from none (dark) to the most
+    there is. .obj and .glb have the flat sheet as texture coordinates.
 
     Args:
         file: its suffix says the format.
@@ -46,8 +48,9 @@ def write_state(file: str | os.PathLike[str], states: Sequence[State], title: st
     if suffix == ".fold":
         from meshes.io import write_fold
 
-        frames = [(_name(state), state.points, _fold_angles(state)) for state in states]
-        write_fold(target, last.mesh, frames=frames, title=title)
+        write_fold(
+            target, last.mesh, frames=[folded_frame(state, _name(state)) for state in states], title=title
+        )
     elif suffix == ".glb":
         from meshes.io import write_gltf
 
@@ -89,6 +92,35 @@ def write_flat(file: str | os.PathLike[str], mesh: SheetMesh, facets: bool = Fal
 
         write_pattern(target, mesh, facets=facets)
     return target.resolve()
+
+
+def folded_frame(state: State, title: str) -> FoldedFrame:
+    """A state as a frame of a FOLD file, with what was computed under keys of the namespace "bh".
+
+    "bh:energies" (N mm, by kind and "total"), "bh:step" (from 1), "bh:lambda", "bh:stable" (null: not known), where the
+    path ended early "bh:ended", and for each face "faces_bh:bendingEnergyDensity" and the like, N mm / mm^2.
+
+    Args:
+        state: of a path.
+        title: of the frame.
+    """
+    from meshes.io import FoldedFrame
+
+    results: dict[str, object] = {
+        "bh:energies": state.energy.as_dict(),
+        "bh:step": state.step + 1,
+        "bh:lambda": state.lam,
+        "bh:stable": state.stable,
+        "bh:units": {
+            "energies": "N mm",
+            "faces_bh:...EnergyDensity": "N mm / mm^2",
+            "edges_foldAngle": "degrees",
+        },
+    }
+    if state.ended:
+        results["bh:ended"] = state.ended
+    results |= {f"faces_bh:{kind}EnergyDensity": values for kind, values in state.energy_density.items()}
+    return FoldedFrame(title, state.points, _fold_angles(state), results)
 
 
 def _name(state: State) -> str:

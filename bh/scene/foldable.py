@@ -15,6 +15,7 @@ import numpy as np
 
 from bh.errors import InputError
 from meshes import CreasePattern, SheetMesh
+from meshes.io.fold import BENT
 from meshes.planar import CORNER
 
 FIT = 200.0  # mm, the longer side of a sheet whose file says no unit and whose numbers make an absurd size
@@ -105,7 +106,7 @@ def _read(file: Path, options: Mapping[str, object]) -> Found:
             found.faces = read_drawn(file, **given)  # type: ignore[arg-type]
     except InputError as error:
         found.why.append(error)
-    if found.faces is None or (_bent(found.faces) and found.faces.flat):
+    if found.faces is None or (found.faces.flat and (_bent(found.faces) or _has_curves(found.faces))):
         try:
             found.pattern = read_pattern(file, **dict(options))  # type: ignore[arg-type]
         except InputError as error:
@@ -125,6 +126,11 @@ def _joined(file: Path, found: Found, options: dict[str, object], assumed: list[
     assumed.append(f"lines that end close to others ({len(gaps)}) are joined by gap = {max(gaps):g} mm")
     options["gap"] = max(gaps)
     return joined
+
+
+def _has_curves(mesh: SheetMesh) -> bool:
+    """True if edges of its file are curves, of which the faces have the chords alone."""
+    return any(BENT in remark for remark in mesh.remarks)
 
 
 def _bent(mesh: SheetMesh) -> bool:

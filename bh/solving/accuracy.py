@@ -84,9 +84,7 @@ def solve(
     trials: list[Trial] = []
     found: list[_Found] = []
     why, failed = "", None
-    while (turn := race.next()) is not None and not (
-        why := race.too_long(trials, time.perf_counter() - began)
-    ):
+    while (turn := race.next()) is not None and not (why := race.too_long(trials)):
         name, step = turn
         try:
             coarser = found[-1].path if found and found[-1].formulation == name else None

@@ -14,7 +14,7 @@ import numpy as np
 from meshes.curves import Array
 from meshes.drawn_pattern import pattern_of, region_of
 from meshes.errors import FileFormatError, InputError
-from meshes.io.export import shown
+from meshes.io.export import one_line, shown
 from meshes.io.perforation import join_dashes
 from meshes.io.sizes import check_lengths, size_remarks
 from meshes.io.strokes import Rules, Stroke, Strokes
@@ -101,7 +101,7 @@ def _naming_the_file(path: str | os.PathLike[str], read: Callable[[], Read]) -> 
     try:
         return read()
     except (InputError, shapely.errors.ShapelyError) as error:
-        raise FileFormatError(f"{shown(path)}: {' '.join(str(error).split())}") from error
+        raise FileFormatError(f"{shown(path)}: {one_line(error)}") from error
 
 
 def _pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> CreasePattern:

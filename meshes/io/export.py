@@ -67,12 +67,40 @@ def write_mesh(
     at_cells = {k: [_field(name, f"cell field {k!r}", v, count)] for k, v in (cell_fields or {}).items()}
     # .ply has no 64-bit integers: meshio would cast them with a printed warning
     triangles = mesh.triangles.astype(np.int32) if form == "ply" else mesh.triangles
+    if form == "obj":
+        with replacing(path) as temporary:
+            temporary.write_text(_obj(mesh, place), encoding="ascii")
+        return
     try:
         out = meshio.Mesh(np.array(place), [("triangle", triangles)], point_data=at_nodes, cell_data=at_cells)
         with replacing(path) as temporary:
             out.write(temporary, file_format=form)
     except meshio.WriteError as error:
         raise FileFormatError(f"{name}: {' '.join(str(error).split())}") from error
+
+
+def texture(mesh: SheetMesh) -> Array | None:
+    """(n, 2) where the nodes lie on the flat sheet, lower left corner at 0, longer side 1; None if it is not flat.
+
+    Args:
+        mesh: stress-free.
+    """
+    if not mesh.flat:
+        return None
+    xy = mesh.points[:, :2] - mesh.points[:, :2].min(axis=0)
+    return np.asarray(xy / xy.max())
+
+
+def _obj(mesh: SheetMesh, place: Array) -> str:
+    """Wavefront's format, mm; meshio writes no texture coordinates that faces refer to."""
+    flat = texture(mesh)
+    lines = ["# curved-crease-workbench; mm"]
+    lines += [f"v {x:.10g} {y:.10g} {z:.10g}" for x, y, z in place.tolist()]
+    if flat is not None:
+        lines += [f"vt {u:.8f} {v:.8f}" for u, v in flat.tolist()]
+    each = "{0}/{0}" if flat is not None else "{0}"
+    lines += [f"f {' '.join(each.format(k + 1) for k in row)}" for row in mesh.triangles.tolist()]
+    return "\n".join([*lines, ""])
 
 
 def _field(name: str, what: str, values: ArrayLike, count: int) -> Array:
@@ -95,6 +123,12 @@ def shown(path: str | os.PathLike[str]) -> str:
     """The path for a message of one line; anything that cannot be printed is escaped."""
     text = os.fspath(path)
     return text if text.isprintable() else ascii(text)
+
+
+def one_line(error: Exception) -> str:
+    """What an error says, on one line; characters that cannot be printed are escaped."""
+    text = " ".join(str(error).split())
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""FOLD files, version 1.2 (https://github.com/edemaine/fold/blob/main/doc/spec.md), to and from `SheetMesh`.
+"""FOLD files, version 1.2 (https://github.com/edemaine/fold/blob/main/doc/spec.md), to `SheetMesh`.
 
 FOLD's fold angles are degrees, valley positive; ours are rad, mountain positive. Frames count as in FOLD: 0
 is the key frame (the top of the file), i + 1 is `file_frames[i]`.
@@ -7,30 +7,27 @@ is the key frame (the top of the file), i + 1 is `file_frames[i]`.
 from __future__ import annotations
 
 import itertools
-import json
-import math
 import os
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from meshes.curves import Array
 from meshes.cuts import CUTS, open_cuts
 from meshes.errors import FileFormatError, InputError
-from meshes.io.export import replacing, shown
+from meshes.io.export import one_line, shown
 from meshes.io.fold_faces import area, faces_of_graph, orient, sides_of, triangulate
-from meshes.io.fold_frame import UNITS, Frame, Side, check, laid_flat, load, select, show, side
+from meshes.io.fold_frame import UNITS, Frame, Side, check, laid_flat, load, select, side
 from meshes.io.loose_ends import tie_ends
 from meshes.io.sizes import check_lengths, size_remarks
-from meshes.mesh import SheetMesh
+from meshes.mesh import SheetMesh, count
 from meshes.pattern import FoldKind
 from meshes.topology import boundary_loops, build
 
 FOLDS: dict[str, FoldKind] = {"M": "mountain", "V": "valley"}
 SETS = {"F": "edge:flat", "U": "edge:unassigned", "J": "edge:join"}
+BENT = "drawn as curves"  # of edges, in remarks
 STRAIGHT = 1e-3  # rad; files give coordinates to some six digits
 
 
@@ -75,8 +72,7 @@ def read_fold(
         remarks = _remarks(found, chosen, scale is None and fit is None)
         return replace(mesh, remarks=(*remarks, *mesh.remarks))
     except (InputError, shapely.errors.ShapelyError) as error:
-        text = " ".join(str(error).split())
-        raise FileFormatError(f"{shown(path)}: {text}") from error
+        raise FileFormatError(f"{shown(path)}: {one_line(error)}") from error
 
 
 def _sized(frame: Frame, units: dict[str, Any], scale: float | None, fit: float | None) -> Frame:
@@ -92,7 +88,13 @@ def _sized(frame: Frame, units: dict[str, Any], scale: float | None, fit: float 
 
 def _remarks(frame: Frame, units: dict[str, Any], as_stated: bool) -> tuple[str, ...]:
     size = float(np.ptp(frame.points, axis=0).max())
-    return tuple(size_remarks(size, units.get("frame_unit", "unit") != "unit")) if as_stated else ()
+    remarks = size_remarks(size, units.get("frame_unit", "unit") != "unit") if as_stated else []
+    if frame.bends:
+        remarks.append(
+            f"{count(len(frame.bends), 'edge')} of the file {BENT}, of which its faces have the chords; "
+            "with [mesh] or accuracy the curves are meshed"
+        )
+    return tuple(remarks)
 
 
 # --- the sheet ------------------------------------------------------------------------------------
@@ -266,105 +268,3 @@ def _straight(frame: Frame, vertex: int, met: list[int]) -> list[tuple[int, int]
             taken |= {i, j}
             pairs.append((met[i], met[j]))
     return pairs
-
-
-# --- writing --------------------------------------------------------------------------------------
-
-
-def write_fold(
-    path: str | os.PathLike[str],
-    mesh: SheetMesh,
-    *,
-    frames: Sequence[tuple[str, ArrayLike, ArrayLike | None]] = (),
-    title: str | None = None,
-) -> None:
-    """Write a mesh as the key frame of a FOLD file, and folded states as further frames; lengths in mm.
-
-    Edges are those of `mesh.topology.edges`: B on the boundary (of a cut: both lips, on doubled vertices), M and V on
-    creases as `mesh.folds` says, U and J in "edge:unassigned" and "edge:join", else F. Fold angles are written if the
-    mesh has any, null on a crease without. The file appears whole or not at all.
-
-    Args:
-        path: of the file.
-        mesh: the key frame.
-        frames: (title, points (n, 3) in mm, fold angles (e,) in rad, mountain positive, one for each of
-            `mesh.topology.edges`, or None) of each state.
-        title: of the file.
-
-    Raises:
-        FileFormatError: arrays that do not fit the mesh, or the file cannot be written.
-    """
-    edges = mesh.topology.edges
-    letters, angles = _assignment(mesh)
-    data: dict[str, Any] = {
-        "file_spec": 1.2,
-        "file_creator": "curved-crease-workbench",
-        "file_classes": ["singleModel", "animation"] if frames else ["singleModel"],
-    }
-    if title is not None:
-        data["file_title"] = str(title)
-    data |= {
-        "frame_classes": ["creasePattern" if mesh.flat else "foldedForm"],
-        "frame_attributes": ["2D" if mesh.flat else "3D", "manifold", "orientable"],
-        "frame_unit": "mm",
-        "vertices_coords": (mesh.points[:, :2] if mesh.flat else mesh.points).tolist(),
-        "edges_vertices": edges.tolist(),
-        "edges_assignment": letters,
-    }
-    if angles is not None:
-        data["edges_foldAngle"] = _degrees(angles)
-    data["faces_vertices"] = mesh.triangles.tolist()
-    states = []
-    for number, (name, points, folds) in enumerate(frames):
-        what = f"{shown(path)}: state {number} ({show(str(name))})"
-        place = _numbers(f"{what}: points", points, mesh.points.shape)
-        state = {
-            "frame_title": str(name),
-            "frame_classes": ["foldedForm"],
-            "frame_attributes": ["3D", "manifold", "orientable"],
-            "frame_parent": 0,
-            "frame_inherit": True,
-            "vertices_coords": place.tolist(),
-        }
-        if folds is not None:
-            state["edges_foldAngle"] = _degrees(_numbers(f"{what}: fold angles", folds, (len(edges),)))
-        states.append(state)
-    if states:
-        data["file_frames"] = states
-    # one line a key: still readable, and a difference of two files says what changed
-    text = ",\n".join(f'"{key}": {json.dumps(value, allow_nan=False)}' for key, value in data.items())
-    with replacing(path) as temporary:
-        temporary.write_text("{\n" + text + "\n}\n", encoding="utf-8")
-
-
-def _assignment(mesh: SheetMesh) -> tuple[list[str], Array | None]:
-    """Letter and drawn fold angle (rad, mountain positive; nan unknown) of every edge of the topology."""
-    topology = mesh.topology
-    letters = np.full(len(topology.edges), "F")
-    angles = np.zeros(len(letters))
-    for letter, name in SETS.items():
-        if name in mesh.edge_sets:
-            letters[topology.find_edges(mesh.edge_sets[name])] = letter
-    for crease in mesh.creases:
-        at = topology.find_edges(mesh.crease_edges(crease))
-        fold = mesh.folds.get(crease, "flat")
-        letters[at] = {"mountain": "M", "valley": "V", "flat": "F"}[fold]
-        angles[at] = mesh.fold_angles.get(crease, np.nan if fold != "flat" else 0.0)
-    rim = topology.edge_triangles[:, 1] < 0
-    letters[rim], angles[rim] = "B", 0.0
-    return letters.tolist(), angles if mesh.fold_angles else None
-
-
-def _degrees(angles: Array) -> list[float | None]:
-    """FOLD's fold angles (valley positive) of ours."""
-    return [None if math.isnan(angle) else 0.0 - angle for angle in np.degrees(angles).tolist()]
-
-
-def _numbers(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
-    try:
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise FileFormatError(f"{what} are not numbers; give an array of shape {shape}") from error
-    if array.shape != shape or not np.isfinite(array).all():
-        raise FileFormatError(f"{what} have shape {array.shape} or are not finite; give shape {shape}")
-    return array

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -27,6 +29,8 @@ UNITS = {
     "nm": 1e-6,
 }  # mm a unit
 LETTERS = "MVFBUCJ"
+BENDS = re.compile(r"edges_(\w+:)?controlPoints")  # an extension of the format
+MOST_BENDS = 2  # control points of a curve: cubic
 PLANE = 1e-6  # of the size: points that are no farther off lie in a plane
 LIMIT = 1e12  # mm; beyond it products of coordinates lose all meaning
 
@@ -45,6 +49,7 @@ class Frame:
         angles: fold angles of the edges, degrees, valley positive, nan where the file has null; None without
             any.
         faces: rings of vertex numbers each; may be empty.
+        bends: (k, 3) control points between the ends of an edge that is a Bezier curve, mm, by its number.
     """
 
     points: Array
@@ -52,6 +57,7 @@ class Frame:
     letters: list[str]
     angles: list[float] | None
     faces: list[Face]
+    bends: Mapping[int, Array] = field(default_factory=dict)
 
     @cached_property
     def flat(self) -> bool:
@@ -84,8 +90,13 @@ def laid_flat(frame: Frame) -> Frame:
     across = np.array((1.0, 0.0, 0.0)) if abs(normal[0]) < 0.9 else np.array((0.0, 1.0, 0.0))
     across = across - (across @ normal) * normal
     across /= np.linalg.norm(across)
-    turned = np.column_stack((frame.points @ across, frame.points @ np.cross(normal, across)))
-    return replace(frame, points=np.column_stack((turned, np.zeros(len(turned)))))
+
+    def turned(points: Array) -> Array:
+        along = np.column_stack((points @ across, points @ np.cross(normal, across)))
+        return np.column_stack((along, np.zeros(len(along))))
+
+    bends = {edge: turned(points) for edge, points in frame.bends.items()}
+    return replace(frame, points=turned(frame.points), bends=bends)
 
 
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -222,7 +233,7 @@ def check(frame: dict[str, Any]) -> Frame:
         faces.append([ring])
     if not faces and not edges:
         raise FileFormatError("the frame has no faces_vertices and no edges_vertices; give one of them")
-    return Frame(points, edges, letters, angles, faces)
+    return Frame(points, edges, letters, angles, faces, _bends(frame, len(edges)))
 
 
 def _points(frame: dict[str, Any]) -> Array:
@@ -232,17 +243,38 @@ def _points(frame: dict[str, Any]) -> Array:
     rows = _list(frame, "vertices_coords")
     if not rows:
         raise FileFormatError("the frame has no vertices_coords; give [x, y] or [x, y, z] for every vertex")
-    points = np.zeros((len(rows), 3))
-    for vertex, row in enumerate(rows):
-        if not isinstance(row, list) or len(row) not in (2, 3):
-            raise FileFormatError(f"vertices_coords[{vertex}] is {show(row)}; give [x, y] or [x, y, z]")
-        for axis, value in enumerate(row):
-            if not _is_number(value) or not abs(value) <= LIMIT / UNITS[unit]:
+    points = [_point(row, f"vertices_coords[{vertex}]", unit) for vertex, row in enumerate(rows)]
+    return np.array(points) * UNITS[unit]
+
+
+def _point(row: object, what: str, unit: str) -> list[float]:
+    """x, y and z of a row, in its unit."""
+    if not isinstance(row, list) or len(row) not in (2, 3):
+        raise FileFormatError(f"{what} is {show(row)}; give [x, y] or [x, y, z]")
+    for value in row:
+        if not _is_number(value) or not abs(value) <= LIMIT / UNITS[unit]:
+            raise FileFormatError(f"{what} holds {show(value)}; give numbers up to {LIMIT:g} mm in size")
+    return [float(value) for value in (*row, 0.0)[:3]]
+
+
+def _bends(frame: dict[str, Any], count: int) -> dict[int, Array]:
+    """Control points (k, 3) of the edges that are curves, mm."""
+    found: dict[int, Array] = {}
+    unit = frame.get("frame_unit", "unit")
+    for key in filter(BENDS.fullmatch, frame):
+        rows = _list(frame, key)
+        _same_length(key, len(rows), count)
+        for edge, row in enumerate(rows):
+            what = f"{key}[{edge}]"
+            if row is None or row == []:
+                continue
+            if not isinstance(row, list) or len(row) > MOST_BENDS:
                 raise FileFormatError(
-                    f"vertices_coords[{vertex}] holds {show(value)}; give numbers up to {LIMIT:g} mm in size"
+                    f"{what} is {show(row)}; give null, or one or two points (quadratic, cubic Bezier curves)"
                 )
-            points[vertex, axis] = value
-    return points * UNITS[unit]
+            points = [_point(point, f"{what}[{k}]", unit) for k, point in enumerate(row)]
+            found[edge] = np.array(points) * UNITS[unit]
+    return found
 
 
 def _angles(frame: dict[str, Any], count: int) -> list[float] | None:

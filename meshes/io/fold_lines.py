@@ -8,11 +8,16 @@ from __future__ import annotations
 
 import math
 import os
+from functools import partial
 
+import numpy as np
+
+from meshes.curves import Array
 from meshes.errors import FileFormatError
 from meshes.io.fold_frame import UNITS, check, laid_flat, load, select
 from meshes.io.strokes import Colour, Stroke, Strokes, always
 
+LEAST, MOST = 8, 4096  # chords of an edge that is a curve
 COLOURS: dict[str, Colour | None] = {
     "B": None,
     "M": (255, 0, 0),
@@ -49,9 +54,11 @@ def read_fold_lines(path: str | os.PathLike[str], frame: int | str | None = None
     for number, ((a, b), letter) in enumerate(zip(found.edges, found.letters, strict=True)):
         angle = math.nan if found.angles is None else abs(found.angles[number])
         opacity = 1.0 if math.isnan(angle) or letter not in "MV" else angle / 180.0
+        ends = points[[a, b]]
+        bend = found.bends.get(number)
         strokes.append(
             Stroke(
-                always(points[[a, b]]),
+                always(ends) if bend is None else partial(_bezier, ends, bend[:, :2] / UNITS[unit]),
                 f"edge {number}",
                 COLOURS[letter],
                 opacity=opacity,
@@ -59,3 +66,17 @@ def read_fold_lines(path: str | os.PathLike[str], frame: int | str | None = None
             )
         )
     return Strokes(strokes, UNITS[unit], stated=unit != "unit")
+
+
+def _bezier(ends: Array, bend: Array, tolerance: float) -> Array:
+    """Points (k, 2) of a Bezier curve with one or two control points `bend`, whose chords stay within a tolerance."""
+    poles = np.vstack((ends[:1], bend, ends[1:]))
+    degree = len(poles) - 1
+    # a chord over a part 1/n of the parameter is off by no more than the second derivative / (8 n^2)
+    most = degree * (degree - 1) * float(np.linalg.norm(np.diff(poles, 2, axis=0), axis=1).max())
+    count = max(LEAST, math.ceil(math.sqrt(min(most / (8.0 * tolerance), MOST**2))))
+    u = np.linspace(0.0, 1.0, count + 1)[:, None]
+    curve = np.repeat(poles[:, None, :], count + 1, axis=1)
+    for _ in range(degree):  # de Casteljau
+        curve = (1.0 - u) * curve[:-1] + u * curve[1:]
+    return np.asarray(curve[0])

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from meshes.errors import FileFormatError
-from meshes.io.export import replacing, shown
+from meshes.io.export import replacing, shown, texture
 from meshes.mesh import SheetMesh
 
+TEXTURE = "_texture"  # what trimesh calls the attribute that becomes TEXCOORD_0
 METRE = 1e-3  # of a millimetre
 PAPER, INK = (185, 196, 207, 255), (27, 27, 31, 255)
 
@@ -23,6 +24,8 @@ def write_gltf(
     colours: ArrayLike | None = None,
 ) -> None:
     """Write the triangles, seen from both sides, with creases and boundary as dark lines.
+
+    Where the mesh is flat, its sheet is the texture coordinates: the longer side from 0 to 1, upright.
 
     Args:
         path: of the .glb file.
@@ -53,6 +56,8 @@ def write_gltf(
     x, y, z = (METRE * place).T
     upright = np.column_stack((x, z, -y))
     sheet = trimesh.Trimesh(upright, mesh.triangles, vertex_colors=shades, process=False)
+    if (flat := texture(mesh)) is not None:  # glTF counts v downwards
+        sheet.vertex_attributes[TEXTURE] = np.column_stack((flat[:, 0], 1.0 - flat[:, 1])).astype(np.float32)
     pairs = [mesh.topology.boundary, *(mesh.crease_edges(crease) for crease in mesh.creases)]
     lines = trimesh.load_path(upright[np.unique(np.sort(np.vstack(pairs), axis=1), axis=0)])
     lines.colors = np.tile(np.array(INK, dtype=np.uint8), (len(lines.entities), 1))
@@ -70,7 +75,7 @@ def _linear(shades: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _both_sides(tree: dict[str, Any]) -> None:
-    """A sheet has no inside: its triangles are drawn from both sides."""
+    """A sheet has no inside: its triangles are drawn from both sides. Texture coordinates get their name."""
     materials = tree.setdefault("materials", [])
     materials.append(
         {"doubleSided": True, "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.9}}
@@ -79,3 +84,5 @@ def _both_sides(tree: dict[str, Any]) -> None:
         for part in mesh["primitives"]:
             if part["mode"] == 4:
                 part["material"] = len(materials) - 1
+                if TEXTURE in part["attributes"]:
+                    part["attributes"]["TEXCOORD_0"] = part["attributes"].pop(TEXTURE)

@@ -9,18 +9,20 @@ import math
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from meshes.curves import Arc, Array, Curve, Line, Polyline, sample
+from meshes.curves import Arc, Array, Curve, Line, Polyline, arc_lengths, sample
 from meshes.errors import FileFormatError
 from meshes.fans import lips
 from meshes.io.export import replacing, shown
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
+from meshes.planar import corners
 from meshes.topology import Ints, boundary_loops
 
 MARGIN = 5.0  # mm of paper round the sheet
@@ -64,7 +66,7 @@ def write_pattern(
         sheet: a pattern, or a flat mesh.
         facets: also the lines along which the sheet does not fold (drawn rulings; the inner edges of a mesh).
         perforate: lengths (cut, left) in mm: creases are cut up into dashes of that length, as many machines
-            ignore the style of a line. Such a file cannot be read back as a pattern.
+            ignore the style of a line. Read back, the dashes are joined again.
 
     Raises:
         FileFormatError: another suffix, a mesh that is not flat, lengths that cannot be, a place that cannot
@@ -176,18 +178,26 @@ def _runs(pairs: Ints, angles: Array | None) -> Iterator[tuple[list[int], float 
 
 
 def _perforated(lines: Iterable[FlatLine], cut: float, left: float) -> Iterator[FlatLine]:
-    """Creases as dashes of about that length, one at either end, so that they open from the rim."""
+    """Creases as dashes of about that length, one at either end and on both sides of corners."""
     for line in lines:
         if line.layer in ("boundary", "cut", "facet"):
             yield line
             continue
-        length = line.curve.length
-        count = max(1, round((length + left) / (cut + left)))
-        dash = cut * length / (count * (cut + left) - left)
-        pitch = (length - dash) / (count - 1) if count > 1 else 0.0
         points = sample(line.curve)
-        for k in range(count):
-            yield FlatLine(line.layer, line.name, Polyline(_part(points, k * pitch, k * pitch + dash)))
+        turns = [0, *np.flatnonzero(corners(points)).tolist(), len(points) - 1]
+        for first, last in pairwise(turns):
+            for dash in _dashes(points[first : last + 1], cut, left):
+                yield FlatLine(line.layer, line.name, Polyline(dash), line.angle)
+
+
+def _dashes(points: Array, cut: float, left: float) -> Iterator[Array]:
+    """Dashes (k, 2) of a line without corners."""
+    length = float(arc_lengths(points)[-1])
+    count = max(1, round((length + left) / (cut + left)))
+    dash = cut * length / (count * (cut + left) - left)
+    pitch = (length - dash) / (count - 1) if count > 1 else 0.0
+    for k in range(count):
+        yield _part(points, k * pitch, k * pitch + dash)
 
 
 def _part(points: Array, start: float, end: float) -> Array:

@@ -17,8 +17,11 @@ import meshes
 from bh.commands.cli import main
 from bh.errors import ModelError, SceneError
 from bh.model.refinement import Goal, Refinement, mesh_at, pattern_of
+from bh.paths.estimate import Trial
 from bh.scene.load import parse_scene
+from bh.solvers.outcome import Outcome
 from bh.solving.accuracy import candidates, estimate
+from bh.solving.race import Race
 from verification.studies.solver.honesty import TRAINING, examine
 
 SHEET = bh.Sheet(E=4000.0, nu=0.38, t=0.127)
@@ -178,6 +181,18 @@ def test_what_is_not_met_is_said() -> None:
     assert short is not None
     assert "more than is left of 1e-06 s" in short.notes[-1]
     assert len(short.trials) == 1
+
+
+@pytest.mark.parametrize("clock", [1e-6, 1e6])
+def test_what_is_begun_depends_on_work_and_not_on_the_clock(clock: float) -> None:
+    """A next level of twice the cells takes eight times as long here: 44 s after 5.5 s."""
+    option = Refinement("staggered", ((1.0, 0.1),) * 4, 1.0, 3.0)
+    mesh = Trial("one", 1.0, "", 10, 1000, 1000, clock, Outcome.REACHED, np.zeros(1))
+    for seconds, begun in ((49.0, False), (50.0, True)):
+        race = Race(Goal(0.05, seconds=seconds), {"one": option}, {"one": [1.0, 2.0]})
+        why = race.too_long([mesh])
+        assert (why == "") is begun
+        assert begun or why == "the next mesh takes some 44 s, more than is left of 49 s"
 
 
 def test_a_path_that_ends_early_has_no_estimate() -> None:

@@ -406,6 +406,29 @@ class TestWriting:
         cut = np.abs(points[:, 1, 0] - points[:, 0, 0])
         assert cut == pytest.approx(np.full(25, 3.0), rel=0.02)
 
+    @pytest.mark.parametrize("suffix", [".svg", ".dxf"])
+    @pytest.mark.parametrize("dashes", [(3.0, 1.0), (2.0, 2.0), (1.0, 0.5)])
+    def test_perforated_comes_back_as_what_it_was(
+        self, tmp_path: Path, suffix: str, dashes: tuple[float, float]
+    ) -> None:
+        """A wave and a crease with a corner: dashes lie on both sides of it, so that it is not cut off."""
+        u = np.linspace(0.0, 1.0, 61)
+        wave = meshes.Polyline(np.column_stack((100.0 * u, 45.0 + 4.0 * np.sin(2.0 * np.pi * u))))
+        corner = meshes.Polyline(np.array([[0.0, 10.0], [41.3, 10.0], [60.0, 28.0], [100.0, 12.0]]))
+        pattern = meshes.CreasePattern(
+            rings=(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 60.0], [0.0, 60.0]]),),
+            creases=(meshes.Crease("m1", wave), meshes.Crease("v1", corner, "valley")),
+        )
+        write_pattern(tmp_path / f"p{suffix}", pattern, perforate=dashes)
+        back = read_pattern(tmp_path / f"p{suffix}")
+        assert folds(back) == {"m1": "mountain", "v1": "valley"}
+        for crease in pattern.creases:
+            (found,) = (c for c in back.creases if c.fold == crease.fold)
+            assert found.curve.length == pytest.approx(crease.curve.length, rel=1e-3)
+            line, again = (shapely.LineString(meshes.curves.sample(c.curve)) for c in (crease, found))
+            assert line.hausdorff_distance(again) < 0.03
+        assert len(back.remarks) == 1
+
     def test_a_mesh(self, tmp_path: Path) -> None:
         mesh = structured(meshes.strip(100.0, 20.0, [10.0], "valley"), along=10)
         write_pattern(tmp_path / "m.svg", mesh, facets=True)

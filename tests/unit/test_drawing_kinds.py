@@ -248,6 +248,13 @@ def test_lines_that_end_inside_are_tied_to_others(tmp_path: Path, line: str) -> 
     assert (2.0 * mesh.areas / sides.max(axis=1)).min() > 0.1  # mm, no slivers along the curve
 
 
+def test_characters_that_cannot_be_printed_are_escaped_in_messages(tmp_path: Path) -> None:
+    (tmp_path / "a.dxf").write_bytes(b"  0\nSECTION\n  2\nENTITIES\n  3\x000\nLINE\n  0\nENDSEC\n  0\nEOF\n")
+    with pytest.raises(FileFormatError) as told:
+        read_pattern(tmp_path / "a.dxf")
+    assert str(told.value).isprintable()
+
+
 def test_perforated_creases_are_joined_with_one_remark(tmp_path: Path) -> None:
     x = np.arange(0.0, 119.0, 4.0)
     wave = 40.0 + 8.0 * np.sin(2.0 * np.pi * np.column_stack((x, x + 2.8)) / 120.0)

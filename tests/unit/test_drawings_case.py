@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 from meshes.errors import InputError
-from verification.framework.checks import Context
+from verification.framework.checks import CaseResult, Context
+from verification.framework.store import Store
 from verification.studies.solver import drawings, drawings_folding
+from verification.studies.solver import drawings_mutations as mutations
 from verification.studies.solver.drawings_folding import Row, fold_apart, fold_here
 
 SHEET = (
@@ -35,6 +37,7 @@ def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (others / "x.FOLD").touch()
     monkeypatch.setattr(drawings, "OWN", own)
     monkeypatch.delenv(drawings.FOLDER, raising=False)
+    monkeypatch.setattr(drawings, "_mutated", lambda *_: None)
     rows = {
         "four_sheets.svg": Row("four_sheets.svg", True, (60.0, 40.0), 2, 1.0, 144.0, seconds=3.0),
         "fan.svg": Row("fan.svg", True, (950.0, 370.0), 2, 0.5, 72.0, seconds=59.0, why="stalled"),
@@ -95,6 +98,48 @@ def test_a_drawing_in_this_process(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert (
         fold_here(file, "a.svg", tmp_path).why == "fault of the program: ZeroDivisionError: division by zero"
     )
+
+
+@pytest.fixture(scope="module")
+def seeded(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, bytes]]:
+    return mutations.seeds(drawings.OWN, tmp_path_factory.mktemp("seeds"))
+
+
+def test_what_is_mutated_is_read_before(seeded: list[tuple[str, bytes]]) -> None:
+    assert {Path(name).suffix for name, _ in seeded} == {".svg", ".dxf", ".fold", ".cp", ".opx"}
+    for name, content in seeded:
+        row = mutations.read(name, content)
+        assert (row.sheet or name in ("four_sheets.svg", "no_outline.svg"), row.fault) == (True, ""), name
+
+
+def test_a_mutation_is_the_same_wherever_it_is_made(seeded: list[tuple[str, bytes]]) -> None:
+    one, two = (mutations.mutant(seeded, 31) for _ in range(2))
+    assert one == two
+    assert one != mutations.mutant(seeded, 31 + len(seeded))
+    assert one[0] == seeded[31 % len(seeded)][0]
+
+
+def test_mutations_are_sheets_or_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seeded: list[tuple[str, bytes]]
+) -> None:
+    monkeypatch.setattr(drawings, "MUTATIONS", 40)
+    monkeypatch.setattr(drawings, "BLOCK", 20)
+    result = CaseResult("drawings", "", "", "")
+    told: list[str] = []
+    store = Store.open(tmp_path, "runs.json", False)
+    drawings._mutated(result, context(tmp_path, told), store)
+    values = {check.quantity: (check.value, check.passed) for check in result.checks}
+    assert values["mutations that end neither in a sheet nor in one clear line"] == (0.0, True)
+    assert values["mutations that keep a reader busy for more than 20 s"] == (0.0, True)
+    assert told == ["drawings: 20 mutations from 0: 0 faults", "drawings: 20 mutations from 20: 0 faults"]
+    # a fault is found, and a run that was stopped goes on
+    monkeypatch.setattr(mutations, "read_pattern", lambda file: [][file])
+    monkeypatch.setattr(drawings, "MUTATIONS", 60)
+    again = CaseResult("drawings", "", "", "")
+    drawings._mutated(again, context(tmp_path, told), store)
+    (faults,) = (check for check in again.checks if "clear line" in check.quantity)
+    assert (faults.value, faults.passed) == (20.0, False)
+    assert "TypeError" in str(faults.params["first"])
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no limit of processor time")

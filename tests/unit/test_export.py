@@ -127,3 +127,55 @@ def test_the_command(
     assert main(["export", "out", "sheet.obj", "--state", "99"]) == 2
     assert main(["export", "none.bh", "sheet.obj"]) == 2
     assert math.isclose(read_pattern("sheet.svg").creases[0].curve.length, 60.0, rel_tol=1e-3)
+
+
+def test_fold_frames_have_what_was_computed(path: Any, tmp_path: Path) -> None:
+    data = json.loads(write_state(tmp_path / "sheet.fold", list(path)).read_text())
+    last = data["file_frames"][-1]
+    assert last["bh:energies"]["total"] == pytest.approx(path[-1].energy.total, rel=1e-15)
+    assert (last["bh:step"], last["bh:lambda"]) == (1, 1.0)
+    assert np.array(last["faces_bh:bendingEnergyDensity"]) @ path[-1].mesh.areas == pytest.approx(
+        path[-1].energy.bending
+    )
+    assert all(":" in key or key.startswith(("frame_", "vertices_coords", "edges_foldAngle")) for key in last)
+
+
+def test_fold_edges_are_curves_again(path: Any, tmp_path: Path) -> None:
+    """The flat FOLD file of a mesh of arcs comes back as arcs, not as their chords."""
+    file = write_flat(tmp_path / "flat.fold", path.model.mesh)
+    (crease,) = read_pattern(file).creases
+    chords = path.model.mesh.points[path.model.mesh.crease_edges("crease")][..., :2]
+    straight = np.linalg.norm(chords[:, 1] - chords[:, 0], axis=1).sum()
+    arc = 80.0
+    assert straight < arc - 5e-3
+    # a parabola through both ends and the middle of each of 16 pieces of 5 mm
+    assert crease.curve.length == pytest.approx(arc, abs=1e-3)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".glb"])
+def test_the_flat_sheet_is_the_texture(path: Any, tmp_path: Path, suffix: str) -> None:
+    scene = trimesh.load(
+        write_state(tmp_path / f"sheet{suffix}", list(path)), process=False, maintain_order=True
+    )
+    sheet = scene.geometry["sheet"] if suffix == ".glb" else scene
+    data = (tmp_path / f"sheet{suffix}").read_bytes()
+    if suffix == ".glb":
+        tree = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+        (part,) = (p for m in tree["meshes"] for p in m["primitives"] if p["mode"] == 4)
+        accessor = tree["accessors"][part["attributes"]["TEXCOORD_0"]]
+        assert (accessor["type"], accessor["count"]) == ("VEC2", len(path[-1].points))
+        view = tree["bufferViews"][accessor["bufferView"]]
+        start = 20 + int.from_bytes(data[12:16], "little") + 8 + view["byteOffset"]
+        uv = np.frombuffer(data[start : start + view["byteLength"]], dtype="<f4").reshape(-1, 2).astype(float)
+        uv[:, 1] = 1.0 - uv[:, 1]  # glTF counts v downwards
+    else:
+        text = data.decode().splitlines()
+        uv = np.array([line.split()[1:] for line in text if line.startswith("vt ")], dtype=float)
+        corners = [line.split()[1:] for line in text if line.startswith("f ")]
+        assert all(corner.split("/")[0] == corner.split("/")[1] for row in corners for corner in row)
+        assert np.array_equal(sheet.faces, path[-1].mesh.triangles)
+    flat = path.model.mesh.points[:, :2]
+    size = np.ptp(flat, axis=0).max()
+    assert uv * size + flat.min(axis=0) == pytest.approx(flat, abs=1e-4)
+    assert uv.max() == pytest.approx(1.0)
+    assert uv.min() == pytest.approx(0.0, abs=1e-7)

@@ -13,8 +13,9 @@ import meshio
 import numpy as np
 import pytest
 
-from meshes import FileFormatError, SheetMesh, annulus_sector, full_annulus, strip, structured
-from meshes.io import read_fold, write_fold, write_mesh
+from bh.scene.folding import proposals
+from meshes import CreasePattern, FileFormatError, SheetMesh, annulus_sector, full_annulus, strip, structured
+from meshes.io import FoldedFrame, read_fold, read_pattern, write_fold, write_mesh
 from meshes.io.export import FORMATS
 
 DATA = pathlib.Path(__file__).parents[1] / "data"
@@ -585,6 +586,58 @@ def test_a_rigidly_folded_form() -> None:
             assert height * sign > 0
 
 
+CURVED: dict[str, Any] = {
+    "vertices_coords": [[0, 0], [50, 0], [100, 0], [100, 60], [50, 60], [0, 60]],
+    "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 0], [1, 4]],
+    "edges_assignment": list("BBBBBBM"),
+    "faces_vertices": [[0, 1, 4, 5], [1, 2, 3, 4]],
+}
+
+
+class TestCurvedEdges:
+    """Control points of edges that are Bezier curves: an extension of the format."""
+
+    def pattern(self, tmp_path: pathlib.Path, **keys: Any) -> CreasePattern:
+        (tmp_path / "curved.fold").write_text(json.dumps(CURVED | keys))
+        return read_pattern(tmp_path / "curved.fold")
+
+    @pytest.mark.parametrize("key", ["edges_controlPoints", "edges_bh:controlPoints"])
+    def test_quadratic(self, tmp_path: pathlib.Path, key: str) -> None:
+        (crease,) = self.pattern(tmp_path, **{key: [None] * 6 + [[[70, 30]]]}).creases
+        # a parabola of height h = 10 over the chord c = 60
+        h, c = 10.0, 60.0
+        root = math.hypot(c, 4.0 * h)
+        length = 0.5 * root + c**2 / (8.0 * h) * math.log((4.0 * h + root) / c)
+        assert crease.curve.length == pytest.approx(length, rel=2e-4)
+        assert crease.curve.point(np.array([0.5]))[0] == pytest.approx([60.0, 30.0], abs=0.01)
+
+    def test_cubic_in_another_plane(self, tmp_path: pathlib.Path) -> None:
+        points = [[x, 0, y] for x, y in CURVED["vertices_coords"]]
+        bends = [None] * 6 + [[[70, 0, 20], [30, 0, 40]]]
+        pattern = self.pattern(tmp_path, vertices_coords=points, edges_controlPoints=bends)
+        x, y = pattern.creases[0].curve.point(np.linspace(0.0, 1.0, 101)).T
+        assert np.ptp(x) == pytest.approx(11.547, abs=0.02)  # 60 s (1 - s) (1 - 2 s) to both sides
+        assert np.ptp(y) == pytest.approx(60.0)
+
+    def test_faces_say_that_they_have_chords(self, tmp_path: pathlib.Path) -> None:
+        self.pattern(tmp_path, edges_controlPoints=[None] * 6 + [[[70, 30]]])
+        (remark,) = read_fold(tmp_path / "curved.fold").remarks
+        assert "1 edge of the file drawn as curves" in remark
+
+    def test_bh_fold_meshes_the_curves(self, tmp_path: pathlib.Path) -> None:
+        self.pattern(tmp_path, edges_controlPoints=[None] * 6 + [[[70, 30]]])
+        assert "faces" not in proposals(tmp_path / "curved.fold")[0].mesh
+        self.pattern(tmp_path, edges_controlPoints=[None] * 7)
+        assert "faces" in proposals(tmp_path / "curved.fold")[0].mesh
+
+    @pytest.mark.parametrize(
+        "bends", [[None] * 6, [[[1, 2]] * 3] * 7, [[["x", 2]]] * 7, [3] * 7, "x", [[[1]]] * 7]
+    )
+    def test_what_cannot_be(self, tmp_path: pathlib.Path, bends: Any) -> None:
+        with pytest.raises(FileFormatError, match="controlPoints"):
+            self.pattern(tmp_path, edges_controlPoints=bends)
+
+
 class TestWriteFold:
     def mesh(self) -> SheetMesh:
         return structured(annulus_sector([60, 80], 10, 1.2, ["mountain", "valley"]), along=5, rows=2)
@@ -651,6 +704,13 @@ class TestWriteFold:
         write_fold(tmp_path / "out.fold", folded)
         assert json.loads((tmp_path / "out.fold").read_text())["frame_classes"] == ["foldedForm"]
         np.testing.assert_array_equal(read_fold(tmp_path / "out.fold").points, folded.points)
+
+    def test_keys_of_others_need_a_namespace_and_the_right_length(self, tmp_path: pathlib.Path) -> None:
+        mesh = self.mesh()
+        for key, value in (("energy", 1.0), ("faces_bh:density", [1.0]), ("edges_bh:angle", "x")):
+            frame = FoldedFrame("bent", mesh.points, None, {key: value})
+            with pytest.raises(FileFormatError, match=r"namespace|give shape|not numbers"):
+                write_fold(tmp_path / "out.fold", mesh, frames=[frame])
 
     def test_wrong_states(self, tmp_path: pathlib.Path) -> None:
         mesh = self.mesh()

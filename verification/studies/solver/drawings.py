@@ -1,8 +1,9 @@
 """Case `drawings`: every drawing is folded with one command, at its right size, within a minute.
 
-The project's own drawings (`tests/data`) are checked; with BH_DRAWINGS=FOLDER in the environment every drawing below
-that folder is folded too and reported, so that a gallery can be counted. A row of figures is kept in
-`drawings_runs.json` beside the results as each is done; a run that was stopped goes on.
+The project's own drawings (`tests/data`) are checked, and what the readers make of mutations of them by a seed; with
+BH_DRAWINGS=FOLDER in the environment every drawing below that folder is folded too and reported, so that a gallery can
+be counted. A row of figures is kept in `drawings_runs.json` beside the results as each is done; a run that was stopped
+goes on.
 """
 
 from __future__ import annotations
@@ -19,10 +20,13 @@ from meshes.io.drawing import PATTERNS
 from verification.framework.checks import CaseResult, Context, Cost
 from verification.framework.store import Store
 from verification.studies.solver.drawings_folding import LIMIT, Row, fold_apart
+from verification.studies.solver.drawings_mutations import mutant, read, seeds
 
 CASE, RUNS, FOLDER = "drawings", "drawings_runs.json", "BH_DRAWINGS"
 OWN = Path(__file__).parents[3] / "tests" / "data"
 QUICK = 2
+MUTATIONS, QUICK_MUTATIONS, BLOCK = 5000, 40, 250
+SLOW = 20.0  # s of processor time that a reader may take for a mutation
 WHERE = "the project's own", FOLDER
 PX = 25.4 / 96.0  # mm
 # longer and shorter side of the sheets, mm, as they were written (tests/data/README.md)
@@ -60,10 +64,48 @@ def run(context: Context) -> CaseResult:
     folders = [(WHERE[0], OWN, own[:QUICK] if context.quick else own)]
     if given := os.environ.get(FOLDER, "").strip():
         folders.append((WHERE[1], Path(given), _given(Path(given))))
+    _mutated(result, context, store)
     for where, folder, files in folders:
         rows = [_kept(context, store, where, folder, file) for file in files]
         _report(result, where, rows)
     return result
+
+
+def _mutated(result: CaseResult, context: Context, store: Store) -> None:
+    """Readers make of every mutation of the own drawings a sheet or one clear line."""
+    wanted = QUICK_MUTATIONS if context.quick else MUTATIONS
+    files: list[tuple[str, bytes]] = []
+    for first in range(0, wanted, BLOCK):
+        key = f"mutations from {first}"
+        if key in store.runs:
+            continue
+        if not files:
+            with tempfile.TemporaryDirectory() as scratch:
+                files = seeds(OWN, Path(scratch))
+        rows = [(number, read(*mutant(files, number))) for number in range(first, min(first + BLOCK, wanted))]
+        faults = [f"{number} ({row.file}): {row.fault}" for number, row in rows if row.fault]
+        kept = {
+            "count": len(rows),
+            "sheets": sum(row.sheet for _, row in rows),
+            "slow": [f"{number} ({row.file})" for number, row in rows if row.seconds > SLOW],
+            "longest": max(row.seconds for _, row in rows),
+            "faults": faults,
+        }
+        context.tell(f"{CASE}: {len(rows)} {key}: {len(faults)} faults")
+        store.keep(key, kept)
+    blocks = [store.runs[f"mutations from {first}"] for first in range(0, wanted, BLOCK)]
+    counted = {"mutations": sum(block["count"] for block in blocks)}
+    result.check("mutations that are read as a sheet", sum(b["sheets"] for b in blocks), params=counted)
+    for key, words in (
+        ("faults", "mutations that end neither in a sheet nor in one clear line"),
+        ("slow", f"mutations that keep a reader busy for more than {SLOW:g} s"),
+    ):
+        found = [line for block in blocks for line in block[key]]
+        params = counted | ({"first": found[0]} if found else {})
+        result.check(words, len(found), reference=0.0, tolerance=0.5, params=params)
+    result.check(
+        "longest processor time of a mutation", max(b["longest"] for b in blocks), unit="s", params=counted
+    )
 
 
 def _given(folder: Path) -> list[Path]:
