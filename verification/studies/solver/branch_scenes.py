@@ -59,8 +59,8 @@ def drawn(number: int, seed: int = SEED) -> Drawn:
     if spring:
         for crease in mesh.creases:
             model = model.crease(crease, Lstar=lstar)
-    for index in range(steps):
-        step, what = _step(model, random, spring, held, index)
+    for _ in range(steps):
+        step, what = _step(model, random, spring, held, _folded(model))
         model = model.step(*step.actuations, until=step.until)
         told.append(what)
     return Drawn("; ".join(told), model)
@@ -97,7 +97,7 @@ def _sheet(kind: str, random: np.random.Generator) -> tuple[meshes.SheetMesh, st
 
 
 def _step(
-    model: Model, random: np.random.Generator, spring: bool, held: bool, index: int
+    model: Model, random: np.random.Generator, spring: bool, held: bool, folded: bool
 ) -> tuple[Step, str]:
     """A step, and what it is in words; a free sheet is only folded."""
     ways: list[Callable[[], tuple[Step, str]]] = [lambda: _fold(model, random, spring)]
@@ -105,9 +105,16 @@ def _step(
         ways.append(lambda: _couple(model, random))
     if held:
         ways += [lambda: _moved(model, random), lambda: _pulled(model, random)]
-    if index and not spring:
+    if folded and not spring:
         ways.append(lambda: _pinched(model, random))
     return ways[int(random.integers(len(ways)))]()
+
+
+def _folded(model: Model) -> bool:
+    """Whether the first crease is held at a fold that a pinch can sharpen."""
+    folds = [item for step in model.steps for item in step.actuations if isinstance(item, Fold)]
+    angles = [item.by for item in folds if item.crease in ("all", model.mesh.creases[0])]
+    return bool(angles) and isinstance(angles[-1], float) and 0.0 < angles[-1] < 1.0
 
 
 def _fold(model: Model, random: np.random.Generator, spring: bool) -> tuple[Step, str]:
@@ -124,18 +131,18 @@ def _fold(model: Model, random: np.random.Generator, spring: bool) -> tuple[Step
 
 
 def _couple(model: Model, random: np.random.Generator) -> tuple[Step, str]:
-    size = 4000.0 * model.sheet.t**3 / 12.0 * float(10.0 ** random.uniform(-3.5, -1.5))
+    size = 4000.0 * model.sheet.t**3 / 12.0 * float(10.0 ** random.uniform(-3.0, -0.7))
     return Step((Moment("all", to=size),)), f"couple {size:.2g} N"
 
 
 def _moved(model: Model, random: np.random.Generator) -> tuple[Step, str]:
-    by = model.mesh.size * float(random.uniform(-0.12, 0.12))
+    by = model.mesh.size * float(random.uniform(-0.3, 0.3))
     return Step((Displace("corner:outer-end", (0.0, 0.0, 1.0), by),)), f"corner by {by:.1f} mm"
 
 
 def _pulled(model: Model, random: np.random.Generator) -> tuple[Step, str]:
     size = model.mesh.size
-    force = 4000.0 * model.sheet.t**3 / size * float(10.0 ** random.uniform(-2.0, 0.0))
+    force = 4000.0 * model.sheet.t**3 / size * float(10.0 ** random.uniform(-1.5, 1.0))
     direction = random.normal(size=3)
     total = tuple(float(x) for x in force * direction / np.linalg.norm(direction))
     return Step((Force("corner:outer-end", total),)), f"pull of {force:.2g} N"
@@ -144,7 +151,7 @@ def _pulled(model: Model, random: np.random.Generator) -> tuple[Step, str]:
 def _pinched(model: Model, random: np.random.Generator) -> tuple[Step, str]:
     at = float(random.uniform(0.2, 0.8))
     fold = math.radians(float(random.uniform(60.0, 140.0)))
-    crease = model.mesh.creases[0]
+    crease = model.mesh.creases[0]  # folded by less than a radian
     return Step(
         (Pinch(crease, at=at, by=fold, length=0.4 * _length(model, crease)),)
     ), f"pinch at {at:.2f} to {math.degrees(fold):.0f} degrees"
