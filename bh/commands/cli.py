@@ -162,7 +162,7 @@ def run(
     pictures: Annotated[bool, typer.Option("--pictures", help="Draw the folded sheet (PNG).")] = False,
     vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
     neighbours: Annotated[
-        bool, typer.Option("--neighbours", help="At each step's end look for other stable states beside it.")
+        bool, typer.Option("--neighbours", help="Look beside the end of every step.")
     ] = False,
     estimate: Annotated[
         bool, typer.Option("--estimate/--no-estimate", help="Of a given mesh: also solve a coarser one.")

@@ -22,6 +22,7 @@ from bh.solvers.system import System
 Array = NDArray[np.float64]
 PUSHES = (0.3, 0.8)  # along the softest mode, in parts of the largest unknown; from 0.1 all came back
 SOFT = 1e-3  # a mode whose stiffness is less than this part of the next one's may lead anywhere
+ITERATIONS = 2  # of inverse iteration: a mode as soft as that stands out at once, and every step pays for it
 OTHER = 1e-5  # difference of energy, in parts of it, from which two states are not one
 DOWNHILL = 40  # steps at most
 
@@ -74,7 +75,7 @@ def nearly_neutral(system: System, here: Point) -> bool:
         here: a state in equilibrium.
     """
     matrix = system.tangent(here.q, here.lam, here.forces).matrix
-    return neutral_mode(matrix, system.primal, SOFT) is not None
+    return neutral_mode(matrix, system.primal, SOFT, ITERATIONS) is not None
 
 
 def neighbour(
