@@ -161,9 +161,7 @@ def run(
     ] = False,
     pictures: Annotated[bool, typer.Option("--pictures", help="Draw the folded sheet (PNG).")] = False,
     vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
-    neighbours: Annotated[
-        bool, typer.Option("--neighbours", help="Look beside the end of every step.")
-    ] = False,
+    neighbours: Annotated[bool, typer.Option("--neighbours", help="Look beside each step's end.")] = False,
     estimate: Annotated[
         bool, typer.Option("--estimate/--no-estimate", help="Of a given mesh: also solve a coarser one.")
     ] = True,
