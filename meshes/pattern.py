@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -101,6 +102,17 @@ class CreasePattern:
     def closed(self) -> bool:
         """True where the rails close on themselves (a full annulus)."""
         return bool(self.rails) and self.rails[0].closed
+
+    @cached_property
+    def panel_sizes(self) -> tuple[Array, Array]:
+        """Mean length along and height across of every panel between two rails, mm; many meshes are tried on them."""
+        u = np.linspace(0.0, 1.0, 65)
+        lengths = np.array([rail.length for rail in self.rails])
+        heights = [
+            float(np.linalg.norm(b.point(u) - a.point(u), axis=1).mean())
+            for a, b in zip(self.rails[:-1], self.rails[1:], strict=True)
+        ]
+        return 0.5 * (lengths[:-1] + lengths[1:]), np.array(heights)
 
     @property
     def folds(self) -> dict[str, FoldKind]:

@@ -62,7 +62,7 @@ def structured(
         raise MeshError(f"mesh kind '{kind}' is not known; use one of {', '.join(get_args(Kind))}")
     if not 1 <= rows <= 1e5 or int(rows) != rows:
         raise MeshError(f"rows = {rows} cannot be; use a whole number from 1")
-    widths, heights = _panel_sizes(pattern)
+    widths, heights = pattern.panel_sizes
     least = 3 if pattern.closed else 1
     if (aspect_ratio is None) == (along is None):
         raise MeshError("give either aspect_ratio or along (the number of cells along the crease)")
@@ -137,17 +137,6 @@ def _tapered(pattern: CreasePattern, along: int, rows: int, kind: Kind, alpha: f
 
 
 Lines = list[tuple[Array, Array]]  # of each node line: points (k, 2) and parameters (k,)
-
-
-def _panel_sizes(pattern: CreasePattern) -> tuple[Array, Array]:
-    """Mean length along and height across of every panel, mm."""
-    u = np.linspace(0.0, 1.0, 65)
-    lengths = np.array([rail.length for rail in pattern.rails])
-    heights = [
-        float(np.linalg.norm(b.point(u) - a.point(u), axis=1).mean())
-        for a, b in zip(pattern.rails[:-1], pattern.rails[1:], strict=True)
-    ]
-    return 0.5 * (lengths[:-1] + lengths[1:]), np.array(heights)
 
 
 def _node_lines(pattern: CreasePattern, along: int, rows: int, *, staggered: bool) -> tuple[Lines, list[int]]:

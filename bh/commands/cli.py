@@ -161,6 +161,7 @@ def run(
     ] = False,
     pictures: Annotated[bool, typer.Option("--pictures", help="Draw the folded sheet (PNG).")] = False,
     vtu: Annotated[bool, typer.Option("--vtu", help="Write all states for ParaView (PVD, VTU).")] = False,
+    neighbours: Annotated[bool, typer.Option("--neighbours", help="Look beside each step's end.")] = False,
     estimate: Annotated[
         bool, typer.Option("--estimate/--no-estimate", help="Of a given mesh: also solve a coarser one.")
     ] = True,
@@ -191,7 +192,13 @@ def run(
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
         path, names, before, contact = solve(
-            loaded, folder, resume=resume, force=force, progress=not quiet, estimate=estimate
+            loaded,
+            folder,
+            resume=resume,
+            force=force,
+            progress=not quiet,
+            estimate=estimate,
+            neighbours=neighbours or None,
         )
     except KeyboardInterrupt:
         sets = [word for change in asked for word in ("--set", change)]

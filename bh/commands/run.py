@@ -60,6 +60,7 @@ def solve(
     progress: bool | ProgressMeter = False,
     estimate: bool = True,
     strategy: Strategy | None = None,
+    neighbours: bool | None = None,
 ) -> Solved:
     """Trace a scene into a folder, which is made if need be.
 
@@ -73,6 +74,7 @@ def solve(
         progress: as for `bh.trace`.
         estimate: solve a coarser mesh, too, where the mesh was given, for an estimate of the error.
         strategy: of the increments; None for the scene's.
+        neighbours: as for `bh.trace`.
 
     Raises:
         InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
@@ -87,7 +89,14 @@ def solve(
         with only_writer(folder):
             ours = True
             return _solved(
-                scene, folder, names, resume=resume, progress=progress, estimate=estimate, strategy=strategy
+                scene,
+                folder,
+                names,
+                resume=resume,
+                progress=progress,
+                estimate=estimate,
+                strategy=strategy,
+                neighbours=neighbours,
             )
     except (InputError, KeyboardInterrupt):
         if ours and not resume and not holds_states(folder):
@@ -105,6 +114,7 @@ def _solved(
     progress: bool | ProgressMeter,
     estimate: bool,
     strategy: Strategy | None,
+    neighbours: bool | None,
 ) -> Solved:
     """What `solve` gives, of a folder that nobody else writes."""
     file = folder / names[0]
@@ -126,6 +136,7 @@ def _solved(
         symmetry=scene.symmetry,
         strategy=strategy or scene.strategy,
         estimate=estimate and scene.accuracy is None,
+        neighbours=neighbours,
         warn=False,  # the command says it in a line of its own
     )
     _keep_scene(scene, file)

@@ -176,6 +176,9 @@ class Path:
         if arc:
             found.append(f"{count(len(arc), 'state')} found by arc length")
         found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
+        found += [
+            f"step {n + 1}: {end.reason}" for n, end in enumerate(self.steps) if end.reached and end.reason
+        ]
         if self.records:
             strain = float(np.abs(self[-1].strain).max())
             if strain > LARGE_STRAIN:

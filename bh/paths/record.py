@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StepOutcome:
-    """How one step ended: "reached", or why not, with one line of reason."""
+    """How one step ended: "reached", with a clause on what lies beside it, or why not, with one line of reason."""
 
     outcome: Outcome
     reason: str = ""

@@ -24,6 +24,8 @@ from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter, meter
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.automatic import Automatic
+from bh.solvers.neighbours import look_around
+from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import LOAD, Point, point
 from bh.solvers.walk import Strategy, Walk, walk
@@ -34,8 +36,10 @@ if TYPE_CHECKING:
     from bh.formulations.symmetry_reduction import Half
     from bh.loading.symmetry import Plane
 
+HARD = 10  # iterations of an increment that found its state with difficulty
 
-def follow(
+
+def follow(  # noqa: PLR0913 - the options of `bh.trace`, all by name
     model: Model,
     *,
     symmetry: Plane | None = None,
@@ -45,6 +49,7 @@ def follow(
     resume: bool = False,
     after: Path | None = None,
     coarser: Path | None = None,
+    neighbours: bool | None = None,
 ) -> Path:
     """Follow the equilibrium of a model on its own mesh through all its steps; arguments as of `bh.trace`.
 
@@ -57,6 +62,7 @@ def follow(
         resume: go on from what the file has.
         after: path whose end this one begins at.
         coarser: path of the same sheet and formulation on a coarser mesh (`bh.solving.coarser`).
+        neighbours: whether to look for other stable states at the end of steps; None where there is reason to.
 
     Returns:
         the path up to where it got.
@@ -69,12 +75,17 @@ def follow(
     report = meter(progress)
     with nullcontext() if file is None else only_writer(FilePath(file)):
         path, target = _opened(model, symmetry, file, resume, after)
-        _walk(path, target, strategy, report, None if coarser is None else Coarser(coarser))
+        _walk(path, target, strategy, report, None if coarser is None else Coarser(coarser), neighbours)
     return path
 
 
 def _walk(
-    path: Path, target: PathFile | None, strategy: Strategy, report: ProgressMeter, coarser: Coarser | None
+    path: Path,
+    target: PathFile | None,
+    strategy: Strategy,
+    report: ProgressMeter,
+    coarser: Coarser | None,
+    neighbours: bool | None,
 ) -> None:
     """Solve the steps that are left."""
     model = path.model
@@ -85,6 +96,8 @@ def _walk(
                 end = _run_step(path, step, way, report, target)
                 if end.reached and step == len(model.steps) - 1:
                     end = _stable_end(path, strategy)
+                if end.reached and neighbours is not False:
+                    end = StepOutcome(end.outcome, _beside(path, step, bool(neighbours)))
             path.steps.append(end)
             if target is not None:
                 target.finish_step(step, *astuple(end))
@@ -166,6 +179,19 @@ def _run_step(
         report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
         began = time.perf_counter()
     return StepOutcome(Outcome.REACHED)
+
+
+def _beside(path: Path, step: int, asked: bool) -> str:
+    """A clause on another stable state beside the end of a step, or an empty string.
+
+    It is looked for where it is `asked`, where an increment of the path was cut or took many iterations, where it has
+    jumped or passed a critical point, and where a mode hardly resists; the look's iterations are not the path's.
+    """
+    half, last = path.half(step), path.records[-1]
+    system, record = (path.system(step), last) if half is None else (half.system, last.of_half(half))
+    doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in path.records)
+    here = point(system, record.q, record.lam, negative=record.negative)
+    return look_around(system, here, doubtful, Newton())
 
 
 def _stable_end(path: Path, strategy: Strategy) -> StepOutcome:

@@ -31,6 +31,7 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
     estimate: bool = False,
     after: Path | None = None,
     warn: bool = True,
+    neighbours: bool | None = None,
 ) -> Path:
     """Follow the equilibrium of `model` through all its steps.
 
@@ -51,6 +52,10 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
             cost; where it cannot be had, `path.estimate_reason` says why.
         after: a solved path of the same model with fewer steps, whose states this one begins with.
         warn: give a `bh.NotReachedWarning` where the path ends early; False where the caller looks at its outcome.
+
+        neighbours: at the end of each step look for other stable states beside it, such as one of lower energy, and
+            say so in `path.remarks`; None looks where an increment was cut, a branch was left or a mode hardly
+            resists. With an accuracy every mesh is solved as by None.
 
     Returns:
         the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
@@ -82,6 +87,7 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
                 file=file,
                 resume=resume,
                 after=after,
+                neighbours=neighbours,
             )
         if estimate and path.accuracy is None:
             from bh.solving.given_mesh import add_estimate

@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 from xml.etree.ElementTree import ParseError
 
@@ -74,8 +75,7 @@ def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
         colour, unknown = _colour(shape)
         if (colour is None and not unknown) or _hidden(shape):
             continue
-        whole = _placed(se, shape)
-        parts = list(_parts(se, whole))
+        parts = list(_segments(se, shape))
         number += bool(parts)
         for part, segments in parts:
             name = f"'{shape.id}'" if shape.id else f"line {number} ({type(shape).__name__.lower()})"
@@ -92,6 +92,17 @@ def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
                 f"id:{shape.id}" if shape.id else "",
             )
             yield from _clipped(stroke, clips)
+
+
+def _segments(se: Any, shape: Any) -> Iterator[tuple[int, list[Any]]]:
+    """Numbers and segments of the connected parts of a shape; a line is one, without the detour by a path."""
+    if not isinstance(shape, se.SimpleLine):
+        yield from _parts(se, _placed(se, shape))
+        return
+    m = shape.transform
+    ends = [m.point_in_matrix_space(se.Point(*end)) for end in ((shape.x1, shape.y1), (shape.x2, shape.y2))]
+    if ends[0] != ends[1]:
+        yield 0, [se.Line(*ends)]
 
 
 def _placed(se: Any, shape: Any) -> Any:
@@ -178,13 +189,18 @@ def _hidden(shape: Any) -> bool:
 
 def _colour(shape: Any) -> tuple[Colour | None, str]:
     """The colour of a line, None where it has no line; and what its colour says where that is not understood."""
-    from tinycss2 import color5
-
     word = str(shape.values.get("stroke") or "none").replace("!important", "").strip()
     if word.lower() in ("none", "transparent"):
         return None, ""
     if word.lower() == "currentcolor":
         word = str(shape.values.get("color") or "black")
+    return _colour_of(word)
+
+
+@lru_cache(maxsize=1000)  # drawings have few colours and many lines
+def _colour_of(word: str) -> tuple[Colour | None, str]:
+    from tinycss2 import color5
+
     found = color5.parse_color(word)
     try:
         red, green, blue, alpha = found.to("srgb")
@@ -218,6 +234,10 @@ def _dash(shape: Any) -> Dash:
 
 def _sampler(se: Any, segments: list[Any]) -> Any:
     curved = (se.CubicBezier, se.QuadraticBezier, se.Arc)
+    if not any(isinstance(segment, curved) for segment in segments):
+        check_limit("vertices", len(segments), "a line of this drawing", FileFormatError)
+        ends = [segments[0].start, *(segment.end for segment in segments)]
+        return always(np.array([[end.x, end.y] for end in ends]) * (1.0, -1.0))
 
     def sample(tolerance: float) -> Array:
         points = [np.array([[segments[0].start.x, segments[0].start.y]])]

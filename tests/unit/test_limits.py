@@ -6,6 +6,7 @@ import json
 import os
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import bh
 import meshes
 from meshes.choices import first_mesh
 from meshes.errors import InputError
-from meshes.io import read_fold, read_pattern
+from meshes.io import read_fold, read_pattern, svg
 from meshes.limits import Limits, limits
 
 REST = """
@@ -246,3 +247,31 @@ def test_scribbles_are_refused_before_anything_is_made_of_them(
         read_pattern(drawing)
     with pytest.raises(InputError, match="crossings, more than 5,000"):
         read_fold(frame)
+
+
+def test_lines_of_a_drawing_need_no_path_each(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two thousand lines of one colour: the reader makes no path of them, and looks at the colour once."""
+    import tinycss2.color5
+
+    lines = "".join(
+        f'<line x1="1" y1="{k / 21}" x2="99" y2="{k / 21}" stroke="red"/>' for k in range(1, 2_000)
+    )
+    (tmp_path / "lines.svg").write_text(PAGE.format(lines), encoding="utf-8")
+    placed = Mock(wraps=svg._placed)
+    colours = Mock(wraps=tinycss2.color5.parse_color)
+    monkeypatch.setattr(svg, "_placed", placed)
+    monkeypatch.setattr(tinycss2.color5, "parse_color", colours)
+    svg._colour_of.cache_clear()
+    strokes = svg.read_svg(tmp_path / "lines.svg").strokes
+    assert len(strokes) == 2_000
+    assert strokes[1].sample(1.0) == pytest.approx(strokes[1].sample(1e-9))
+    assert placed.call_count < 10
+    assert colours.call_count < 10
+
+
+def test_panels_are_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many meshes are tried on a pattern."""
+    pattern = meshes.annulus_sector([40.0, 50.0], 10.0, 1.0)
+    first_mesh(pattern)
+    monkeypatch.setattr(type(pattern.rails[0]), "length", property(lambda _: 1 / 0))
+    assert len(pattern.panel_sizes[0]) == 3

@@ -74,6 +74,7 @@ STUDIES = (
     Study("honesty", "solver", long=True),
     Study("campaign", "solver", long=True),
     Study("attack", "solver", long=True),
+    Study("branches", "solver", long=True),
     Study("drawings", "solver", long=True),
     Study("gradients", "solver"),
     Study("top_down", "4"),

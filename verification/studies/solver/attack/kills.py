@@ -214,6 +214,15 @@ def _figures() -> dict[str, str]:
         return case_bits(Path(place) / "results" / "checks.json")
 
 
+@cache
+def _cases_s() -> float:
+    """Time, s, in which verify and report are disturbed: a third more than the first case needs."""
+    with TemporaryDirectory() as place:
+        began = time.monotonic()
+        play((*BH, "verify", CASES[0], "--quick", "--results", "results"), Path(place))
+        return 1.3 * (time.monotonic() - began)
+
+
 def _cases(words: Sequence[str], send: signal.Signals, folder: Path, random: np.random.Generator) -> Found:
     """A chain of signals; finished cases are stored, whole, and have the same figures."""
     bits = _figures()
@@ -223,7 +232,7 @@ def _cases(words: Sequence[str], send: signal.Signals, folder: Path, random: np.
     for _ in range(CHAIN):
         before = case_bits(file) if file.exists() else {}
         ended = play(
-            (*BH, *words), folder, send=send, after_s=random.uniform(least, max(MOST_S, 1.5 * least))
+            (*BH, *words), folder, send=send, after_s=random.uniform(least, max(_cases_s(), 1.5 * least))
         )
         if ended.code in (0, 1):
             continue
