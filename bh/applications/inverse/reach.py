@@ -1,15 +1,15 @@
 """Problem C in practice: a crease that ends at a point, found in a library of designs and checked by simulation.
 
 Genetic algorithms draw their designs anew for every target. One library of random designs serves all: its ends are in a
-k-d tree, the nearest ones are polished by least squares, and the answer is simulated whole. What the simulation misses
-is added to the aim and the design polished again, so that the distance that counts is that of the whole strip, with
-its error bar where the model has one.
+k-d tree, the nearest ones are polished together, and the shortest that ends there is simulated whole. What the simulation
+misses is added to the aim and the design polished again, so that the distance that counts is that of the whole strip,
+with its error bar where the model has one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from bh.applications.inverse.descent import descend
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.models import Name, model
-from bh.applications.inverse.optimisers import Found, polish
 from bh.applications.inverse.problems import Design, ReachPoint
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule, Swept
@@ -28,17 +28,22 @@ from bh.errors import InputError
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-REACH = {
-    1: 6.0,
-    2: 20.0,
-    3: 40.0,
-}  # mm from a random design of so many segments; one segment has two variables only
+SIZES = {1: 4_000, 2: 20_000}  # random designs of so many segments, which fill their few variables as densely
+ALIKE = 1e-3  # curvature over its largest, and mm, by which designs differ that are not the same one
 SAME = 0.1  # mm between chain and simulation, below which aiming again changes nothing
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """Random designs of n segments that their rules allow, and where they end. The seed makes them reproducible."""
+    """Random designs of n segments that their rules allow, and where they end. The seed makes them reproducible.
+
+    Attributes:
+        surrogate: the model.
+        n: segments.
+        size: random designs.
+        seed: of them.
+        rules: what is forbidden.
+    """
 
     surrogate: Forward
     n: int
@@ -66,21 +71,19 @@ class Library:
         """The problem of a target (3,), mm."""
         return ReachPoint(self.surrogate, self.n, self.rules, target)
 
-    def nearest(self, target: Array, count: int) -> Iterator[tuple[Array, Bools]]:
-        """Candidates in the order of their distance from a point, as far as they are near enough to be polished.
+    def nearest(self, target: Array, count: int) -> tuple[Array, Bools]:
+        """Candidates in the order of their distance from a point.
 
         Args:
             target: (3,), mm.
             count: candidates at most.
 
         Returns:
-            variables (2 n,) and pinches (n,) of one candidate after another.
+            variables (c, 2 n) and pinches (c, n) of the candidates.
         """
         x, on, _ = self.designs
-        near = self.tree.query(target, k=min(count, len(x)), distance_upper_bound=REACH[min(self.n, 3)])[1]
-        for i in np.atleast_1d(near):
-            if i < len(x):
-                yield x[i], on[i]
+        near = np.atleast_1d(self.tree.query(target, k=min(count, len(x)))[1])
+        return x[near], on[near]
 
 
 @cache
@@ -92,7 +95,7 @@ def library(n: int, seed: int = 1, name: Name = "converged") -> Library:
         seed: of its random designs.
         name: of the model.
     """
-    return Library(model(name), n, seed=seed)
+    return Library(model(name), n, SIZES.get(n, 50_000), seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +145,8 @@ class Reach:
     Attributes:
         most: segments.
         tolerance: of the end, mm.
-        candidates: designs polished for each number of segments.
+        candidates: designs polished for each number of segments; the shortest crease of those that end near enough
+            is tried first.
         verify: simulate the strip, and aim again up to `rounds` times where that misses by more than `aim`
             (mm), or with its error bar by more than the tolerance.
         clear: prefer designs whose strips clear themselves in space; of the others only where no candidate
@@ -152,7 +156,7 @@ class Reach:
 
     most: int = 4
     tolerance: float = 1.0
-    candidates: int = 24
+    candidates: int = 48
     verify: bool = True
     rounds: int = 3
     aim: float = 0.5
@@ -174,17 +178,14 @@ class Reach:
         nearest = math.inf
         for n in range(1, self.most + 1):
             book = self.book(n)
-            for found in self._candidates(book, point):
-                nearest = min(nearest, found.value)
-                if found.value > self.tolerance:
-                    continue
-                design = book.problem(point).design(found.x, found.on)
-                clear = not self.clear or not Swept().meets(
-                    book.surrogate, design.k0, design.length, design.pinched
-                )
+            x, on, near = self._candidates(book, point)
+            nearest = min(nearest, near)
+            for candidate in zip(x, on, strict=True):
+                design = book.problem(point).design(*candidate)
+                clear = not self.clear or not Swept().meets(book.surrogate, *_arrays(design))
                 if not clear and second is not None:
                     continue
-                reached = self._verified(book, point, found, clear)
+                reached = self._verified(book, point, candidate, clear)
                 if reached is not None and clear:
                     return reached
                 second = second or reached
@@ -205,24 +206,32 @@ class Reach:
             n, self.seed, self.model
         )
 
-    def _candidates(self, book: Library, point: Array) -> Iterator[Found]:
+    def _candidates(self, book: Library, point: Array) -> tuple[Array, Bools, float]:
+        """Variables (c, 2 n) and pinches (c, n) of polished designs that are near enough, and the nearest distance, mm."""
         problem = book.problem(point)
-        for x, on in book.nearest(point, self.candidates):
-            found = polish(problem, x, on)
-            if found.allowed:
-                yield found
+        x, on = book.nearest(point, self.candidates)
+        x = descend(problem, x, on)
+        missed, broken = problem.evaluate(x, on)
+        missed = np.where(broken <= 0.0, missed, math.inf)
+        bars = book.surrogate.bars(*problem.split(x), on)[0]
+        good = np.flatnonzero((missed <= self.tolerance) & (bars <= self.tolerance))
+        good = good[np.argsort(problem.split(x[good])[1].sum(axis=1), kind="stable")]
+        x, on = x[good], on[good]
+        once = np.array([not _alike(x[i], on[i], x[:i], on[:i]) for i in range(len(x))], dtype=bool)
+        return x[once], on[once], float(missed.min())
 
-    def _verified(self, book: Library, point: Array, found: Found, clear: bool) -> Reached | None:
+    def _verified(
+        self, book: Library, point: Array, candidate: tuple[Array, Bools], clear: bool
+    ) -> Reached | None:
         """The simulated design, aimed again at what its simulation missed; None where it does not come near enough."""
         problem = book.problem(point)
+        x, on = candidate
         best: Reached | None = None
         for count in range(1, self.rounds + 1):
-            design = problem.design(found.x, found.on)
-            end = problem.end(found.x, found.on)
+            design = problem.design(x, on)
+            end = problem.end(x, on)
             if not self.verify:
                 return Reached(design, point, end, None, clear, 0)
-            if book.surrogate.bars(design.k0, design.length, design.pinched)[0] > self.tolerance:
-                break  # whatever its simulation says
             try:
                 landing = book.surrogate.land(*design.lists())
             except InputError:  # a flat strip that meets itself cannot be cut: another candidate
@@ -237,7 +246,17 @@ class Reach:
             ):  # the chain was right: its nearest design is this one
                 break
             problem = replace(problem, target=problem.target + point - landing.end)
-            found = polish(problem, found.x, found.on)
-            if not found.allowed:
+            x = descend(problem, x[None], on[None])[0]
+            if problem.violation(x, on) > 0.0:
                 break
         return best if best is not None and best.missed_at_most <= self.tolerance else None
+
+
+def _arrays(design: Design) -> tuple[Array, Array, Bools]:
+    return design.k0, design.length, design.pinched
+
+
+def _alike(x: Array, on: Bools, others: Array, switches: Bools) -> bool:
+    """Whether a candidate (2 n,) is one of others (m, 2 n), but for less than `ALIKE`."""
+    same = (np.abs(others - x) < ALIKE).all(axis=1) & (switches == on).all(axis=1)
+    return bool(same.any())
