@@ -195,11 +195,15 @@ class Landing:
         strip: that was simulated, on one mesh.
         end: (3,) of the crease in the frame at its start, mm; of `strip`, or in the limit of fine meshes.
         bar: error bar of `end`, mm; 0 where there is none.
+        frame: (3, 3) of the end in that of the start, as `end`.
+        turn: error bar of `frame`, rad.
     """
 
     strip: Simulated
     end: Array
     bar: float
+    frame: Array
+    turn: float
 
 
 class SegmentValues(TypedDict):

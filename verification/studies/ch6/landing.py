@@ -1,8 +1,8 @@
 """Case `landing`: designs by the model that converges, judged by the shell, which none of them was made with.
 
-Most of an hour of processor time, in ten blocks, each of which is drawn at random: every segment, target and strip is stored
-when it is done, and a run goes on from what another one left in the same folder. So the first blocks are a part of the case
-that stands for all of it (`part`).
+Most of an hour of processor time, in ten blocks, each of which is drawn at random: every segment, target and strip is
+stored when it is done, and a run goes on from what another one left in the same folder. So the first blocks are a part
+of the case that stands for all of it (`part`).
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class LandTask:
         assert found.landing is not None
         return {
             "missed": found.missed_simulated,
-            "bar": found.landing.bar,
+            "bar": found.bar,
             "n": design.n,
             "clear": float(found.clear),
             "simulations": found.simulations,
