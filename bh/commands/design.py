@@ -95,7 +95,9 @@ class SearchTable(Table):
     )
     tolerance: Scale = Field(1.0, description="of a point, mm, a positive number")
     angle: Turn = Field(
-        math.radians(1.0), gt=0.0, description="tolerance of a direction, rad or a text such as '1deg'"
+        math.radians(1.0),
+        gt=0.0,
+        description="a positive angle, rad or a text such as '1deg': the tolerance of a direction",
     )
     robust: bool = Field(
         False, description="true: prefer designs whose end moves least with what is not made exactly"

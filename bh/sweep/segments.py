@@ -25,13 +25,16 @@ from bh.applications.inverse.variants import table as variant_table
 from bh.runtime.terminal import say
 from bh.scene.options import a_length
 from bh.solvers.outcome import Outcome
-from bh.sweep import Label, Points, run, table
+from bh.sweep import Label, Points, SweepError, run, table
 from bh.sweep.pools import Pool
 from bh.sweep.runner import Meter
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
+BESIDE = (
+    10.0  # mm on either side of a pinch in the shortest segment, where it dies out by a factor of a hundred
+)
 LABELS = {
     "k0": Label("1/mm", "curvature of the crease before folding, positive to the left"),
     "length": Label("mm", "length of the crease"),
@@ -251,6 +254,12 @@ def segments(
     """Make the data set of strips for inverse design."""
     from dataclasses import replace
 
+    most = Domain().length[0] - 2.0 * BESIDE
+    if not 0.0 < zone <= most:
+        raise SweepError(
+            f"a zone of {zone:g} mm is longer than the shortest segment, {Domain().length[0]:g} mm, has room for; "
+            f"use {most:g} mm or less"
+        )
     if model == "source":
         makers = [("segments", build, replace(SETTING, zone=zone), output)]
     else:

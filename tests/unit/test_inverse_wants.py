@@ -49,7 +49,7 @@ class Bowl:
 
 
 def test_batches_go_down_inside_the_box() -> None:
-    """Each with its own switches: to the zero, or to the side of the box next to it; what is outside begins at a side."""
+    """Each with its own switches: to the zero, or to the side of the box next to it; what is outside begins there."""
     x = np.array([[0.1, 0.1], [1.9, 1.9], [-5.0, 7.0], [0.3, 1.0]])
     on = np.array([[True], [False], [True], [False]])
     np.testing.assert_allclose(
@@ -215,28 +215,31 @@ def test_a_design_is_found_again() -> None:
 
 
 def test_a_point_with_a_direction() -> None:
-    """The whole strip ends there and so; without the direction it ends otherwise."""
-    target = (50.0, 150.0, 0.0)
-    wants = Wants.of(target, tangent=(0.0, 1.0, 0.0))
-    found = Reach(most=2)(wants)
+    """The whole strip ends there and so; two segments have four variables, too few for a point and a direction."""
+    target, tangent = (100.0, 100.0, 0.0), (-1.0, 0.0, 0.0)
+    found = Reach(most=3)(Wants.of(target, tangent))
+    assert found.design.n == 3
     assert found.missed_at_most <= 1.0
     assert found.turned_at_most <= math.radians(1.0)
     assert found.landing is not None
-    assert found.landing.frame[1, 0] > math.cos(math.radians(1.0))
-    free = Reach(most=2)(target)
-    assert free.landing is not None
-    assert free.landing.frame[1, 0] < math.cos(math.radians(2.0))
-    assert free.design.total <= found.design.total
+    assert found.landing.frame[0, 0] < -math.cos(math.radians(1.0))
 
 
 def test_robust_designs_move_less() -> None:
-    target = (0.0, 120.0, -8.0)
-    short, robust = (Reach(verify=False, prefer=way)(target) for way in ("short", "robust"))  # type: ignore[arg-type]
+    """Half as much here, with one segment more; they still end where they should."""
+    target = (50.0, 150.0, 0.0)
+    short, robust = (Reach(verify=False, most=3, prefer=way)(target) for way in ("short", "robust"))  # type: ignore[arg-type]
     moved = [
         float(predicted(converged(), d.k0, d.length, d.pinched).size) for d in (short.design, robust.design)
     ]
-    assert moved[1] < moved[0]
+    assert moved[1] < 0.5 * moved[0]
     assert robust.missed <= 1.0
+    assert short.design.total < robust.design.total
+
+
+def test_a_zone_is_no_longer_than_its_segment() -> None:
+    with pytest.raises(DesignError, match="longer than its segment of 35 mm"):
+        simulate([0.0, 0.0], [35.0, 60.0], [True, False], converged().setting)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ whole strip, with its error bar where the model has one.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Literal
@@ -32,10 +32,12 @@ from bh.errors import InputError
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Candidate = tuple[ReachAll, Array, Bools]  # with variables (2 n,) and pinches (n,)
 SIZES = {1: 4_000, 2: 20_000}  # random designs of so many segments, which fill their few variables as densely
 WIDER = (
     20  # candidates that are looked at for each that is polished, where a point is not all that is asked for
 )
+STEADIED = 24  # of the candidates that move least, which are made to move less
 ALIKE = 1e-3  # curvature over its largest, and mm, by which designs differ that are not the same one
 SAME = 0.1  # mm between chain and simulation, below which aiming again changes nothing
 
@@ -174,8 +176,9 @@ class Reach:
             (mm), or with its error bar by more than the tolerance.
         clear: prefer designs whose strips clear themselves in space; of the others only where no candidate
             does.
-        prefer: which of the candidates that end near enough is tried first: the "short" one, or the "robust" one, whose
-            end moves least with what is not made exactly (`tolerances.predicted`).
+        prefer: which of the candidates that end near enough is tried first: the "short" one, or the "robust" one,
+            whose end moves least with what is not made exactly (`tolerances.predicted`), of as few segments as do and
+            of one more.
         seed: of the random designs.
         libraries: of random designs; where there is none of a number of segments, those of the model.
         model: "converged", or "source" for one row of bars and hinges; of no use where libraries are given.
@@ -206,12 +209,10 @@ class Reach:
         wants = target if isinstance(target, Wants) else Wants.of(target)
         second: Reached | None = None
         sifted = Sifted()
-        for n in range(1, self.most + 1):
-            book = self.book(n)
-            problem = ReachAll(book.surrogate, n, book.rules, wants.point, wants, np.zeros(1))
-            for x, on in self._candidates(book, problem, sifted):
+        for group in self._groups(wants, sifted):
+            for problem, x, on in group:
                 design = problem.design(x, on)
-                clear = not self.clear or not Swept().meets(book.surrogate, *_arrays(design))
+                clear = not self.clear or not Swept().meets(problem.surrogate, *_arrays(design))
                 if not clear and second is not None:
                     continue
                 reached = self._verified(problem, x, on, clear)
@@ -219,11 +220,27 @@ class Reach:
                     return reached
                 second = second or reached
             # a strip that meets itself is the answer only where one segment more does no better
-            if second is not None and second.design.n < n:
+            if second is not None and second.design.n < group[0][0].n:
                 return second
         if second is not None:
             return second
         raise DesignError(sifted.told(wants, self.most, self.tolerance, self.angle))
+
+    def _groups(self, wants: Wants, sifted: Sifted) -> Iterator[list[Candidate]]:
+        """Candidates of one segment, of two, ..., the preferred first; robust ones with those of a segment more."""
+        before: list[Candidate] = []
+        for n in range(1, self.most + 1):
+            book = self.book(n)
+            problem = ReachAll(book.surrogate, n, book.rules, wants.point, wants, np.zeros(1))
+            here = [(problem, x, on) for x, on in self._candidates(book, problem, sifted)]
+            if self.prefer == "short":
+                yield from [here] if here else []
+                continue
+            both = [*before, *here]
+            if both and (before or n == self.most):
+                both.sort(key=lambda each: float(self._moves(each[0], each[1][None], each[2][None])[0]))
+                yield both
+            before = here
 
     def book(self, n: int) -> Library:
         """The library of designs of n segments."""
@@ -241,16 +258,13 @@ class Reach:
             first = np.argsort(np.linalg.norm(problem.residuals(x, on), axis=1), kind="stable")[:count]
             x, on = x[first], on[first]
         x = descend(problem, x, on)
-        missed, turned = problem.off(problem.bare(x, on))
-        legal = problem.violation(x, on) <= 0.0
-        sifted.add(missed, turned, legal)
-        bars = book.surrogate.bars(*problem.split(x), on)
-        good = np.flatnonzero(
-            legal & (missed <= self.tolerance) & (turned <= self.angle) & (bars[0] <= self.tolerance)
-        )
-        x, on = x[good], on[good]
+        x, on = self._good(problem, x, on, sifted)
         if self.prefer == "robust":
-            order = np.argsort(predicted(book.surrogate, *problem.split(x), on).size, kind="stable")
+            first = np.argsort(self._moves(problem, x, on), kind="stable")[:STEADIED]
+            x, on = x[first], on[first]
+            steady = problem.steadied(x, on)
+            x, on = self._good(problem, np.concatenate((steady, x)), np.concatenate((on, on)), sifted)
+            order = np.argsort(self._moves(problem, x, on), kind="stable")
         else:
             order = np.argsort(problem.split(x)[1].sum(axis=1), kind="stable")
         x, on = x[order], on[order]
@@ -263,6 +277,23 @@ class Reach:
             else:
                 sifted.boxed += 1
         return found
+
+    def _good(self, problem: ReachAll, x: Array, on: Bools, sifted: Sifted) -> tuple[Array, Bools]:
+        """Those of some candidates that obey the rules and are near enough by the chain."""
+        if not len(x):
+            return x, on
+        missed, turned = problem.off(problem.bare(x, on))
+        legal = problem.violation(x, on) <= 0.0
+        sifted.add(missed, turned, legal)
+        bars = problem.surrogate.bars(*problem.split(x), on)[0]
+        good = legal & (missed <= self.tolerance) & (turned <= self.angle) & (bars <= self.tolerance)
+        return x[good], on[good]
+
+    def _moves(self, problem: ReachAll, x: Array, on: Bools) -> Array:
+        """(N,) how far ends are off in the mean, mm."""
+        if not len(x):
+            return np.zeros(0)
+        return predicted(problem.surrogate, *problem.split(x), on).size
 
     def _verified(self, problem: ReachAll, x: Array, on: Bools, clear: bool) -> Reached | None:
         """The simulated design, aimed again at what its simulation missed; None where it does not come near enough."""

@@ -13,15 +13,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bh.applications.inverse.descent import descend
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.problems import Design, ReachPoint
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Swept
 from bh.applications.inverse.simulate import Landing
+from bh.applications.inverse.tolerances import predicted
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 LEVER = 100.0  # mm
+STEADY = 0.3  # weight of movements beside residuals, where a design is to move less
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +210,17 @@ class ReachAll(ReachPoint):
         found: Array = self.bare(x, on) + self.shift
         return found
 
+    def steadied(self, x: Array, on: Bools) -> Array:
+        """Designs next to others that do the same and whose ends move less with what is not made exactly.
+
+        Movements are brought down beside the residuals, and then these to zero again by the shortest way.
+
+        Args:
+            x: (N, 2 n) variables.
+            on: (N, n) pinches.
+        """
+        return descend(self, descend(_Steady(self), x, on, steps=12), on)
+
     def off(self, residuals: Array) -> tuple[Array, Array]:
         """(...) largest distance from a point that is asked for, mm, and (...) angle from the direction, rad.
 
@@ -245,3 +259,24 @@ class ReachAll(ReachPoint):
             on: (n,) its pinches.
         """
         return replace(self, shift=residuals - self.bare(x[None], on[None])[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Steady:
+    """Residuals of a problem, and beside them a part of the movements of the end by one spread of each thing."""
+
+    problem: ReachAll
+
+    @property
+    def lower(self) -> Array:
+        return self.problem.lower
+
+    @property
+    def upper(self) -> Array:
+        return self.problem.upper
+
+    def residuals(self, x: Array, on: Bools) -> Array:
+        moves = predicted(self.problem.surrogate, *self.problem.split(x), on).moves
+        return np.concatenate(
+            (self.problem.residuals(x, on), *(STEADY * move for move in moves.values())), axis=-1
+        )
