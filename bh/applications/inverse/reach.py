@@ -119,6 +119,7 @@ class Reached:
     Attributes:
         design: crease and pinches.
         wants: what was asked for.
+        end: (3,) where the chain of its segments ends, mm.
         missed: largest distance of the chain of its segments from a point that was asked for, mm.
         turned: angle of its end from the direction that was asked for, rad; 0 where there was none.
         landing: of the whole simulated strip, or None where that was not asked for.
@@ -132,6 +133,7 @@ class Reached:
 
     design: Design
     wants: Wants
+    end: Array
     missed: float
     turned: float
     landing: Landing | None = None
@@ -302,7 +304,7 @@ class Reach:
             design = problem.design(x, on)
             bare = problem.bare(x[None], on[None])[0]
             missed, turned = (float(value) for value in problem.off(bare))
-            reached = Reached(design, problem.wants, missed, turned, clear=clear)
+            reached = Reached(design, problem.wants, problem.end(x, on), missed, turned, clear=clear)
             if not self.verify:
                 return reached
             try:
