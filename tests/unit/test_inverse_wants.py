@@ -258,3 +258,13 @@ def test_what_cannot_be_had(wants: Wants, told: str) -> None:
     with pytest.raises(DesignError, match=told) as error:
         Reach(most=1)(wants)
     assert "\n" not in str(error.value)
+
+
+def test_blocks_of_the_case_are_a_part_at_random() -> None:
+    """Ten blocks have every target once, and segments do not depend on how many are drawn."""
+    from verification.studies.ch6.landing import BLOCKS, aims, drawn
+
+    every = [point for number in range(BLOCKS) for point in aims(number)]
+    assert len(every) == len(set(every)) == 330
+    assert len({z for _, _, z in aims(0)}) == 5
+    assert drawn(8)[:4] == drawn(4)

@@ -156,6 +156,7 @@ def part(context: Context, blocks: int, size: Block = WHOLE, pool: int | None = 
     reached(result, of_targets)
     judged(result, of_strips)
     if (blocks, size) != (BLOCKS, WHOLE):
+        result.title += ", a part drawn at random"
         result.notes.append(
             f"A part of the case, drawn at random: {blocks * size.segments} of {BLOCKS * WHOLE.segments} segments, "
             f"{blocks * size.targets} of {BLOCKS * WHOLE.targets} targets with y >= 0, {blocks * size.strips} of "
@@ -177,10 +178,8 @@ def block(folder: Path, number: int, size: Block = WHOLE, pool: int | None = Non
     k0, length, pinched = zip(*drawn(last)[first:], strict=True)
     table = bh.sweep.table({"k0": list(k0), "length": list(length), "pinched": [int(on) for on in pinched]})
     of_segments = solved(SegmentTask(), table, folder / f"landing_segments_{number}.nc", pool)
-    every = targets(False)
-    order = np.random.default_rng(605).permutation(len(every))
-    points = [every[int(i)] for i in order[number * size.targets : (number + 1) * size.targets]]
-    table = bh.sweep.table({name: [float(point[name]) for point in points] for name in "xyz"})
+    points = aims(number, size)
+    table = bh.sweep.table(dict(zip("xyz", map(list, zip(*points, strict=True)), strict=True)))
     of_targets = solved(LandTask(), table, folder / f"landing_targets_{number}.nc", pool)
     designs = _designs(of_targets, size.strips)
     table = bh.sweep.table(dict(zip("xyz", map(list, zip(*dict(designs), strict=True)), strict=True)))
@@ -189,6 +188,19 @@ def block(folder: Path, number: int, size: Block = WHOLE, pool: int | None = Non
         of_targets,
         solved(JudgeTask(designs), table, folder / f"landing_strips_{number}.nc", pool),
     )
+
+
+def aims(number: int, size: Block = WHOLE) -> list[Target]:
+    """Targets of a block, mm: all blocks have each target with y >= 0 once.
+
+    Args:
+        number: of the block, from 0.
+        size: of all blocks.
+    """
+    every = targets(False)
+    order = np.random.default_rng(605).permutation(len(every))
+    points = [every[int(i)] for i in order[number * size.targets : (number + 1) * size.targets]]
+    return [(float(point["x"]), float(point["y"]), float(point["z"])) for point in points]
 
 
 def _designs(data: Any, count: int) -> Designs:
