@@ -97,7 +97,7 @@ def test_differences_are_those_of_strips() -> None:
     setting = replace(converged().setting, edge=2.5, rows=2)
     for name in ("fold", "pinch", "zone", "t"):
         up, down = (
-            simulate(K0, LENGTH, ON, replace(setting, **{name: getattr(setting, name) + s * STEPS[name]})).t  # type: ignore[arg-type]
+            simulate(K0, LENGTH, ON, replace(setting, **{name: getattr(setting, name) + s * STEPS[name]})).t
             for s in (1.0, -1.0)
         )
         whole = 0.5 * (up - down)
@@ -226,13 +226,13 @@ def test_a_point_with_a_direction() -> None:
 
 
 def test_robust_designs_move_less() -> None:
-    """Half as much here, with one segment more; they still end where they should."""
+    """A fifth here, with one segment more and a descent on the movements; they still end where they should."""
     target = (50.0, 150.0, 0.0)
-    short, robust = (Reach(verify=False, most=3, prefer=way)(target) for way in ("short", "robust"))  # type: ignore[arg-type]
+    short, robust = (Reach(verify=False, most=3, prefer=way)(target) for way in ("short", "robust"))
     moved = [
         float(predicted(converged(), d.k0, d.length, d.pinched).size) for d in (short.design, robust.design)
     ]
-    assert moved[1] < 0.5 * moved[0]
+    assert moved[1] < 0.3 * moved[0]  # 0.37 without the descent on movements
     assert robust.missed <= 1.0
     assert short.design.total < robust.design.total
 

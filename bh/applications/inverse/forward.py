@@ -90,7 +90,11 @@ class Forward(Protocol):
         ...
 
     def varied(self) -> Mapping[str, tuple[Forward, Forward]]:
-        """Models of strips with one thing a step less and a step more (`variants.STEPS`), by its name."""
+        """Models of strips with one thing a step less and a step more (`variants.STEPS`).
+
+        Returns:
+            both models, by the name of what differs.
+        """
         ...
 
     def about(self) -> Mapping[str, object]:

@@ -46,10 +46,13 @@ def parts() -> Array:
 
 
 def variants(setting: Setting) -> dict[tuple[str, int], Setting]:
-    """What is changed and its sign, with the setting that has it so.
+    """Settings with one thing a step less or more.
 
     Args:
         setting: that is varied.
+
+    Returns:
+        the settings, by the name of what is changed and the sign of its step.
     """
     return {
         (name, sign): replace(setting, **{name: getattr(setting, name) + sign * step})

@@ -218,8 +218,11 @@ class ReachAll(ReachPoint):
         Args:
             x: (N, 2 n) variables.
             on: (N, n) pinches.
+
+        Returns:
+            (N, 2 n) variables.
         """
-        return descend(self, descend(_Steady(self), x, on, steps=12), on)
+        return descend(self, descend(_Steady(self), x, on), on)
 
     def off(self, residuals: Array) -> tuple[Array, Array]:
         """(...) largest distance from a point that is asked for, mm, and (...) angle from the direction, rad.
