@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,13 +19,27 @@ from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.judge import Verdict, judge
 from bh.applications.inverse.models import Name, model, read
 from bh.applications.inverse.problems import CURVES, Design
-from bh.applications.inverse.reach import Library, Reach
+from bh.applications.inverse.reach import Library, Reach, size_of
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.simulate import Landing, Simulated
+from bh.applications.inverse.tolerances import Spreads, Tolerance, predicted
+from bh.applications.inverse.wants import Wants
 from bh.errors import InputError
 from bh.paths.provenance import versions
 from bh.runtime.terminal import say
-from bh.scene.reading import Scale, Spot, Table, check_keys, inside, one_line, read_table, read_toml
+from bh.scene.reading import (
+    Number,
+    Scale,
+    Spot,
+    Table,
+    Turn,
+    Vector,
+    check_keys,
+    inside,
+    one_line,
+    read_table,
+    read_toml,
+)
 from meshes import parallel_creases
 from meshes.curves import arc_lengths, interpolated
 from meshes.io import write_pattern
@@ -35,14 +49,29 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+Stopping = Annotated[list[Number], Field(min_length=4, max_length=4)]
+Box = Annotated[list[Number], Field(min_length=6, max_length=6)]
+SPREADS, PROBABILITY = Spreads(), 0.95
 
 
 class TargetTable(Table):
-    """What is asked for: exactly one of the three."""
+    """What is asked for: exactly one of point, curve and move_tip; of a point perhaps more."""
 
     point: Spot | None = Field(None, description="three coordinates [x, y, z] in mm")
     curve: str | None = Field(
         None, description=f"the name of a CSV file of points x, y in mm, or one of {', '.join(CURVES)}"
+    )
+    tangent: Vector | None = Field(None, description="of a point: direction in which the crease ends there")
+    up: Vector | None = Field(
+        None, description="of a point: direction of the ridge of the fold there; needs tangent, too"
+    )
+    stops: list[Stopping] = Field(
+        default_factory=list,
+        description="of a point: where the end is on its way, rows [part, x, y, z]: part of the pinch, mm",
+    )
+    keep_out: list[Box] = Field(
+        default_factory=list,
+        description="of a point: boxes without the strip, rows [x, y, z, x, y, z] of two opposite corners in mm",
     )
     move_tip: bool = Field(
         False, description="true: the end moves as far as it can when the crease is pinched"
@@ -53,6 +82,8 @@ class TargetTable(Table):
         """Check that one thing is asked for."""
         if (self.point is not None) + (self.curve is not None) + self.move_tip != 1:
             raise ValueError("needs exactly one of point, curve and move_tip = true")
+        if self.point is None and (self.tangent or self.up or self.stops or self.keep_out):
+            raise ValueError("takes tangent, up, stops and keep_out with a point only")
         return self
 
 
@@ -63,6 +94,14 @@ class SearchTable(Table):
         4, description="the largest number of segments, 1 to 8"
     )
     tolerance: Scale = Field(1.0, description="of a point, mm, a positive number")
+    angle: Turn = Field(
+        math.radians(1.0),
+        gt=0.0,
+        description="a positive angle, rad or a text such as '1deg': the tolerance of a direction",
+    )
+    robust: bool = Field(
+        False, description="true: prefer designs whose end moves least with what is not made exactly"
+    )
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(1, description="a whole number from 0")
     model: Name = Field("converged", description="converged, or source for one row of bars and hinges")
     data: str | None = Field(
@@ -92,6 +131,14 @@ class Answer:
     surrogate: Forward
     point: bool = False
     verdict: Verdict | None = None
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """How the end moves with what is not made exactly; None where the model does not know."""
+        k0, length, on = self.design.k0, self.design.length, self.design.pinched
+        if not self.surrogate.has_variants:
+            return None
+        return predicted(self.surrogate, k0, length, on, SPREADS).one()
 
     @property
     def strip(self) -> Simulated:
@@ -131,7 +178,7 @@ def solve(file: str | Path) -> Answer:
             else read(inside(file.parent, search.data, "search.data"))
         )
         if target.point is not None:
-            return _point(target.point, search, surrogate)
+            return _point(target, search, surrogate)
         if target.curve is not None:
             return _curve(target.curve, search, file.parent, surrogate)
         return _tip(search, surrogate)
@@ -144,17 +191,31 @@ def solve(file: str | Path) -> Answer:
         ) from error
 
 
-def _point(point: list[float], search: SearchTable, surrogate: Forward) -> Answer:
-    books = tuple(Library(surrogate, n, seed=search.seed) for n in range(1, search.segments + 1))
-    found = Reach(most=search.segments, tolerance=search.tolerance, seed=search.seed, libraries=books)(point)
+def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answer:
+    assert target.point is not None
+    stops = [(row[0], row[1:]) for row in target.stops]
+    wants = Wants.of(target.point, target.tangent, target.up, stops, target.keep_out)
+    books = tuple(Library(surrogate, n, size_of(n), search.seed) for n in range(1, search.segments + 1))
+    reach = Reach(
+        most=search.segments,
+        tolerance=search.tolerance,
+        angle=search.angle,
+        prefer="robust" if search.robust else "short",
+        seed=search.seed,
+        libraries=books,
+    )
+    found = reach(wants)
     assert found.landing is not None
     measure = {
         "distance by interpolation": (found.missed, "mm"),
         "distance of the simulated strip": (found.missed_simulated, "mm"),
-        "its error bar": (found.landing.bar, "mm"),
+        "its error bar": (found.bar, "mm"),
         "clears itself in space": (float(found.clear), "1 yes, 0 no"),
     }
-    goal = np.array([point], dtype=float)
+    if wants.directed:
+        measure["angle of the simulated strip to its direction"] = math.degrees(found.turned_simulated), "deg"
+        measure["error bar of the angle"] = math.degrees(found.turn_bar), "deg"
+    goal = np.array([target.point], dtype=float)
     return Answer(found.design, found.landing, measure, goal, surrogate, point=True)
 
 
@@ -243,6 +304,7 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
         answer.strip.path.save(files[2])
         with replacing(files[3]) as draft:
             picture(answer).savefig(draft, format="png", dpi=110, metadata={"Software": None})
+        tolerance = answer.tolerance
         about = {
             "segments": answer.design.rows(),
             "total_length_mm": answer.design.total,
@@ -252,6 +314,7 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
             "measures": {
                 name: {"value": value, "unit": unit} for name, (value, unit) in answer.measure.items()
             },
+            "tolerance": None if tolerance is None else _spread(tolerance),
             "data": data,
             "versions": versions(),
         }
@@ -262,6 +325,31 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
             f"cannot write to '{folder}' ({error.strerror}); choose another folder with -o"
         ) from error
     return files
+
+
+def _spread(tolerance: Tolerance) -> dict[str, object]:
+    """Spreads, movements and the ellipsoid as plain data."""
+    size, directions = tolerance.axes(PROBABILITY)
+    return {
+        "spreads": asdict(SPREADS),
+        "moves_mm": {name: move.tolist() for name, move in tolerance.moves.items()},
+        "probability": PROBABILITY,
+        "semi_axes_mm": size.tolist(),
+        "directions": directions.T.tolist(),
+    }
+
+
+def _told(tolerance: Tolerance | None) -> str:
+    """One line on how the end moves."""
+    if tolerance is None:
+        return "tolerances: not known to this model"
+    size = tolerance.axes(PROBABILITY)[0]
+    by = sorted(((float(np.linalg.norm(move)), name) for name, move in tolerance.moves.items()), reverse=True)
+    most = ", ".join(f"{name} {moved:.2g}" for moved, name in by[:3])
+    axes = " x ".join(f"{axis:.2g}" for axis in size)
+    return (
+        f"{PROBABILITY:.0%} of strips end in an ellipsoid of semi-axes {axes} mm; by one spread of {most} mm"
+    )
 
 
 def picture(answer: Answer) -> Figure:
@@ -327,6 +415,7 @@ def design(
             say(f"segment: k0 {row['k0']:+.6f} /mm, length {row['length']:.2f} mm, {state}")
         for name, (value, unit) in answer.measure.items():
             say(f"{name}: {value:.4g} {unit}")
+        say(_told(answer.tolerance))
         turn = math.degrees(float(np.abs(answer.design.k0 * answer.design.length).sum()))
         say(f"total length {answer.design.total:.1f} mm, the flat crease turns by {turn:.0f} degrees in all")
         say("files: " + " ".join(str(file) for file in files))

@@ -14,22 +14,27 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from bh.applications.inverse.models import Name
-from bh.applications.inverse.pieces import CONVERGING, PIECES, PieceTask
+from bh.applications.inverse.models import Name, beside
+from bh.applications.inverse.pieces import CONVERGING, PIECES, PieceTask, column
 from bh.applications.inverse.pieces import table as piece_table
 from bh.applications.inverse.segments import Domain, beyond, grid
 from bh.applications.inverse.simulate import SETTING, SegmentTask, Setting
 from bh.applications.inverse.surrogate import FORMAT, Surrogate
+from bh.applications.inverse.variants import VARIANTS
+from bh.applications.inverse.variants import table as variant_table
 from bh.runtime.terminal import say
 from bh.scene.options import a_length
 from bh.solvers.outcome import Outcome
-from bh.sweep import Label, Points, run, table
+from bh.sweep import Label, Points, SweepError, run, table
 from bh.sweep.pools import Pool
 from bh.sweep.runner import Meter
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
+BESIDE = (
+    10.0  # mm on either side of a pinch in the shortest segment, where it dies out by a factor of a hundred
+)
 LABELS = {
     "k0": Label("1/mm", "curvature of the crease before folding, positive to the left"),
     "length": Label("mm", "length of the crease"),
@@ -56,6 +61,13 @@ PIECE_LABELS = {
     "energy": LABELS["energy"],
     "stable": LABELS["stable"],
     "critical_points": LABELS["critical_points"],
+}
+VARIANT_LABELS = {
+    column("Lstar"): Label("mm", "length scale of the crease"),
+    column("t"): Label("mm", "thickness"),
+    column("zone"): Label("mm", "length of the pinched zone"),
+    column("pinch"): Label("rad", "dihedral angle in its middle"),
+    column("fold"): Label("rad", "rest dihedral angle"),
 }
 
 
@@ -143,6 +155,38 @@ def build_pieces(
     )
 
 
+def build_variants(
+    file: str | Path,
+    setting: Setting = CONVERGING,
+    *,
+    pool: Pool | Executor | int | None = None,
+    resume: bool = False,
+    progress: bool | Meter = False,
+) -> Dataset:
+    """Simulate pieces that are made a little differently, and pinches that are closed by a part of the way.
+
+    Args:
+        file: of the data set (netCDF-4).
+        setting: that is varied.
+        pool: see `bh.sweep.run`.
+        resume: see `bh.sweep.run`.
+        progress: see `bh.sweep.run`.
+
+    Raises:
+        SweepError: see `bh.sweep.run`.
+    """
+    return run(
+        PieceTask(setting),
+        table(variant_table(setting)),
+        file,
+        pool=pool,
+        resume=resume,
+        progress=progress,
+        labels=PIECE_LABELS | VARIANT_LABELS,
+        attributes=_about("Variants of pieces of folded strips", VARIANTS, setting),
+    )
+
+
 def intensity_points(
     surrogate: Surrogate, steps: int = 9, parts: tuple[float, ...] = (0.25, 0.5, 0.75)
 ) -> Points:
@@ -210,11 +254,25 @@ def segments(
     """Make the data set of strips for inverse design."""
     from dataclasses import replace
 
+    most = Domain().length[0] - 2.0 * BESIDE
+    if not 0.0 < zone <= most:
+        raise SweepError(
+            f"a zone of {zone:g} mm is longer than the shortest segment, {Domain().length[0]:g} mm, has room for; "
+            f"use {most:g} mm or less"
+        )
     if model == "source":
-        what, setting, make = "segments", SETTING, build
+        makers = [("segments", build, replace(SETTING, zone=zone), output)]
     else:
-        what, setting, make = "pieces", CONVERGING, build_pieces
-    data = make(output, replace(setting, zone=zone), pool=workers, resume=resume, progress=True)
-    failed = int((data["outcome"] != Outcome.REACHED).sum())
-    say(f"{data.sizes['point'] - failed:,} of {data.sizes['point']:,} {what}; wrote {output}")
+        setting = replace(CONVERGING, zone=zone)
+        makers = [
+            ("pieces", build_pieces, setting, output),
+            ("variants of pieces", build_variants, setting, beside(output)),
+        ]
+    failed = 0
+    for what, make, made, file in makers:
+        going_on = resume and (file.is_file() or Path(f"{file}.points").is_file() or file == output)
+        data = make(file, made, pool=workers, resume=going_on, progress=True)
+        lost = int((data["outcome"] != Outcome.REACHED).sum())
+        say(f"{data.sizes['point'] - lost:,} of {data.sizes['point']:,} {what}; wrote {file}")
+        failed += lost
     return 1 if failed else 0

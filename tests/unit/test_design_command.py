@@ -41,6 +41,9 @@ def test_example(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     assert 0.0 < about["error_bar_mm"] == measured["its error bar"] < 1.0
     assert 0.0 < measured["distance of the strip by the shell"] < 10.0
     assert measured["end by the shell, change with its mesh"] > 0.0
+    assert "95% of strips end in an ellipsoid of semi-axes" in told
+    assert len(about["tolerance"]["semi_axes_mm"]) == 3
+    assert about["tolerance"]["spreads"]["fold"] == 0.02
     path = Trace.load(folder / "path.bh")
     assert path.outcome == "reached"
     # the outline that is cut is that of the mesh that was simulated
@@ -74,6 +77,10 @@ def test_a_curve_from_points(tmp_path: Path) -> None:
         ("[target]\npoint = [900.0, 0.0, 0.0]\n[search]\nsegments = 2", "no crease of up to 2 segments"),
         ("[target]\npoint = [90.0, 0.0, 0.0]\n[search]\nsegment = 2", "segment"),
         ('[target]\npoint = [90.0, 0.0, 0.0]\n[search]\ndata = "none.nc"', "there is no data set"),
+        ("[target]\nmove_tip = true\nup = [0, 0, 1]", "with a point only"),
+        ("[target]\npoint = [90.0, 0.0, 0.0]\nup = [0, 0, 1]", "needs a tangent"),
+        ("[target]\npoint = [90.0, 0.0, 0.0]\nkeep_out = [[1, 2, 3]]", "target.keep_out"),
+        ('[target]\npoint = [90.0, 0.0, 0.0]\n[search]\nangle = "-1deg"', "a positive angle"),
     ],
 )
 def test_bad_targets(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, told: str) -> None:

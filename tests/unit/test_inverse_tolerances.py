@@ -9,9 +9,10 @@ pytest.importorskip("xarray")
 from dataclasses import replace
 
 from bh.applications.inverse.models import model
+from bh.applications.inverse.pieces import VARIED
 from bh.applications.inverse.problems import Design
 from bh.applications.inverse.simulate import simulate
-from bh.applications.inverse.tolerances import VARIED, Spreads, Tolerance, sampled, tolerance
+from bh.applications.inverse.tolerances import Spreads, Tolerance, sampled, tolerance
 
 DESIGN = Design(np.array([0.009]), np.array([105.0]), np.array([True]))
 EDGE, ROWS = 5.0, 1

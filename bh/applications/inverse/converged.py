@@ -11,18 +11,20 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.applications.inverse.levels import Limit, Series
-from bh.applications.inverse.motions import ALONG, exponential
+from bh.applications.inverse.levels import Limit, Series, lagrange
+from bh.applications.inverse.motions import ALONG, exponential, logarithm
 from bh.applications.inverse.piece_data import PieceData
 from bh.applications.inverse.pieces import LARGEST, LEVELS, PIECES
 from bh.applications.inverse.segments import DesignError, Domain
 from bh.applications.inverse.simulate import Landing, Setting, simulate
 from bh.applications.inverse.transforms import chain
+from bh.applications.inverse.variants import STEPS, VariantData, closed, parts, variants
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -41,6 +43,7 @@ class Converged:
         domain: of the segments that designs are made of.
         setting: sheet, fold and pinch.
         mesh: of whole strips that are simulated.
+        has_variants: pieces that are made differently are known.
     """
 
     def __init__(
@@ -49,6 +52,7 @@ class Converged:
         setting: Setting,
         limits: Mapping[str, Limit] | None = None,
         same: Converged | None = None,
+        varied: VariantData | None = None,
     ) -> None:
         """Take functions "arc" (rate of its motion), "end", "pinch" and "joint" of the curvatures.
 
@@ -57,14 +61,21 @@ class Converged:
             setting: sheet, fold and pinch.
             limits: what they are limits of, with error bars; None where they are those of one mesh.
             same: the model of one mesh, on which whole strips are simulated.
+            varied: pieces of strips that are made differently; None where these are not known.
         """
         self.setting, self.domain = setting, Domain(k0=LARGEST, fold=setting.fold)
         self.mesh = LEVELS["pinch"][STRIP]
         self._series, self._limits, self._same = series, limits or {}, same or self
+        self._varied = varied
+        self.has_variants = varied is not None and varied.setting == setting
 
     @classmethod
-    def of(cls, data: Dataset) -> Converged:
+    def of(cls, data: Dataset, other: Dataset | None = None) -> Converged:
         """From a data set of `bh segments`.
+
+        Args:
+            data: of the pieces.
+            other: of their variants, or None.
 
         Raises:
             DesignError: it is of another version, or lacks something.
@@ -74,10 +85,12 @@ class Converged:
                 f"the data set has format {data.attrs.get('format')}, pieces have {PIECES}; {ANEW}"
             )
         try:
-            setting = Setting(**json.loads(data.attrs["setting"]))
+            setting = _setting(data)
             read = PieceData(data)
             values = {name: limit.value for name, limit in read.limits.items()}
-            return cls(values, setting, read.limits, cls(read.series(STRIP), setting))
+            same = cls(read.series(STRIP), setting)
+            varied = None if other is None else VariantData(other, read, _setting(other))
+            return cls(values, setting, read.limits, same, varied)
         except (KeyError, TypeError, ValueError) as error:
             raise DesignError(f"the data set is incomplete ({error}); {ANEW}") from error
 
@@ -244,14 +257,83 @@ class Converged:
         """
         strip = simulate(k0, length, pinched, replace(self.setting, edge=self.mesh.edge, rows=self.mesh.rows))
         design = np.asarray(k0), np.asarray(length), np.asarray(pinched)
-        beside = strip.t - self._same.forward(*design, check=False)[0][-1]
-        end = self.forward(*design, check=False)[0][-1] + beside
-        bar = float(self.bars(*design)[0]) + SHARE * float(np.linalg.norm(beside))
-        return Landing(strip, end, bar)
+        (same, same_frames), (points, frames) = (
+            model.forward(*design, check=False) for model in (self._same, self)
+        )
+        beside, turned = strip.t - same[-1], same_frames[-1].T @ strip.r
+        position, turn = (float(bar) for bar in self.bars(*design))
+        return Landing(
+            strip,
+            points[-1] + beside,
+            position + SHARE * float(np.linalg.norm(beside)),
+            frames[-1] @ turned,
+            turn + SHARE * float(np.linalg.norm(logarithm(np.zeros(3), turned)[3:])),
+        )
+
+    def closed_by(self, part: float) -> Converged:
+        """The model of the same strips with all pinches closed by a part of the way.
+
+        Args:
+            part: from 0 to 1; polynomials through the parts of the data set.
+
+        Raises:
+            DesignError: the data set of the variants is of another setting, or part is none.
+        """
+        if not 0.0 <= part <= 1.0:
+            raise DesignError(f"a pinch cannot be closed by {part:g} of its way; give a part from 0 to 1")
+        weights = lagrange(parts(), part)[1:]  # nothing happens where no pinch is closed
+        known = [*self._variants().closing, self._limits["pinch"]]
+        limit, same = (
+            sum((s.times(w) for w, s in zip(weights, series, strict=True)), Series(np.zeros((1, 6))))
+            for series in ([each.value for each in known], [each.levels[STRIP] for each in known])
+        )
+        doubts = tuple(d.times(w) for w, each in zip(weights, known, strict=True) for d in each.doubts)
+        setting = closed(self.setting, part)
+        return Converged(
+            {**self._series, "pinch": limit},
+            setting,
+            {**self._limits, "pinch": Limit((same,), limit, doubts)},
+            self._same.pinching(same, setting),
+        )
+
+    def pinching(self, pinch: Series, setting: Setting) -> Converged:
+        """The same strips with another pinch.
+
+        Args:
+            pinch: its motions.
+            setting: that it is of.
+        """
+        return Converged({**self._series, "pinch": pinch}, setting)
+
+    def varied(self) -> Mapping[str, tuple[Converged, Converged]]:
+        """Models of strips with one thing a step less and a step more (`variants.STEPS`), by its name.
+
+        Raises:
+            DesignError: the data set of the variants is of another setting.
+        """
+        return self._pairs
+
+    @cached_property
+    def _pairs(self) -> dict[str, tuple[Converged, Converged]]:
+        data = self._variants()
+
+        def one(name: str, sign: int) -> Converged:
+            return Converged(data.series(name, sign), variants(self.setting)[name, sign])
+
+        return {name: (one(name, -1), one(name, 1)) for name in STEPS}
+
+    def _variants(self) -> VariantData:
+        if self._varied is None or not self.has_variants:
+            raise DesignError(f"there are no variants of this data set's setting; {ANEW}")
+        return self._varied
 
     def about(self) -> Mapping[str, object]:
         """The setting as plain data."""
         return asdict(self.setting)
+
+
+def _setting(data: Dataset) -> Setting:
+    return Setting(**json.loads(data.attrs["setting"]))
 
 
 def _design(k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array, Bools]:

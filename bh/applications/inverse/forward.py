@@ -20,10 +20,12 @@ class Forward(Protocol):
     Attributes:
         domain: of the segments that designs are made of.
         setting: sheet, fold and pinch.
+        has_variants: it knows strips that are made a little differently (`varied`), and other pinches (`closed_by`).
     """
 
     domain: Domain
     setting: Setting
+    has_variants: bool
 
     def forward(
         self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike, check: bool = True
@@ -76,6 +78,22 @@ class Forward(Protocol):
             k0: (..., n) curvatures before folding, 1/mm.
             length: (..., n), mm.
             pinched: (..., n) truth values.
+        """
+        ...
+
+    def closed_by(self, part: float) -> Forward:
+        """The model of the same strips with all pinches closed by a part of the way.
+
+        Args:
+            part: from 0 to 1.
+        """
+        ...
+
+    def varied(self) -> Mapping[str, tuple[Forward, Forward]]:
+        """Models of strips with one thing a step less and a step more (`variants.STEPS`).
+
+        Returns:
+            both models, by the name of what differs.
         """
         ...
 

@@ -61,6 +61,20 @@ def points(count: int) -> Array:
     return found
 
 
+def lagrange(at: Array, x: float) -> Array:
+    """(k,) weights of values at different places (k,) in the polynomial through them at x.
+
+    Args:
+        at: (k,) places.
+        x: where the polynomial is wanted.
+    """
+    others = at[:, None] - at + np.eye(len(at))
+    found: Array = ((x - at) * ~np.eye(len(at), dtype=bool) + np.eye(len(at))).prod(axis=1) / others.prod(
+        axis=1
+    )
+    return found
+
+
 def _vander(x: Array, degree: int) -> Array:
     """(..., degree + 1) Chebyshev polynomials at arguments (...)."""
     return np.asarray(chebyshev.chebvander(x, degree).reshape(*x.shape, degree + 1))

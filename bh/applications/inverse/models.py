@@ -38,10 +38,23 @@ def model(name: Name = "converged") -> Forward:
 
 
 def read(file: str | Path) -> Forward:
-    """The model that a data set of `bh segments` was made for.
+    """The model that a data set of `bh segments` was made for, with the variants beside it where there are some.
 
     Raises:
         DesignError: it cannot be read.
     """
     data = surrogate.loaded(file)
-    return Converged.of(data) if data.attrs.get("format") == PIECES else surrogate.Surrogate.of(data)
+    if data.attrs.get("format") != PIECES:
+        return surrogate.Surrogate.of(data)
+    other = beside(file)
+    return Converged.of(data, surrogate.loaded(other) if other.is_file() else None)
+
+
+def beside(file: str | Path) -> Path:
+    """Where the variants of a data set of pieces are: pieces-variants.nc beside pieces.nc.
+
+    Args:
+        file: of the pieces.
+    """
+    file = Path(file)
+    return file.with_name(f"{file.stem}-variants{file.suffix}")

@@ -64,7 +64,7 @@ def pareto(
     for n in range(1, most + 1):
         book = next((b for b in books if b.n == n), None) or library(n, name=name)
         problem = book.problem(point)
-        near = list(book.nearest(point, 20 * starts))
+        near = list(zip(*book.nearest(point, 20 * starts), strict=True))
         near.sort(key=lambda pair: float(pair[0][n:].sum()))
         for x, on in near[:starts]:
             for allowed in allowances:

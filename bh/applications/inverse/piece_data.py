@@ -34,20 +34,24 @@ class PieceData:
 
     Attributes:
         data: of `bh.sweep.segments.build_pieces`.
+        other: pieces to take where `data` has none.
     """
 
     data: Dataset
+    other: PieceData | None = None
 
     @cached_property
-    def _rows(self) -> dict[tuple[str, int, float, float], tuple[Array, Array, Array]]:
+    def rows(self) -> dict[tuple[str, int, float, float], tuple[Array, Array, Array]]:
+        """Motions and distances by kind, rows of cells and curvatures (1/mm), see `PieceValues`."""
         d = {
             name: self.data[name].values
             for name in ("kind", "rows", "before", "after", "t", "r", "to_middle")
         }
-        return {
+        own = {
             (str(kind), int(rows), float(before), float(after)): (t, r, to)
             for kind, rows, before, after, t, r, to in zip(*d.values(), strict=True)
         }
+        return own if self.other is None else {**self.other.rows, **own}
 
     def _row(self, kind: Kind, level: Level, before: float, after: float) -> tuple[Motion, Motion, Array]:
         """Motions from the free end to the first section and from there to the second, and the distances.
@@ -57,7 +61,7 @@ class PieceData:
             ValueError: it could not be simulated.
         """
         key = (kind, level.rows, float(np.round(before, 12)), float(np.round(after, 12)))
-        t, r, to = self._rows[key]
+        t, r, to = self.rows[key]
         if not np.isfinite(t).all():
             raise ValueError(f"the piece {key} was not simulated")
         return (t[0], r[0]), (t[1], r[1]), to
@@ -83,6 +87,15 @@ class PieceData:
             count = len(LEVELS[kind])  # type: ignore[index]
             found[name] = Limit.of([values(i, going(arcs.value)) for i in range(count)])
         return found
+
+    def pinches(self, count: int) -> Limit:
+        """The limit of the pinches' first levels of meshes, with the limit of the arcs.
+
+        Args:
+            count: of the levels, 3 or more.
+        """
+        arcs = Limit.of([self._arcs(i) for i in range(len(LEVELS["arc"]))])
+        return Limit.of([self._pinches(i, going(arcs.value)) for i in range(count)])
 
     def _halved(self, level: Level, value: Callable[[float], Array]) -> Array:
         """(degree + 1, 6) values at all curvatures from those at the ones from zero."""

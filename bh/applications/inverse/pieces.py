@@ -33,6 +33,7 @@ FREE = 30.0  # mm from a free end or a joint to the section where an arc is take
 CLEAR = 30.0  # mm from the end of a pinched zone to it
 END = 10.0  # mm from there to the free end
 LARGEST = 0.02  # 1/mm, curvature before folding up to which pieces are known
+VARIED = ("Lstar", "t", "zone", "pinch", "fold")  # of `Setting`, that strips may be made off
 CONVERGING = Setting(edge=2.5, rows=2, formulation="consistent")
 
 
@@ -98,6 +99,15 @@ def table() -> dict[str, list[float | int | str]]:
     return {name: list(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
 
 
+def column(name: str) -> str:
+    """Name of a point's column for a field of its setting: "made_t", since "t" is what is measured.
+
+    Args:
+        name: one of `VARIED`.
+    """
+    return f"made_{name}"
+
+
 class PieceValues(TypedDict):
     """What is measured of a piece.
 
@@ -121,7 +131,10 @@ class PieceValues(TypedDict):
 
 @dataclass(frozen=True)
 class PieceTask:
-    """One piece: the task of the sweep that makes the data set (`bh.sweep.run`)."""
+    """One piece: the task of the sweep that makes the data set (`bh.sweep.run`).
+
+    A point may have fields of the setting that differ, see `column`.
+    """
 
     setting: Setting = CONVERGING
 
@@ -138,6 +151,9 @@ class PieceTask:
         """
         kind, before, after = str(point["kind"]), float(point["before"]), float(point["after"])
         setting = replace(self.setting, edge=float(point["edge"]), rows=int(point["rows"]))
+        for name in VARIED:
+            if column(name) in point:
+                setting = replace(setting, **{name: float(point[column(name)])})  # type: ignore[arg-type]
         if kind == "pinch":
             whole, start = setting.zone + 2.0 * (CLEAR + END), END
             found = simulate([before], [whole], [True], setting)

@@ -1,9 +1,9 @@
 """Problem C in practice: a crease that ends at a point, found in a library of designs and checked by simulation.
 
 Genetic algorithms draw their designs anew for every target. One library of random designs serves all: its ends are in a
-k-d tree, the nearest ones are polished by least squares, and the answer is simulated whole. What the simulation misses
-is added to the aim and the design polished again, so that the distance that counts is that of the whole strip, with
-its error bar where the model has one.
+k-d tree, the nearest ones are polished together, and the shortest that ends there is simulated whole. What the
+simulation misses is added to the aim and the design polished again, so that the distance that counts is that of the
+whole strip, with its error bar where the model has one.
 """
 
 from __future__ import annotations
@@ -12,33 +12,47 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from bh.applications.inverse.descent import descend
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.models import Name, model
-from bh.applications.inverse.optimisers import Found, polish
 from bh.applications.inverse.problems import Design, ReachPoint
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule, Swept
+from bh.applications.inverse.sifted import Sifted
 from bh.applications.inverse.simulate import Landing, Simulated
+from bh.applications.inverse.tolerances import predicted
+from bh.applications.inverse.wants import ReachAll, Wants
 from bh.errors import InputError
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-REACH = {
-    1: 6.0,
-    2: 20.0,
-    3: 40.0,
-}  # mm from a random design of so many segments; one segment has two variables only
+Candidate = tuple[ReachAll, Array, Bools]  # with variables (2 n,) and pinches (n,)
+SIZES = {1: 4_000, 2: 20_000}  # random designs of so many segments, which fill their few variables as densely
+WIDER = (
+    20  # candidates that are looked at for each that is polished, where a point is not all that is asked for
+)
+STEADIED = 24  # of the candidates that move least, which are made to move less
+ALIKE = 1e-3  # curvature over its largest, and mm, by which designs differ that are not the same one
 SAME = 0.1  # mm between chain and simulation, below which aiming again changes nothing
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """Random designs of n segments that their rules allow, and where they end. The seed makes them reproducible."""
+    """Random designs of n segments that their rules allow, and where they end. The seed makes them reproducible.
+
+    Attributes:
+        surrogate: the model.
+        n: segments.
+        size: random designs.
+        seed: of them.
+        rules: what is forbidden.
+    """
 
     surrogate: Forward
     n: int
@@ -66,21 +80,19 @@ class Library:
         """The problem of a target (3,), mm."""
         return ReachPoint(self.surrogate, self.n, self.rules, target)
 
-    def nearest(self, target: Array, count: int) -> Iterator[tuple[Array, Bools]]:
-        """Candidates in the order of their distance from a point, as far as they are near enough to be polished.
+    def nearest(self, target: Array, count: int) -> tuple[Array, Bools]:
+        """Candidates in the order of their distance from a point.
 
         Args:
             target: (3,), mm.
             count: candidates at most.
 
         Returns:
-            variables (2 n,) and pinches (n,) of one candidate after another.
+            variables (c, 2 n) and pinches (c, n) of the candidates.
         """
         x, on, _ = self.designs
-        near = self.tree.query(target, k=min(count, len(x)), distance_upper_bound=REACH[min(self.n, 3)])[1]
-        for i in np.atleast_1d(near):
-            if i < len(x):
-                yield x[i], on[i]
+        near = np.atleast_1d(self.tree.query(target, k=min(count, len(x)))[1])
+        return x[near], on[near]
 
 
 @cache
@@ -92,7 +104,12 @@ def library(n: int, seed: int = 1, name: Name = "converged") -> Library:
         seed: of its random designs.
         name: of the model.
     """
-    return Library(model(name), n, seed=seed)
+    return Library(model(name), n, size_of(n), seed)
+
+
+def size_of(n: int) -> int:
+    """How many random designs of n segments a library has."""
+    return SIZES.get(n, Library.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,19 +117,32 @@ class Reached:
     """A design for a target.
 
     Attributes:
-        target: (3,) the point asked for, mm.
+        design: crease and pinches.
+        wants: what was asked for.
         end: (3,) where the chain of its segments ends, mm.
+        missed: largest distance of the chain of its segments from a point that was asked for, mm.
+        turned: angle of its end from the direction that was asked for, rad; 0 where there was none.
         landing: of the whole simulated strip, or None where that was not asked for.
+        missed_simulated: as `missed`, of the simulated strip; nan where it was not simulated.
+        turned_simulated: as `turned`.
+        bar: error bar of `missed_simulated`, mm.
+        turn_bar: error bar of `turned_simulated`, rad.
         clear: the strips do not touch themselves in space (`Swept`).
-        simulations: how many it took.
+        simulations: how many rounds it took.
     """
 
     design: Design
-    target: Array
+    wants: Wants
     end: Array
-    landing: Landing | None
-    clear: bool
-    simulations: int
+    missed: float
+    turned: float
+    landing: Landing | None = None
+    missed_simulated: float = math.nan
+    turned_simulated: float = math.nan
+    bar: float = math.nan
+    turn_bar: float = math.nan
+    clear: bool = True
+    simulations: int = 0
 
     @property
     def simulated(self) -> Simulated | None:
@@ -120,19 +150,19 @@ class Reached:
         return None if self.landing is None else self.landing.strip
 
     @property
-    def missed(self) -> float:
-        """Distance of the chain's end from the target, mm."""
-        return float(np.linalg.norm(self.end - self.target))
-
-    @property
-    def missed_simulated(self) -> float:
-        """Distance of the simulated strip's end from the target, mm; nan where it was not simulated."""
-        return math.nan if self.landing is None else float(np.linalg.norm(self.landing.end - self.target))
+    def target(self) -> Array:
+        """(3,) the point asked for, mm."""
+        return self.wants.point
 
     @property
     def missed_at_most(self) -> float:
-        """The same with its error bar, mm."""
-        return math.nan if self.landing is None else self.missed_simulated + self.landing.bar
+        """Distance of the simulated strip with its error bar, mm."""
+        return self.missed_simulated + self.bar
+
+    @property
+    def turned_at_most(self) -> float:
+        """Angle of the simulated strip with its error bar, rad."""
+        return self.turned_simulated + self.turn_bar if self.wants.directed else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,62 +172,77 @@ class Reach:
     Attributes:
         most: segments.
         tolerance: of the end, mm.
+        angle: of its direction, rad, where one is asked for.
         candidates: designs polished for each number of segments.
         verify: simulate the strip, and aim again up to `rounds` times where that misses by more than `aim`
             (mm), or with its error bar by more than the tolerance.
         clear: prefer designs whose strips clear themselves in space; of the others only where no candidate
             does.
+        prefer: which of the candidates that end near enough is tried first: the "short" one, or the "robust" one,
+            whose end moves least with what is not made exactly (`tolerances.predicted`), of as few segments as do and
+            of one more.
+        seed: of the random designs.
+        libraries: of random designs; where there is none of a number of segments, those of the model.
         model: "converged", or "source" for one row of bars and hinges; of no use where libraries are given.
     """
 
     most: int = 4
     tolerance: float = 1.0
-    candidates: int = 24
+    angle: float = math.radians(1.0)
+    candidates: int = 48
     verify: bool = True
     rounds: int = 3
     aim: float = 0.5
     clear: bool = True
+    prefer: Literal["short", "robust"] = "short"
     seed: int = 1
     libraries: tuple[Library, ...] = ()
     model: Name = "converged"
 
-    def __call__(self, target: ArrayLike) -> Reached:
-        """The first design that ends within the tolerance.
+    def __call__(self, target: ArrayLike | Wants) -> Reached:
+        """The first design that does what is asked for.
+
+        Args:
+            target: (3,) point, mm, or all that is asked for.
 
         Raises:
             DesignError: a target that is no point, or that no crease of `most` segments reaches.
         """
-        point = np.asarray(target, dtype=float)
-        if point.shape != (3,) or not np.isfinite(point).all():
-            raise DesignError(f"the target {target!r} is no point; give three coordinates in mm")
+        wants = target if isinstance(target, Wants) else Wants.of(target)
         second: Reached | None = None
-        nearest = math.inf
-        for n in range(1, self.most + 1):
-            book = self.book(n)
-            for found in self._candidates(book, point):
-                nearest = min(nearest, found.value)
-                if found.value > self.tolerance:
-                    continue
-                design = book.problem(point).design(found.x, found.on)
-                clear = not self.clear or not Swept().meets(
-                    book.surrogate, design.k0, design.length, design.pinched
-                )
+        sifted = Sifted()
+        for group in self._groups(wants, sifted):
+            for problem, x, on in group:
+                design = problem.design(x, on)
+                clear = not self.clear or not Swept().meets(problem.surrogate, *_arrays(design))
                 if not clear and second is not None:
                     continue
-                reached = self._verified(book, point, found, clear)
+                reached = self._verified(problem, x, on, clear)
                 if reached is not None and clear:
                     return reached
                 second = second or reached
             # a strip that meets itself is the answer only where one segment more does no better
-            if second is not None and second.design.n < n:
+            if second is not None and second.design.n < group[0][0].n:
                 return second
         if second is not None:
             return second
-        x, y, z = point
-        raise DesignError(
-            f"no crease of up to {self.most} segments was found that ends within {self.tolerance:g} mm of "
-            f"({x:g}, {y:g}, {z:g}); the nearest ends {nearest:.3g} mm away"
-        )
+        raise DesignError(sifted.told(wants, self.most, self.tolerance, self.angle))
+
+    def _groups(self, wants: Wants, sifted: Sifted) -> Iterator[list[Candidate]]:
+        """Candidates of one segment, of two, ..., the preferred first; robust ones with those of a segment more."""
+        before: list[Candidate] = []
+        for n in range(1, self.most + 1):
+            book = self.book(n)
+            problem = ReachAll(book.surrogate, n, book.rules, wants.point, wants, np.zeros(1))
+            here = [(problem, x, on) for x, on in self._candidates(book, problem, sifted)]
+            if self.prefer == "short":
+                yield from [here] if here else []
+                continue
+            both = [*before, *here]
+            if both and (before or n == self.most):
+                both.sort(key=lambda each: float(self._moves(each[0], each[1][None], each[2][None])[0]))
+                yield both
+            before = here
 
     def book(self, n: int) -> Library:
         """The library of designs of n segments."""
@@ -205,39 +250,99 @@ class Reach:
             n, self.seed, self.model
         )
 
-    def _candidates(self, book: Library, point: Array) -> Iterator[Found]:
-        problem = book.problem(point)
-        for x, on in book.nearest(point, self.candidates):
-            found = polish(problem, x, on)
-            if found.allowed:
-                yield found
+    def _candidates(self, book: Library, problem: ReachAll, sifted: Sifted) -> list[tuple[Array, Bools]]:
+        """Variables (2 n,) and pinches (n,) of polished designs that are near enough, the preferred ones first."""
+        wants = problem.wants
+        simple = not wants.directed and not wants.stops and not len(wants.keep_out)
+        count = self.candidates if simple and self.prefer == "short" else 4 * self.candidates
+        x, on = book.nearest(wants.point, count if simple else WIDER * count)
+        if not simple:
+            first = np.argsort(np.linalg.norm(problem.residuals(x, on), axis=1), kind="stable")[:count]
+            x, on = x[first], on[first]
+        x = descend(problem, x, on)
+        x, on = self._good(problem, x, on, sifted)
+        if self.prefer == "robust":
+            first = np.argsort(self._moves(problem, x, on), kind="stable")[:STEADIED]
+            x, on = x[first], on[first]
+            steady = problem.steadied(x, on)
+            x, on = self._good(problem, np.concatenate((steady, x)), np.concatenate((on, on)), sifted)
+            order = np.argsort(self._moves(problem, x, on), kind="stable")
+        else:
+            order = np.argsort(problem.split(x)[1].sum(axis=1), kind="stable")
+        x, on = x[order], on[order]
+        found = []
+        for i in range(len(x)):
+            if _alike(x[i], on[i], x[:i], on[:i]):
+                continue
+            if wants.free(problem.design(x[i], on[i]), book.surrogate):
+                found.append((x[i], on[i]))
+            else:
+                sifted.boxed += 1
+        return found
 
-    def _verified(self, book: Library, point: Array, found: Found, clear: bool) -> Reached | None:
+    def _good(self, problem: ReachAll, x: Array, on: Bools, sifted: Sifted) -> tuple[Array, Bools]:
+        """Those of some candidates that obey the rules and are near enough by the chain."""
+        if not len(x):
+            return x, on
+        missed, turned = problem.off(problem.bare(x, on))
+        legal = problem.violation(x, on) <= 0.0
+        sifted.add(missed, turned, legal)
+        bars = problem.surrogate.bars(*problem.split(x), on)[0]
+        good = legal & (missed <= self.tolerance) & (turned <= self.angle) & (bars <= self.tolerance)
+        return x[good], on[good]
+
+    def _moves(self, problem: ReachAll, x: Array, on: Bools) -> Array:
+        """(N,) how far ends are off in the mean, mm."""
+        if not len(x):
+            return np.zeros(0)
+        return predicted(problem.surrogate, *problem.split(x), on).size
+
+    def _verified(self, problem: ReachAll, x: Array, on: Bools, clear: bool) -> Reached | None:
         """The simulated design, aimed again at what its simulation missed; None where it does not come near enough."""
-        problem = book.problem(point)
         best: Reached | None = None
         for count in range(1, self.rounds + 1):
-            design = problem.design(found.x, found.on)
-            end = problem.end(found.x, found.on)
+            design = problem.design(x, on)
+            bare = problem.bare(x[None], on[None])[0]
+            missed, turned = (float(value) for value in problem.off(bare))
+            reached = Reached(design, problem.wants, problem.end(x, on), missed, turned, clear=clear)
             if not self.verify:
-                return Reached(design, point, end, None, clear, 0)
-            if book.surrogate.bars(design.k0, design.length, design.pinched)[0] > self.tolerance:
-                break  # whatever its simulation says
+                return reached
             try:
-                landing = book.surrogate.land(*design.lists())
+                landing, there, bar, turn_bar = problem.landed(design)
             except InputError:  # a flat strip that meets itself cannot be cut: another candidate
                 break
-            reached = Reached(design, point, end, landing, clear, count)
-            if best is None or reached.missed_at_most < best.missed_at_most:
+            missed, turned = (float(value) for value in problem.off(there))
+            reached = replace(
+                reached,
+                landing=landing,
+                missed_simulated=missed,
+                turned_simulated=turned,
+                bar=bar,
+                turn_bar=turn_bar,
+                simulations=count,
+            )
+            if best is None or self._badness(reached) < self._badness(best):
                 best = reached
-            if best.missed_simulated <= self.aim and best.missed_at_most <= self.tolerance:
+            if best.missed_simulated <= self.aim and self._badness(best) <= 1.0:
                 break
-            if (
-                np.linalg.norm(landing.end - end) < SAME
-            ):  # the chain was right: its nearest design is this one
+            if np.linalg.norm(there - bare) < SAME:  # the chain was right: its nearest design is this one
                 break
-            problem = replace(problem, target=problem.target + point - landing.end)
-            found = polish(problem, found.x, found.on)
-            if not found.allowed:
+            problem = problem.shifted(there, x, on)
+            x = descend(problem, x[None], on[None])[0]
+            if problem.violation(x, on) > 0.0:
                 break
-        return best if best is not None and best.missed_at_most <= self.tolerance else None
+        return best if best is not None and self._badness(best) <= 1.0 else None
+
+    def _badness(self, reached: Reached) -> float:
+        """Distance and angle with their error bars over what is allowed, the larger one."""
+        return max(reached.missed_at_most / self.tolerance, reached.turned_at_most / self.angle)
+
+
+def _arrays(design: Design) -> tuple[Array, Array, Bools]:
+    return design.k0, design.length, design.pinched
+
+
+def _alike(x: Array, on: Bools, others: Array, switches: Bools) -> bool:
+    """Whether a candidate (2 n,) is one of others (m, 2 n), but for less than `ALIKE`."""
+    same = (np.abs(others - x) < ALIKE).all(axis=1) & (switches == on).all(axis=1)
+    return bool(same.any())

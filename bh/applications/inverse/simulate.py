@@ -78,12 +78,18 @@ def model(
         setting: sheet, fold and pinch.
 
     Raises:
-        DesignError: lists of different lengths.
+        DesignError: lists of different lengths, or a pinched segment that is shorter than the zone of its pinch.
         PatternError: the flat strip overlaps itself: it cannot be cut from one sheet.
     """
     if not len(k0) == len(lengths) == len(pinched) or not len(k0):
         raise DesignError(
             f"{len(k0)} curvatures, {len(lengths)} lengths and {len(pinched)} pinches; give one of each"
+        )
+    short = min((size for size, on in zip(lengths, pinched, strict=True) if on), default=math.inf)
+    if short < setting.zone:
+        raise DesignError(
+            f"the zone of a pinch, {setting.zone:g} mm, is longer than its segment of {short:g} mm; "
+            f"make the zone {short:g} mm or less, or the segment longer"
         )
     whole = float(sum(lengths))
     pattern = parallel_creases(list(k0), list(lengths), setting.width)
@@ -195,11 +201,15 @@ class Landing:
         strip: that was simulated, on one mesh.
         end: (3,) of the crease in the frame at its start, mm; of `strip`, or in the limit of fine meshes.
         bar: error bar of `end`, mm; 0 where there is none.
+        frame: (3, 3) of the end in that of the start, as `end`.
+        turn: error bar of `frame`, rad.
     """
 
     strip: Simulated
     end: Array
     bar: float
+    frame: Array
+    turn: float
 
 
 class SegmentValues(TypedDict):

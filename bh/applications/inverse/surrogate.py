@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, NdBSpline, RectBivariateSpline
 
+from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.segments import DesignError, Domain, folded, folded_transforms
 from bh.applications.inverse.simulate import SETTING, Landing, Setting, simulate
 from bh.applications.inverse.transforms import chain, matrix
@@ -38,6 +39,7 @@ class Surrogate:
     Attributes:
         domain: where it may be asked.
         setting: what was simulated.
+        has_variants: False, see `Forward`.
     """
 
     def __init__(
@@ -48,7 +50,7 @@ class Surrogate:
         Raises:
             DesignError: the segments are no grid, or leave out parts of the domain.
         """
-        self.setting, self.domain = setting, Domain(fold=setting.fold)
+        self.setting, self.domain, self.has_variants = setting, Domain(fold=setting.fold), False
         k0, length, values = (np.asarray(x, dtype=float) for x in (k0, length, values))
         lengths = np.unique(length)
         s = np.linspace(-1.0, 1.0, COLUMNS)
@@ -212,7 +214,24 @@ class Surrogate:
             DesignError: the path ended early.
         """
         strip = simulate(k0, length, pinched, self.setting)
-        return Landing(strip, strip.t, 0.0)
+        return Landing(strip, strip.t, 0.0, strip.r, 0.0)
+
+    def closed_by(self, part: float) -> Forward:
+        """Not known to this model: only pinches that are closed all the way.
+
+        Args:
+            part: of the way.
+
+        Raises:
+            DesignError: always.
+        """
+        raise DesignError(
+            f"the source's model knows no pinch closed by {part:g} of its way; use model = 'converged'"
+        )
+
+    def varied(self) -> Mapping[str, tuple[Forward, Forward]]:
+        """None: this model does not know what strips do that are made a little differently."""
+        return {}
 
     def bars(self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array]:
         """Zero: one mesh has no error bars, see `Forward.bars`.

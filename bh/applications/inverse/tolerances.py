@@ -11,14 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bh.applications.inverse.forward import Forward
+from bh.applications.inverse.pieces import VARIED
 from bh.applications.inverse.problems import Design
 from bh.applications.inverse.simulate import Setting, simulate
+from bh.applications.inverse.variants import STEPS
 
 Array = NDArray[np.float64]
-VARIED = ("Lstar", "t", "zone", "pinch", "fold")  # of `Setting`
 STEP = 1e-4  # of a standard deviation, for derivatives of the model
 
 
@@ -78,6 +79,62 @@ class Tolerance:
         square, directions = np.linalg.eigh(self.covariance)
         size = np.sqrt(np.maximum(square, 0.0) * chi2.ppf(probability, 3))
         return size[::-1], directions[:, ::-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Movements of the ends of many designs by one standard deviation of each thing, by chains of pieces.
+
+    Attributes:
+        moves: (..., 3) by name, mm.
+    """
+
+    moves: Mapping[str, Array]
+
+    @property
+    def size(self) -> Array:
+        """(...) root of the mean square of the distance from where the end should be, mm."""
+        return np.asarray(np.sqrt(sum((move**2).sum(axis=-1) for move in self.moves.values())))
+
+    def one(self) -> Tolerance:
+        """Of one design, whose moves are (3,)."""
+        return Tolerance(self.moves, {})
+
+
+def predicted(
+    model: Forward, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike, spreads: Spreads | None = None
+) -> Predicted:
+    """How ends of designs (..., n) move, without a simulation: differences of chains that are made differently.
+
+    Args:
+        model: that the designs are made with.
+        k0: (..., n) curvatures before folding, 1/mm.
+        length: (..., n), mm.
+        pinched: (..., n) truth values.
+        spreads: standard deviations; None for the default ones.
+
+    Raises:
+        DesignError: the model knows no variants of its strips.
+    """
+    spreads = spreads or Spreads()
+    k, size, on = (
+        np.asarray(k0, dtype=float),
+        np.asarray(length, dtype=float),
+        np.asarray(pinched, dtype=bool),
+    )
+    moves: dict[str, Array] = {}
+    for name, (low, high) in model.varied().items():
+        up, down = (each.forward(k, size, on, check=False)[0][..., -1, :] for each in (high, low))
+        moves[name] = (up - down) * (0.5 * getattr(spreads, name) / STEPS[name])
+    for i in range(k.shape[-1]):
+        for name, spread in (("k0", spreads.k0), ("length", spreads.length)):
+            shift = STEP * spread * (np.arange(k.shape[-1]) == i)
+            ends = []
+            for sign in (1.0, -1.0):
+                bent, longer = (sign * shift, 0.0) if name == "k0" else (0.0, sign * shift)
+                ends.append(model.forward(k + bent, size + longer, on, check=False)[0][..., -1, :])
+            moves[f"{name} of segment {i + 1}"] = (ends[0] - ends[1]) * (0.5 / STEP)
+    return Predicted(moves)
 
 
 def tolerance(

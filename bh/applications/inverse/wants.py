@@ -1,0 +1,285 @@
+"""What a design is asked for: a point, the direction of its end, points on the way of the pinch, and room for others.
+
+Everything that is to be met is a vector of residuals (mm), so that candidates are polished for all of it at once.
+Directions count as much as a lever of `LEVER` would move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bh.applications.inverse.descent import descend
+from bh.applications.inverse.forward import Forward
+from bh.applications.inverse.problems import Design, ReachPoint
+from bh.applications.inverse.segments import DesignError
+from bh.applications.inverse.self_intersection import Swept
+from bh.applications.inverse.simulate import Landing
+from bh.applications.inverse.tolerances import predicted
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+LEVER = 100.0  # mm
+STEADY = 0.3  # weight of movements beside residuals, where a design is to move less
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """Where the end of the crease is when pinches are closed by a part of the way.
+
+    Attributes:
+        part: of the way from the fold to the full pinch, above 0 and below 1.
+        point: (3,) where the end is to be then, mm.
+    """
+
+    part: float
+    point: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Wants:
+    """All that is asked of a design.
+
+    Attributes:
+        point: (3,) where the crease ends, mm.
+        tangent: (3,) unit vector along which it ends, or None for any.
+        up: (3,) unit vector at right angles to it to which the ridge of the fold points there, or None for any.
+        stops: points on the way there while all pinches are closed alike.
+        keep_out: (k, 2, 3) boxes that the strip stays out of, folded and pinched, by their lowest and highest
+            corners, mm.
+    """
+
+    point: Array
+    tangent: Array | None = None
+    up: Array | None = None
+    stops: tuple[Stop, ...] = ()
+    keep_out: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
+
+    @classmethod
+    def of(
+        cls,
+        point: ArrayLike,
+        tangent: ArrayLike | None = None,
+        up: ArrayLike | None = None,
+        stops: Sequence[tuple[float, ArrayLike]] = (),
+        keep_out: ArrayLike = (),
+    ) -> Wants:
+        """From plain numbers, checked.
+
+        Args:
+            point: (3,), mm.
+            tangent: (3,) of any length.
+            up: (3,) of any length; only its part at right angles to the tangent counts.
+            stops: parts of the way of the pinch, and points (3,), mm.
+            keep_out: (k, 2, 3) or (k, 6) corners of boxes, mm.
+
+        Raises:
+            DesignError: no point, no direction, a part that is none, or a box without room.
+        """
+        at = _vector(point, "the target")
+        if up is not None and tangent is None:
+            raise DesignError("a target with up needs a tangent, too; give both directions")
+        along = None if tangent is None else _unit(_vector(tangent, "the tangent"), "the tangent")
+        ridge = None
+        if up is not None and along is not None:
+            ridge = _vector(up, "up")
+            ridge = _unit(ridge - (ridge @ along) * along, "up, at right angles to the tangent,")
+        for part, _ in stops:
+            if not 0.0 < part < 1.0:
+                raise DesignError(
+                    f"a pinch that is closed by {part:g} of its way is no stop; give 0 < part < 1"
+                )
+        try:
+            boxes = np.asarray(keep_out, dtype=float).reshape(-1, 2, 3)
+        except ValueError as error:
+            raise DesignError(
+                "keep_out needs boxes of six numbers: x, y, z of two opposite corners"
+            ) from error
+        boxes = np.sort(boxes, axis=1)
+        if not np.isfinite(boxes).all() or (boxes[:, 0] >= boxes[:, 1]).any():
+            raise DesignError("a box of keep_out has no room; give two opposite corners")
+        met = tuple(Stop(float(part), _vector(p, "a stop")) for part, p in stops)
+        return cls(at, along, ridge, met, boxes)
+
+    @property
+    def directed(self) -> bool:
+        """Whether a direction is asked for."""
+        return self.tangent is not None
+
+    def turn(self, frames: Array) -> Array:
+        """(..., 3) or (..., 0) residuals of the direction of frames (..., 3, 3), mm.
+
+        The rotation vector to the frame that is asked for times the lever; of a tangent alone the shortest turn.
+        """
+        if self.tangent is None:
+            return np.zeros((*frames.shape[:-2], 0))
+        along = frames[..., 0]
+        if self.up is None:
+            return LEVER * _shortest(np.broadcast_to(self.tangent, along.shape), along)
+        from scipy.spatial.transform import Rotation
+
+        wanted = np.column_stack((self.tangent, np.cross(self.up, self.tangent), self.up))
+        off = (frames @ wanted.T).reshape(-1, 3, 3)
+        turned = Rotation.from_matrix(off).as_rotvec().reshape(*frames.shape[:-2], 3)
+        return LEVER * np.asarray(turned, dtype=float)
+
+    def free(self, design: Design, surrogate: Forward) -> bool:
+        """Whether the strip of a design stays out of the boxes, folded and pinched.
+
+        Args:
+            design: crease and pinches.
+            surrogate: the model.
+        """
+        if not len(self.keep_out):
+            return True
+        cell = max(1.0, min(5.0, 0.25 * float(np.ptp(self.keep_out, axis=1).min())))
+        swept = Swept(cell=cell)
+        for on in (np.zeros(design.n, dtype=bool), design.pinched):
+            points, triangles, _ = swept.strip(surrogate, design.k0, design.length, on)
+            sampled = np.concatenate((points, points[triangles].mean(axis=1)))[:, None, :]
+            inside = (sampled > self.keep_out[:, 0]) & (sampled < self.keep_out[:, 1])
+            if inside.all(axis=-1).any():
+                return False
+        return True
+
+
+def _vector(value: ArrayLike, name: str) -> Array:
+    found = np.asarray(value, dtype=float)
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise DesignError(f"{name} {value!r} is no point; give three coordinates in mm")
+    return found
+
+
+def _unit(value: Array, name: str) -> Array:
+    size = float(np.linalg.norm(value))
+    if size < 1e-9:
+        raise DesignError(f"{name} has no direction; give three numbers, not all of them zero")
+    return value / size
+
+
+def _shortest(start: Array, end: Array) -> Array:
+    """(..., 3) rotation vectors of the shortest turns from unit vectors to others."""
+    axis = np.cross(start, end)
+    sine, cosine = np.linalg.norm(axis, axis=-1), (start * end).sum(axis=-1)
+    angle = np.arctan2(sine, cosine)
+    found: Array = axis * (angle / np.where(sine > 1e-12, sine, 1.0))[..., None]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class ReachAll(ReachPoint):
+    """Problem C with more wants than a point.
+
+    Attributes:
+        wants: all that is asked for; `target` is its point.
+        shift: (k,) added to the residuals: what a simulated strip was off where the chain was right, mm.
+    """
+
+    wants: Wants = field(default_factory=lambda: Wants(np.zeros(3)))
+    shift: Array = field(default_factory=lambda: np.zeros(1))
+
+    @cached_property
+    def _closed(self) -> tuple[Forward, ...]:
+        return tuple(self.surrogate.closed_by(stop.part) for stop in self.wants.stops)
+
+    def bare(self, x: Array, on: Bools) -> Array:
+        """(N, k) residuals without the shift, mm: of the point, of the direction, of the stops.
+
+        Args:
+            x: (N, 2 n) variables.
+            on: (N, n) pinches.
+        """
+        design = self.split(x)
+        points, frames = self.surrogate.forward(*design, on, check=False)
+        groups = [points[..., -1, :] - self.wants.point, self.wants.turn(frames[..., -1, :, :])]
+        for model, stop in zip(self._closed, self.wants.stops, strict=True):
+            groups.append(model.forward(*design, on, check=False)[0][..., -1, :] - stop.point)
+        return np.concatenate(groups, axis=-1)
+
+    def residuals(self, x: Array, on: Bools) -> Array:
+        """(N, k) from what is asked for, mm, see `bare`.
+
+        Args:
+            x: (N, 2 n) variables.
+            on: (N, n) pinches.
+        """
+        found: Array = self.bare(x, on) + self.shift
+        return found
+
+    def steadied(self, x: Array, on: Bools) -> Array:
+        """Designs next to others that do the same and whose ends move less with what is not made exactly.
+
+        Movements are brought down beside the residuals, and then these to zero again by the shortest way.
+
+        Args:
+            x: (N, 2 n) variables.
+            on: (N, n) pinches.
+
+        Returns:
+            (N, 2 n) variables.
+        """
+        return descend(self, descend(_Steady(self), x, on), on)
+
+    def off(self, residuals: Array) -> tuple[Array, Array]:
+        """(...) largest distance from a point that is asked for, mm, and (...) angle from the direction, rad.
+
+        Args:
+            residuals: (..., k) of `bare`.
+        """
+        turned = 3 if self.wants.directed else 0
+        apart = np.concatenate((residuals[..., :3], residuals[..., 3 + turned :]), axis=-1)
+        apart = np.linalg.norm(apart.reshape(*apart.shape[:-1], -1, 3), axis=-1).max(axis=-1)
+        return apart, np.linalg.norm(residuals[..., 3 : 3 + turned], axis=-1) / LEVER
+
+    def landed(self, design: Design) -> tuple[Landing, Array, float, float]:
+        """The whole strip simulated: where it lands, its residuals (k,), and error bars, mm and rad.
+
+        Args:
+            design: crease and pinches.
+
+        Raises:
+            DesignError: a path ended early.
+        """
+        landing = self.surrogate.land(*design.lists())
+        groups = [landing.end - self.wants.point, self.wants.turn(landing.frame)]
+        bar = landing.bar
+        for model, stop in zip(self._closed, self.wants.stops, strict=True):
+            there = model.land(*design.lists())
+            groups.append(there.end - stop.point)
+            bar = max(bar, there.bar)
+        return landing, np.concatenate(groups), bar, landing.turn
+
+    def shifted(self, residuals: Array, x: Array, on: Bools) -> ReachAll:
+        """The problem aimed at what a simulated strip missed.
+
+        Args:
+            residuals: (k,) of the simulated strip, mm.
+            x: (2 n,) its variables.
+            on: (n,) its pinches.
+        """
+        return replace(self, shift=residuals - self.bare(x[None], on[None])[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Steady:
+    """Residuals of a problem, and beside them a part of the movements of the end by one spread of each thing."""
+
+    problem: ReachAll
+
+    @property
+    def lower(self) -> Array:
+        return self.problem.lower
+
+    @property
+    def upper(self) -> Array:
+        return self.problem.upper
+
+    def residuals(self, x: Array, on: Bools) -> Array:
+        moves = predicted(self.problem.surrogate, *self.problem.split(x), on).moves
+        return np.concatenate(
+            (self.problem.residuals(x, on), *(STEADY * move for move in moves.values())), axis=-1
+        )
