@@ -73,10 +73,8 @@ class Sheet:
         Raises:
             ModelError: one line that names the value and what to give.
         """
-        take_units(
-            self, "sheet", E="modulus", t="length", E2="modulus", G12="modulus", grain="angle",
-            strength="modulus", strength2="modulus", shear_strength="modulus",
-        )  # fmt: skip
+        take_units(self, "sheet", E="modulus", t="length", E2="modulus", G12="modulus", grain="angle")
+        take_units(self, "sheet", strength="modulus", strength2="modulus", shear_strength="modulus")
         units = {"E": "MPa", "t": "mm", "E2": "MPa", "G12": "MPa", "density": "kg/m^3"}
         for name, unit in (units | dict.fromkeys(STRENGTHS, "MPa")).items():
             value = getattr(self, name)
