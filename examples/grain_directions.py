@@ -1,7 +1,7 @@
 """One card, folded along one curved crease, with its grain along, across and at 45 degrees to the crease's middle.
 
-Nothing holds the card, so that the grain alone decides how far its ends come together; at 45 degrees it winds up, one end
-against the other. Pictures are coloured by the stress over the strength of the card.
+Nothing holds the card, so that the grain alone decides how far its ends come together; at 45 degrees it winds up, one
+end against the other. Pictures are coloured by the stress over the strength of the card.
 """
 
 import numpy as np
