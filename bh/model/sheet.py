@@ -125,7 +125,10 @@ class Sheet:
         return cls(E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t, density=density, **strengths)
 
     def strengths(self) -> tuple[float, float, float]:
-        """Stresses of yield along the grain, across it and in shear, MPa; of a sheet without one von Mises's.
+        """Stresses of yield; of a sheet without a grain von Mises's.
+
+        Returns:
+            along the grain, across it and in shear, MPa.
 
         Raises:
             ModelError: they are not given.

@@ -73,6 +73,9 @@ def cell_data(state: State) -> dict[str, NDArray[np.float64]]:
 
     Args:
         state: of a path.
+
+    Returns:
+        (t,) or (t, 3) by name.
     """
     cells = {f"{kind}_energy_density": values for kind, values in state.energy_density.items()}
     if state.recover is None or not state.mesh.flat:
