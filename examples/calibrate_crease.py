@@ -1,4 +1,4 @@
-"""L* of a crease from a measured curve: the sheet is lifted at its crease in three steps, with the force read after each.
+"""L* of a crease from a measured curve: the sheet is lifted in three steps, with the force read after each.
 
 Nobody measured here: the curve is the shell's, with 3 % of noise, and what is fitted to it is the consistent
 formulation. The interval is that of the noise; the difference of the two models on these meshes comes on top.

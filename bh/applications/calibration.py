@@ -188,8 +188,14 @@ def fit(
         return out
 
     done = least_squares(
-        residual, begin / scale, jacobian, bounds=(low / scale, high / scale), method="trf", xtol=1e-9, ftol=1e-10
-    )  # fmt: skip
+        residual,
+        begin / scale,
+        jacobian,
+        bounds=(low / scale, high / scale),
+        method="trf",
+        xtol=1e-9,
+        ftol=1e-10,
+    )
     variance = 1.0 if sigma is not None else float(done.fun @ done.fun) / (m - n)
     covariance, unknown = _known(np.asarray(done.jac), np.abs(done.x), variance, names)
     covariance = covariance * scale[:, None] * scale
@@ -258,5 +264,5 @@ def _replaced(model: Model, name: str, value: float) -> Model:
         if getattr(law, what) is not None:
             return replace(model, creases={**model.creases, crease: replace(law, **{what: value})})
     raise ModelError(
-        f"free '{name}' is no value of the model; give sheet.KEY or creases.NAME.KEY of one that it has, such as sheet.E"
+        f"free '{name}' is no value of the model; give sheet.KEY or creases.NAME.KEY that it has, such as sheet.E"
     )
