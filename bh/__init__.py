@@ -20,6 +20,7 @@ except KeyboardInterrupt:  # of the command `bh` alone; of a user's own program 
     raise SystemExit(130) from None
 
 if TYPE_CHECKING:
+    from bh.applications.calibration import Calibration, Measured, calibrate
     from bh.commands.read import Run, read
     from bh.errors import (
         InputError,
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
 
 # where a name is; `tests/test_architecture.py` holds it against the imports above
 _NAMES = {
+    "bh.applications.calibration": "Calibration Measured calibrate",
     "bh.commands.read": "Run read",
     "bh.errors": "InputError ModelError NotReachedError NotReachedWarning PathFileError SceneError",
     "bh.formulations.protocols": "Formulation SheetSystem",
@@ -112,6 +114,7 @@ __all__ = [
     "ArcLength",
     "Automatic",
     "Body",
+    "Calibration",
     "Constraint",
     "CreaseLaw",
     "Displace",
@@ -126,6 +129,7 @@ __all__ = [
     "Indenter",
     "InputError",
     "LoadControl",
+    "Measured",
     "Model",
     "ModelError",
     "Moment",
@@ -155,6 +159,7 @@ __all__ = [
     "Zone",
     "allow_outside",
     "allow_plugins",
+    "calibrate",
     "depth",
     "load_scene",
     "read",

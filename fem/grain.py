@@ -39,6 +39,21 @@ def compliance(sheet: Sheet) -> Array:
     return np.array([[1.0 / sheet.E, mixed, 0.0], [mixed, 1.0 / sheet.E2, 0.0], [0.0, 0.0, 1.0 / sheet.G12]])
 
 
+def compliance_in_drawing(sheet: Sheet) -> Array:
+    """(3, 3) strains (xx, yy, 2 xy) of a unit stress (xx, yy, xy) in the axes of the drawing, 1 / MPa.
+
+    Args:
+        sheet: with a grain or without.
+    """
+    if sheet.grain is None:
+        one, mixed, shear = 1.0 / sheet.E, -sheet.nu / sheet.E, 2.0 * (1.0 + sheet.nu) / sheet.E
+        return np.array([[one, mixed, 0.0], [mixed, one, 0.0], [0.0, 0.0, shear]])
+    c, s = axes(sheet)[0]
+    # stress (xx, yy, xy) to (aa, bb, ab); strains go back by its transpose
+    T = np.array([[c * c, s * s, 2.0 * c * s], [s * s, c * c, -2.0 * c * s], [-c * s, c * s, c * c - s * s]])
+    return np.asarray(T.T @ compliance(sheet) @ T)
+
+
 def membrane_stiffness(tensors: Array, weights: Array, F: Array, J: Array, sheet: Sheet) -> Array:
     """Stiffness against generalised strains.
 

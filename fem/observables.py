@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.formulations.state import Energy
+from bh.formulations.stress import Resultants
 from bh.model.model import Model
 from bh.model.sheet import Sheet
 from fem import grain
@@ -76,7 +78,20 @@ def observe(
         crease_couples=couples,
         membrane_forces=in_plane,
         moments=bent,
+        recover=partial(resultants, model.sheet, in_plane, bent),
     )
+
+
+def resultants(sheet: Sheet, forces: Array, moments: Array) -> Resultants:
+    """What stresses are made of; strains and curvatures are those that forces and moments belong to.
+
+    Args:
+        sheet: material and thickness.
+        forces: (t, 3) membrane forces at the middle of each triangle, N / mm.
+        moments: (t, 3) moments there, N.
+    """
+    C = grain.compliance_in_drawing(sheet)
+    return Resultants(sheet, forces @ C / sheet.t, moments @ C * 12.0 / sheet.t**3, forces, moments)
 
 
 def _to_corners(system: ShellSystem, nodal: Array) -> Array:

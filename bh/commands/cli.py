@@ -191,7 +191,7 @@ def run(
         )
     folder = Path(f"{loaded.name}-out") if output is None else output
     try:
-        path, names, before, contact = solve(
+        path, names, before, contact, yields = solve(
             loaded,
             folder,
             resume=resume,
@@ -211,7 +211,7 @@ def run(
     written = [folder / name for name in names]
     written += write_extras(path, loaded, folder, pictures, vtu)
     if not quiet:
-        summary(path, loaded, written, contact)
+        summary(path, loaded, written, contact, yields)
     if path.reached and path.accuracy is not None and not path.accuracy.met:
         why = "; ".join(note for note in path.accuracy.notes if note.startswith("ended"))
         say(

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from bh.analysis.contact import Contact
+from bh.analysis.yielding import Yielding
+from bh.formulations.stress import Extreme
 from bh.paths.path import Path as Trace
 from bh.scene.load import Scene
 
 
-def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, object]:
+def result(
+    path: Trace, scene: Scene, contact: Contact | None, yields: Yielding | str | None = None
+) -> dict[str, object]:
     """The content of result.json; energies in N mm, angles in rad; `contact` is the path's first self-contact.
 
     Args:
         path: solved, as far as it goes.
         scene: that it is of.
         contact: the path's first self-contact, if any.
+        yields: when and where the sheet yields, or why that cannot be told; None where its strength is not given.
     """
     model = path.model
     mesh, last = model.mesh, path[-1]
@@ -53,6 +58,7 @@ def result(path: Trace, scene: Scene, contact: Contact | None) -> dict[str, obje
             if len(a)
         },
         "self_contact": _contact(path, contact),
+        "yield": _yield(yields),
         "steps": steps,
         "iterations": path.iterations,
         "wall_time_s": path.wall_time_s,
@@ -85,6 +91,27 @@ def _contact(path: Trace, contact: Contact | None) -> dict[str, object]:
             "triangles": contact.triangles[:100].tolist(),
         }
     return found
+
+
+def _yield(yields: Yielding | str | None) -> dict[str, object] | None:
+    if yields is None or isinstance(yields, str):
+        return None if yields is None else {"unknown": yields}
+
+    def place(found: Extreme) -> dict[str, object]:
+        return {
+            "utilisation": found.utilisation,
+            "side": found.side,
+            "triangle": found.triangle,
+            "place": found.place.tolist(),
+        }
+
+    out: dict[str, object] = {
+        "found": yields.first is not None,
+        "largest": place(yields.largest) | {"state": yields.state},
+    }
+    if yields.first is not None:
+        out["first"] = place(yields.first) | {"step": yields.step, "lambda": yields.lam}
+    return out
 
 
 def _number(value: float) -> float | None:

@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bh.analysis.contact import Contact, first_contact
+from bh.analysis.yielding import Yielding, yielding
 from bh.commands.occupied import FINISHED, UNFINISHED, changed, check_folder
 from bh.commands.result import result
-from bh.errors import InputError
+from bh.errors import InputError, ModelError
 from bh.model.serialise import fingerprint
 from bh.paths.export import FOLDED, folded_frame, write_flat, write_state
 from bh.paths.path import Path as Trace
@@ -43,12 +44,14 @@ class Solved(NamedTuple):
         names: of its two files in the folder.
         before: whether it had been finished before.
         contact: its first self-contact, if any.
+        yields: how near to yield it comes, or why that cannot be told; None for a sheet whose strength is not given.
     """
 
     path: Trace
     names: tuple[str, str]
     before: bool
     contact: Contact | None
+    yields: Yielding | str | None
 
 
 def solve(
@@ -147,8 +150,8 @@ def _solved(
             move(folder_of(file), folder_of(folder / FINISHED[0]))
         names = FINISHED
     before = before and solved == _solved_meshes(folder / names[0])
-    contact = first_contact(path)
-    text = json.dumps(result(path, scene, contact), indent=2, allow_nan=False) + "\n"
+    contact, yields = first_contact(path), _yields(path)
+    text = json.dumps(result(path, scene, contact, yields), indent=2, allow_nan=False) + "\n"
     with replacing(folder / names[1]) as draft:
         draft.write_text(text, encoding="utf-8")
     if not before:
@@ -158,7 +161,16 @@ def _solved(
             (folder / name).unlink(missing_ok=True)
         remove_levels(folder_of(folder / UNFINISHED[0]))
         remove_extras(folder, "-unfinished")
-    return Solved(path, names, before, contact)
+    return Solved(path, names, before, contact, yields)
+
+
+def _yields(path: Trace) -> Yielding | str | None:
+    if path.model.sheet.strength is None:
+        return None
+    try:
+        return yielding(path)
+    except ModelError as error:
+        return str(error)
 
 
 def _keep_scene(scene: Scene, file: Path) -> None:

@@ -10,11 +10,18 @@ from bh.runtime.terminal import say
 
 if TYPE_CHECKING:
     from bh.analysis.contact import Contact
+    from bh.analysis.yielding import Yielding
     from bh.paths.path import Path as Trace
     from bh.scene.load import Scene
 
 
-def summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact | None) -> None:
+def summary(
+    path: Trace,
+    scene: Scene,
+    written: Sequence[Path],
+    contact: Contact | None,
+    yields: Yielding | str | None = None,
+) -> None:
     """Print what has come of a scene.
 
     Args:
@@ -22,6 +29,7 @@ def summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact
         scene: that it is of.
         written: the files.
         contact: the first self-contact.
+        yields: when and where it yields, or why that cannot be told.
     """
     from math import degrees
 
@@ -56,6 +64,8 @@ def summary(path: Trace, scene: Scene, written: Sequence[Path], contact: Contact
         say("self-contact: none")
     else:
         say(f"self-contact (reported, not prevented), first in {contact}")
+    if yields is not None:
+        say(f"yield was not looked at: {yields}" if isinstance(yields, str) else str(yields))
     if path.accuracy is not None:
         say(f"accuracy: {path.accuracy}")
     if path.estimate_reason:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
+from bh.formulations.stress import Resultants, Stress, stress_of
 from bh.loading.load_step import crease_hinges
 from meshes import SheetMesh
 
@@ -71,6 +73,8 @@ class State:
             keeps them otherwise.
         ended: the outcome where the path ended early at this state, such as "stalled": it is not what was asked for.
         stable: True if the tangent is positive definite there (False: not, None: not known).
+        recover: what makes the resultants that `stress` is made of, when they are asked for; None where a formulation
+            has none.
     """
 
     mesh: SheetMesh
@@ -87,6 +91,7 @@ class State:
     edge_slopes: Array | None = None
     clamp_couples: Array | None = None
     ended: str = ""
+    recover: Callable[[], Resultants] | None = None
 
     def __repr__(self) -> str:
         """One line: "State(step 0, lambda 1, energy 0.0534 N mm, stable)", or "..., ENDED EARLY: stalled)"."""
@@ -131,6 +136,18 @@ class State:
         """(3,) resultant of the reactions at a place, N."""
         total: Array = self.reactions[self.mesh.nodes(at)].sum(axis=0)
         return total
+
+    def stress(self) -> Stress:
+        """Strains, membrane forces, moments and stresses of every triangle; computed when it is asked for.
+
+        Raises:
+            ModelError: the formulation has none, or the stress-free sheet is not flat.
+        """
+        if self.recover is None:
+            raise ModelError(
+                "bars and hinges have no stress: a bar stands for more than one direction of the sheet; take consistent"
+            )
+        return stress_of(self.mesh, self.recover(), self.crease_moments)
 
     @property
     def strain(self) -> Array:

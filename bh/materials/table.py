@@ -44,7 +44,8 @@ class Stock:
         """A sheet of it.
 
         Without a direction a material with a grain becomes one that is alike in all directions, of the geometric means
-        E = sqrt(E1 E2) and nu = sqrt(nu12 nu21).
+        E = sqrt(E1 E2) and nu = sqrt(nu12 nu21), and of the strength across the grain. Across it a sheet yields at the
+        same strain as along it.
 
         Args:
             t: thickness, mm; None for the usual one.
@@ -57,10 +58,14 @@ class Stock:
         if self.E2 is None or self.G12 is None:
             if grain is not None:
                 raise ModelError(f"{self.about} is alike in all directions; leave out grain")
-            return Sheet(E=self.E, nu=self.nu, t=thickness, density=self.density)
+            return Sheet(E=self.E, nu=self.nu, t=thickness, density=self.density, strength=self.strength)
+        across = None if self.strength is None else self.strength * self.E2 / self.E
         if grain is None:
             ratio = math.sqrt(self.E2 / self.E)
-            return Sheet(E=self.E * ratio, nu=self.nu * ratio, t=thickness, density=self.density)
+            # the weaker direction is what counts where nobody knows which one it is
+            return Sheet(
+                E=self.E * ratio, nu=self.nu * ratio, t=thickness, density=self.density, strength=across
+            )
         return Sheet.orthotropic(
             E1=self.E,
             E2=self.E2,
@@ -69,6 +74,8 @@ class Stock:
             grain=grain,
             t=thickness,
             density=self.density,
+            strength=self.strength,
+            strength2=across,
         )
 
     def tightest_radius(self, t: float | None = None) -> float:

@@ -14,6 +14,7 @@ from bh.errors import ModelError
 from meshes.quantities import take_units
 
 TURN = 2.0 * math.pi
+STRENGTHS = ("strength", "strength2", "shear_strength")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +32,10 @@ class Sheet:
         G12: shear modulus in the plane of the sheet, MPa; with a grain.
         grain: direction of the grain in the drawing, rad from its x axis towards its y axis, or with a unit ("30deg").
         density: kg / m^3, of a sheet that is to have a weight; None where it does not matter.
+        strength: stress at which it yields when it is pulled, along the grain where there is one, MPa, or with a unit;
+            None where it is not known. No formulation yields: states are compared with it (`State.stress`).
+        strength2: the same across the grain, MPa; with a grain.
+        shear_strength: the same in shear along the grain, MPa; with a grain, sqrt(strength strength2 / 3) unless given.
     """
 
     E: float
@@ -40,10 +45,13 @@ class Sheet:
     G12: float | None = None
     grain: float | None = None
     density: float | None = None
+    strength: float | None = None
+    strength2: float | None = None
+    shear_strength: float | None = None
 
     if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
 
-        def __init__(
+        def __init__(  # noqa: PLR0913
             self,
             *,
             E: float | str,
@@ -53,6 +61,9 @@ class Sheet:
             G12: float | str | None = None,
             grain: float | str | None = None,
             density: float | None = None,
+            strength: float | str | None = None,
+            strength2: float | str | None = None,
+            shear_strength: float | str | None = None,
         ) -> None:
             """See the attributes."""
 
@@ -63,12 +74,18 @@ class Sheet:
             ModelError: one line that names the value and what to give.
         """
         take_units(self, "sheet", E="modulus", t="length", E2="modulus", G12="modulus", grain="angle")
-        for name, unit in (("E", "MPa"), ("t", "mm"), ("E2", "MPa"), ("G12", "MPa"), ("density", "kg/m^3")):
+        take_units(self, "sheet", strength="modulus", strength2="modulus", shear_strength="modulus")
+        units = {"E": "MPa", "t": "mm", "E2": "MPa", "G12": "MPa", "density": "kg/m^3"}
+        for name, unit in (units | dict.fromkeys(STRENGTHS, "MPa")).items():
             value = getattr(self, name)
-            if value is None and name in ("E2", "G12", "density"):
+            if value is None and name not in ("E", "t"):
                 continue
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
                 raise ModelError(f"sheet {name} = {value!r} cannot be; give a positive number in {unit}")
+        if self.grain is None and (self.strength2, self.shear_strength) != (None, None):
+            raise ModelError(
+                "sheet strength2 and shear_strength are of a grain; give E2, G12 and grain, or strength alone"
+            )
         if (self.E2, self.G12, self.grain) != (None, None, None):
             _check_grain(self)
         elif not (isinstance(self.nu, Real) and -1.0 < self.nu <= 0.5):
@@ -85,6 +102,7 @@ class Sheet:
         grain: float | str,
         t: float | str,
         density: float | None = None,
+        **strengths: float | str | None,
     ) -> Sheet:
         """A sheet with a grain, by the names of its moduli.
 
@@ -96,11 +114,34 @@ class Sheet:
             grain: direction of the grain in the drawing, rad from its x axis towards its y axis.
             t: thickness, mm.
             density: kg / m^3, or None.
+            **strengths: `strength`, `strength2` and `shear_strength`, MPa (see the class).
 
         Raises:
             ModelError: moduli that are not definite: a sheet that gives energy when it is strained.
         """
-        return cls(E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t, density=density)
+        unknown = set(strengths) - set(STRENGTHS)
+        if unknown:
+            raise ModelError(f"a sheet has no {sorted(unknown)[0]}; its strengths are {', '.join(STRENGTHS)}")
+        return cls(E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t, density=density, **strengths)
+
+    def strengths(self) -> tuple[float, float, float]:
+        """Stresses of yield; of a sheet without a grain von Mises's.
+
+        Returns:
+            along the grain, across it and in shear, MPa.
+
+        Raises:
+            ModelError: they are not given.
+        """
+        if self.strength is None:
+            raise ModelError("the sheet has no strength to compare stresses with; give strength in MPa")
+        across = self.strength if self.grain is None else self.strength2
+        if across is None:
+            raise ModelError(
+                "a sheet with a grain has a strength in both directions; give strength2, across it, in MPa"
+            )
+        shear = self.shear_strength
+        return self.strength, across, math.sqrt(self.strength * across / 3.0) if shear is None else shear
 
     @property
     def nu_squared(self) -> float:

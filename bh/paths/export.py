@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Sequence
 from pathlib import Path as FilePath
@@ -10,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.errors import InputError
+from bh.errors import InputError, ModelError
+from bh.formulations.stress import HEIGHT
 from meshes import SheetMesh
 
 if TYPE_CHECKING:
@@ -25,8 +27,8 @@ def write_state(file: str | os.PathLike[str], states: Sequence[State], title: st
     """Write the last of some states of a path; a FOLD file gets all of them as frames behind the flat key frame.
 
     Its energies and energy densities go with each frame, see `folded_frame`. .vtu, .vtk and .msh hold the displacement
-    (mm) and the energy densities (N mm / mm^2); .glb has them as colours, bending from none (dark) to the most
-    there is. .obj and .glb have the flat sheet as texture coordinates.
+    (mm), the energy densities (N mm / mm^2) and stresses (`cell_data`); .glb has the energy densities as colours,
+    bending from none (dark) to the most there is. .obj and .glb have the flat sheet as texture coordinates.
 
     Args:
         file: its suffix says the format.
@@ -60,13 +62,33 @@ def write_state(file: str | os.PathLike[str], states: Sequence[State], title: st
         from meshes.io.export import FORMATS
 
         nodes = {"displacement": last.points - last.mesh.points} if FORMATS[suffix][1] else {}
-        cells = (
-            {f"{kind}_energy_density": values for kind, values in last.energy_density.items()}
-            if nodes
-            else {}
-        )
+        cells = cell_data(last) if nodes else {}
         write_mesh(target, last.mesh, last.points, nodes, cells)
     return target.resolve()
+
+
+def cell_data(state: State) -> dict[str, NDArray[np.float64]]:
+    """Values of the triangles by name, for files.
+
+    Energy densities (N mm / mm^2); where the formulation has them membrane_force (N / mm) and moment (N), components
+    xx, yy, xy in the axes of the drawing, equivalent_stress_top, _middle and _bottom (MPa: von Mises, with a grain
+    Hill), and with a strength reserve, the smaller one of both sides.
+
+    Args:
+        state: of a path.
+
+    Returns:
+        (t,) or (t, 3) by name.
+    """
+    cells = {f"{kind}_energy_density": values for kind, values in state.energy_density.items()}
+    if state.recover is None or not state.mesh.flat:
+        return cells
+    stress = state.stress()
+    cells |= {"membrane_force": stress.forces, "moment": stress.moments}
+    with contextlib.suppress(ModelError):  # a grain without strengths has no equivalent stress
+        cells |= {f"equivalent_stress_{side}": stress.equivalent(side) for side in HEIGHT}
+        cells["reserve"] = np.minimum(*(np.minimum(stress.reserve(side), 1e9) for side in ("top", "bottom")))
+    return cells
 
 
 def write_flat(file: str | os.PathLike[str], mesh: SheetMesh, facets: bool = False) -> FilePath:

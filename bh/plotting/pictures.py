@@ -8,13 +8,15 @@ import tempfile
 import uuid
 from collections.abc import Sequence
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.paths.export import cell_data
 from bh.plotting.camera import Camera, camera_of
 from bh.plotting.charts import INK
+from bh.plotting.colouring import KINDS, Colouring, colouring_of
 from bh.plotting.offscreen import PlotError, has_display, render
 from bh.plotting.panels import cut_open
 from meshes.io.export import replacing, write_mesh
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-KINDS = ("stretching", "bending", "folding")
 # of a collection of VTU files
 HEAD = (
     '<?xml version="1.0"?>',
@@ -39,14 +40,6 @@ HEAD = (
 FOOT = ("  </Collection>", "</VTKFile>", "")
 PAPER, BLANK_SHEET, COLOURS = "white", "#b9c4cf", "viridis"
 MOST_EDGES = 20_000  # triangles of a mesh whose edges can still be told apart in a picture
-
-
-class Colouring(NamedTuple):
-    """Values (n,) at nodes, N mm / mm^2; colours end at `top` > 0; `cut` if some lie above it."""
-
-    values: Array
-    top: float
-    cut: bool
 
 
 def picture(
@@ -64,8 +57,9 @@ def picture(
     Args:
         state: of a path.
         file: to write, .png; appears whole or not at all.
-        colour: "stretching", "bending", "folding" or "total" energy density averaged to nodes, N mm / mm^2;
-            None for the plain sheet (also drawn where there is no such energy at all).
+        colour: "stretching", "bending", "folding" or "total" energy density averaged to nodes, N mm / mm^2; "stress",
+            the larger equivalent stress of top and bottom, MPa, averaged within panels; "utilisation", the same over
+            the strength; None for the plain sheet (also drawn where there is nothing to colour).
         size: width and height, pixels.
         caption: a line of text; True for lambda and the energies, False for none.
         camera: azimuth and elevation that it looks from, rad; None for where most of the sheet is seen.
@@ -82,13 +76,13 @@ def picture(
     if target.suffix.lower() != ".png":
         raise PlotError(f"picture '{target}' is not a .png file; name it so")
     width, height = _possible(size)
-    colouring = _colouring(state, colour, top)
+    colouring = colouring_of(state, colour, top)
     title = _energies(state) if caption is True else (caption or "")
     unit = _unit(width, height)
     head, foot = int(64 * unit) if title else 0, int(118 * unit) if colouring is not None else 0
     inner = height - head - foot
     image = _render(state, colouring, (width, inner), camera_of(state, width / inner, camera))
-    figure = _frame(image, (width, height), foot, title, f"{colour} energy density", colouring)
+    figure = _frame(image, (width, height), foot, title, colouring)
     with replacing(target) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
     return target.resolve()
@@ -110,7 +104,7 @@ def moving_pictures(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     width, height = _possible(size)
-    whole = [_colouring(state, colour, None) for state in states]
+    whole = [colouring_of(state, colour, None) for state in states]
     top = max((found.top for found in whole if found is not None), default=0.0)
     unit = _unit(width, height)
     head, foot = int(64 * unit), int(118 * unit) if top else 0
@@ -118,9 +112,9 @@ def moving_pictures(
     camera = camera_of(states[-1], width / inner, None, np.concatenate([state.points for state in states]))
     found = []
     for state in states:
-        colouring = _colouring(state, colour, top or None)
+        colouring = colouring_of(state, colour, top or None)
         image = _render(state, colouring, (width, inner), camera)
-        figure = _frame(image, (width, height), foot, _energies(state), f"{colour} energy density", colouring)
+        figure = _frame(image, (width, height), foot, _energies(state), colouring)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()  # type: ignore[no-untyped-call]
         found.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())  # type: ignore[no-untyped-call]
@@ -146,7 +140,7 @@ def show(state: State, colour: str | None = "bending", **options: object) -> obj
     import pyvista as pv
     from matplotlib.font_manager import findfont
 
-    colouring = _colouring(state, colour, None)
+    colouring = colouring_of(state, colour, None)
     plotter = pv.Plotter(window_size=[1200, 900], title="bh")
     near = camera_of(state, 4 / 3, None)
     # room for the texts
@@ -156,7 +150,7 @@ def show(state: State, colour: str | None = "bending", **options: object) -> obj
     sheet = _draw(plotter, state, colouring, 2.0 * camera.half_height / 900)
     if colouring is not None:
         plotter.add_scalar_bar(
-            f"{colour} energy density, N mm / mm^2\n",
+            f"{colouring.label}, {colouring.unit}\n",
             mapper=sheet.mapper,
             color=INK,
             n_labels=3,
@@ -177,8 +171,9 @@ def show(state: State, colour: str | None = "bending", **options: object) -> obj
 def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path") -> FilePath:
     """Write every state as a VTU file, and the collection `name`.pvd of them with time = step + lambda.
 
-    Point data are the displacement (mm) and the energy densities by kind averaged to nodes, cell data the
-    energy densities of the triangles (N mm / mm^2). The states lie in the folder `name` beside the collection;
+    Point data are the displacement (mm) and the energy densities by kind averaged to nodes, cell data what
+    `bh.paths.export.cell_data` gives: energy densities, membrane forces, moments, stresses, reserve. The states lie in
+    the folder `name` beside the collection;
     both appear when all is written and replace what was there.
 
     Args:
@@ -205,8 +200,7 @@ def export_series(path: Path, folder: str | os.PathLike[str], name: str = "path"
             file = f"{index:04d}.vtu"
             at_nodes: dict[str, Array] = {"displacement": state.points - state.mesh.points}
             at_nodes |= {f"{kind}_energy_density": state.nodal_energy_density(kind) for kind in KINDS}
-            at_cells = {f"{kind}_energy_density": state.energy_density[kind] for kind in KINDS}
-            write_mesh(new / file, state.mesh, state.points, at_nodes, at_cells)
+            write_mesh(new / file, state.mesh, state.points, at_nodes, cell_data(state))
             entries.append(f'    <DataSet timestep="{time:.17g}" part="0" file="{name}/{file}"/>')
         _swap(new, home / name)
         text = "\n".join((*HEAD, *entries, *FOOT))
@@ -229,26 +223,6 @@ def _possible(size: tuple[int, int]) -> tuple[int, int]:
 
 
 # --- what is drawn -----------------------------------------------------------------------------------------
-
-
-def _colouring(state: State, colour: str | None, top: float | None) -> Colouring | None:
-    if not hasattr(state, "nodal_energy_density"):
-        raise PlotError(f"{type(state).__name__} is not a state; give one of a path, such as path[-1]")
-    if colour is None:
-        return None
-    if colour == "total":
-        values = np.sum([state.nodal_energy_density(kind) for kind in KINDS], axis=0)
-    elif colour in KINDS:
-        values = state.nodal_energy_density(colour)
-    else:
-        raise PlotError(f"colour '{colour}' is not known; use one of {', '.join(KINDS)}, total")
-    if top is None:
-        top = float(values.max(initial=0.0))
-    if not (np.isfinite(top) and top >= 0.0):
-        raise PlotError(f"top = {top} cannot be; give an energy density in N mm / mm^2")
-    if top == 0.0:
-        return None
-    return Colouring(values, top, bool(values.max(initial=0.0) > top * (1.0 + 1e-9)))
 
 
 def _energies(state: State) -> str:
@@ -293,7 +267,7 @@ def _draw(plotter: Plotter, state: State, colouring: Colouring | None, pixel: fl
         faint |= {"color": INK, "opacity": 0.25}
     else:
         scale = {"clim": (0.0, colouring.top), "show_scalar_bar": False, "interpolate_before_map": True}
-        look |= {"scalars": colouring.values[surface.point_data["node"]], "cmap": COLOURS, **scale}
+        look |= {"scalars": colouring.on_panels(state), "cmap": COLOURS, **scale}
         faint |= {"scalars": colouring.values, "cmap": _shades_of_edges(), **scale}
     drawn = plotter.add_mesh(surface, smooth_shading=True, **look)
     # pushed back a little, so that the edges in the surface win over it
@@ -347,9 +321,7 @@ def _render(state: State, colouring: Colouring | None, size: tuple[int, int], ca
     return render(size, draw)
 
 
-def _frame(
-    image: Array, size: tuple[int, int], foot: int, title: str, label: str, colouring: Colouring | None
-) -> Figure:
+def _frame(image: Array, size: tuple[int, int], foot: int, title: str, colouring: Colouring | None) -> Figure:
     """The rendered sheet, `foot` pixels above the bottom, a line of text above it and a colour bar below."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -376,7 +348,7 @@ def _frame(
         axes.spines[:].set_visible(False)
         axes.tick_params(length=5.0 * unit, width=unit, color=INK, labelcolor=INK, labelsize=15.0 * unit)
         axes.locator_params(nbins=5)
-        title = f"{label}, {scale}N mm / mm²"
+        title = f"{colouring.label}, {scale}{colouring.unit}"
         axes.set_title(title, loc="left", pad=8.0 * unit, color=INK, fontproperties=font)
     return figure
 

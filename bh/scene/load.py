@@ -270,7 +270,16 @@ def _sheet(table: SheetTable) -> Sheet:
     assert E is not None
     with within("sheet"):
         return Sheet(
-            E=E, t=table.t, nu=nu or 0.0, E2=table.E2, G12=table.G12, grain=table.grain, density=table.density
+            E=E,
+            t=table.t,
+            nu=nu or 0.0,
+            E2=table.E2,
+            G12=table.G12,
+            grain=table.grain,
+            density=table.density,
+            strength=table.strength,
+            strength2=table.strength2,
+            shear_strength=table.shear_strength,
         )
 
 

@@ -70,6 +70,14 @@ class SheetTable(Table):
     density: Positive | None = Field(
         None, description="the density in kg/m^3 of a sheet with a weight, positive"
     )
+    strength: Modulus | None = Field(
+        None, description="the stress in MPa at which the sheet yields, along the grain where there is one"
+    )
+    strength2: Modulus | None = Field(None, description="the stress of yield across the grain in MPa")
+    shear_strength: Modulus | None = Field(
+        None,
+        description="the stress of yield in shear in MPa, with a grain; sqrt(strength strength2 / 3) unless given",
+    )
     material: str | None = Field(
         None,
         description='a name of the table of materials (docs/materials.md), such as "card-300", in place of moduli',
@@ -79,7 +87,7 @@ class SheetTable(Table):
     def one_name(self) -> SheetTable:
         """Check that the modulus is there, and that nothing is given by two names."""
         if self.material is not None:
-            for name in ("E", "E1", "E2", "G12", "nu", "nu12"):
+            for name in ("E", "E1", "E2", "G12", "nu", "nu12", "strength", "strength2", "shear_strength"):
                 if getattr(self, name) is not None:
                     raise ValueError(f"has material and {name}, which the material gives; remove one of them")
             return self

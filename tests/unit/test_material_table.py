@@ -70,7 +70,15 @@ def test_every_material_is_a_sheet(name: str) -> None:
 def test_what_may_be_given_beside_the_name() -> None:
     found = read('material = "card-300", t = "0.4mm", density = 700, grain = 0.5')
     assert found == Sheet.orthotropic(
-        E1=6000.0, E2=3000.0, G12=1642.0, nu12=0.3, grain=0.5, t=0.4, density=700.0
+        E1=6000.0,
+        E2=3000.0,
+        G12=1642.0,
+        nu12=0.3,
+        grain=0.5,
+        t=0.4,
+        density=700.0,
+        strength=15.0,
+        strength2=7.5,
     )
     assert bh.materials.sheet("pet", t="0.2mm").t == 0.2
 

@@ -7,6 +7,7 @@ angles between the triangle and the sheet's tangent plane at its edges. docs/for
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ from bh.mechanics.consistent.derivatives import ConsistentDerivatives
 from bh.mechanics.consistent.elements import LINEAR
 from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.membrane import Measure, constant_strain, smoothed_strain
+from bh.mechanics.consistent.resultants import resultants
 from bh.mechanics.consistent.system import ConsistentSystem
 from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.kinematics import dihedral_angles
@@ -131,6 +133,7 @@ class Consistent:
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable, edge_slopes=slopes, clamp_couples=couples,
+            recover=partial(resultants, model.sheet, mesh, e, self.material, x, now.theta),
             contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
         )  # fmt: skip
 

@@ -149,6 +149,17 @@ class Stretching:
         np.add.at(out, sides[:, 1], (1.0 - share) * five)
         return out
 
+    def strains_and_forces(self, x: Array) -> tuple[tuple[Cells, Array, Array], ...]:
+        """Of both kinds of cells these, their strains (c, 3) and membrane forces (c, 3), N / mm, in their own axes.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+        """
+        gamma = self.gamma(x)
+        strains = (cells.strains(gamma) for cells in self.membrane.cells)
+        each = zip(self.membrane.cells, self._laws, strains, strict=True)
+        return tuple((cells, strain, law.stress(strain)) for cells, law, strain in each)
+
     @property
     def largest(self) -> float:
         """Largest stiffness of a bar in the stress-free sheet, N / mm."""

@@ -1,0 +1,182 @@
+"""Strains and stresses of a state: through the thickness, principal, equivalent, and against yield."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.errors import ModelError
+from bh.formulations import yielding
+from bh.formulations.recovery import corner_values
+from bh.model.sheet import Sheet
+from meshes import SheetMesh
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
+HEIGHT = {"top": 0.5, "middle": 0.0, "bottom": -0.5}  # above the middle surface, in thicknesses
+
+
+class Resultants(NamedTuple):
+    """What a formulation knows of every triangle, in the axes of the flat drawing, rows of (xx, yy, 2 xy or xy).
+
+    Attributes:
+        sheet: of which it is.
+        strain: (t, 3) Green's strain of the middle surface, components xx, yy, 2 xy.
+        curvature: (t, 3) its change of curvature, 1 / mm; positive where the sheet's edges are bent up.
+        forces: (t, 3) membrane forces (second Piola-Kirchhoff), N / mm, components xx, yy, xy.
+        moments: (t, 3) N mm / mm, components xx, yy, xy.
+    """
+
+    sheet: Sheet
+    strain: Array
+    curvature: Array
+    forces: Array
+    moments: Array
+
+
+class Extreme(NamedTuple):
+    """Where a stress is nearest to yield.
+
+    Attributes:
+        utilisation: equivalent stress over strength; 1 is yield.
+        side: "top" or "bottom".
+        triangle: row of `mesh.triangles`.
+        place: (2,) in the flat drawing, mm.
+    """
+
+    utilisation: float
+    side: str
+    triangle: int
+    place: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Stress:
+    """Strains and stresses of a state; arrays (t, ...) of triangles, or (t, 3, ...) of their corners (`corners`).
+
+    Components are in the axes of the flat drawing, which the sheet carries along. Stress varies linearly through the
+    thickness: N / t -+ 6 M / t^2 at the top (the side that faces +z in the drawing) and at the bottom.
+
+    Attributes:
+        mesh: the stress-free sheet.
+        sheet: its material.
+        strain, curvature, forces, moments: see `Resultants`.
+        cut: (k,) rows of `mesh.topology.hinges`: creases, across which nothing is averaged.
+    """
+
+    mesh: SheetMesh
+    sheet: Sheet
+    strain: Array
+    curvature: Array
+    forces: Array
+    moments: Array
+    cut: Ints
+
+    @cached_property
+    def corners(self) -> Stress:
+        """The same at the corners of the triangles, (t, 3, ...), averaged within panels and never across creases."""
+        both = np.hstack((self.strain, self.curvature, self.forces, self.moments))
+        at = corner_values(self.mesh, both, self.cut)
+        return Stress(self.mesh, self.sheet, at[..., :3], at[..., 3:6], at[..., 6:9], at[..., 9:], self.cut)
+
+    def at(self, side: str = "top") -> Array:
+        """(..., 3) stresses xx, yy, xy, MPa.
+
+        Args:
+            side: "top", "middle" or "bottom".
+        """
+        t = self.sheet.t
+        return np.asarray(self.forces / t - 12.0 / t**2 * _height(side) * self.moments)
+
+    def strain_at(self, side: str = "top") -> Array:
+        """(..., 3) strains xx, yy, 2 xy.
+
+        Args:
+            side: "top", "middle" or "bottom".
+        """
+        return np.asarray(self.strain - self.sheet.t * _height(side) * self.curvature)
+
+    def principal(self, side: str = "top") -> Array:
+        """(..., 2) principal stresses, the larger one first, MPa.
+
+        Args:
+            side: "top", "middle" or "bottom".
+        """
+        return yielding.principal(self.at(side))
+
+    def equivalent(self, side: str = "top") -> Array:
+        """(...,) von Mises's stress; of a sheet with a grain Hill's, which is a pull along the grain, MPa.
+
+        Args:
+            side: "top", "middle" or "bottom".
+
+        Raises:
+            ModelError: a sheet with a grain whose strengths are not given.
+        """
+        return yielding.equivalent(self.at(side), self.sheet)
+
+    def utilisation(self, side: str = "top") -> Array:
+        """(...,) equivalent stress over the strength of the sheet; yield begins at 1.
+
+        Args:
+            side: "top", "middle" or "bottom".
+
+        Raises:
+            ModelError: no strength is given.
+        """
+        return np.asarray(self.equivalent(side) / self.sheet.strengths()[0])
+
+    def reserve(self, side: str = "top") -> Array:
+        """(...,) by what all stresses could grow until yield: strength over equivalent stress, inf where there is none.
+
+        Args:
+            side: "top", "middle" or "bottom".
+
+        Raises:
+            ModelError: no strength is given.
+        """
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / self.utilisation(side))
+
+    def worst(self) -> Extreme:
+        """Where the sheet is nearest to yield, on either side, by the values at corners.
+
+        Raises:
+            ModelError: no strength is given.
+        """
+        both = {side: self.corners.utilisation(side) for side in ("top", "bottom")}
+        side = max(both, key=lambda name: float(both[name].max()))
+        triangle, corner = np.unravel_index(int(both[side].argmax()), both[side].shape)
+        place = self.mesh.points[self.mesh.triangles[triangle, corner], :2]
+        return Extreme(float(both[side].max()), side, int(triangle), place)
+
+
+def stress_of(mesh: SheetMesh, found: Resultants, moments: Array) -> Stress:
+    """Stress from what a formulation gives.
+
+    Args:
+        mesh: the stress-free sheet.
+        found: of every triangle.
+        moments: (m,) of every hinge, nan off creases.
+
+    Raises:
+        ModelError: the stress-free sheet is not flat, so that its components have no axes.
+    """
+    if not mesh.flat:
+        raise ModelError("stresses are read in the axes of the drawing; this stress-free sheet is not flat")
+    topology = mesh.topology
+    cut = ~np.isnan(moments)
+    for name in mesh.creases:
+        hinge = topology.edge_hinges[topology.find_edges(mesh.crease_edges(name))]
+        cut[hinge[hinge >= 0]] = True
+    return Stress(mesh, found.sheet, *found[1:], np.flatnonzero(cut))
+
+
+def _height(side: str) -> float:
+    if side not in HEIGHT:
+        raise ModelError(f"side '{side}' is not known; use one of {', '.join(HEIGHT)}")
+    return HEIGHT[side]

@@ -1,0 +1,74 @@
+"""Strains, curvatures, membrane forces and moments of the triangles of a sheet, in the axes of the drawing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bh.formulations.stress import Resultants
+from bh.materials import Material
+from bh.materials.protocols import in_axes
+from bh.mechanics.consistent.elements import ConsistentElements
+from bh.mechanics.consistent.patches import curvature_maps, frame_angles, triangle_frames
+from bh.mechanics.consistent.stretching import Stretching
+from bh.model.sheet import Sheet
+from meshes import SheetMesh
+
+Array = NDArray[np.float64]
+
+
+def resultants(
+    sheet: Sheet, mesh: SheetMesh, elements: ConsistentElements, material: Material, x: Array, theta: Array
+) -> Resultants:
+    """What the elements measure, and what their material makes of it.
+
+    A triangle has the mean strain of its thirds, each that of the cell of its edge, and the curvature of its angles.
+
+    Args:
+        sheet: of the model.
+        mesh: the stress-free sheet, flat.
+        elements: of the whole sheet.
+        material: of the formulation.
+        x: (n, 3) positions, mm.
+        theta: (c, a) angles of the patches there, rad.
+    """
+    strain, forces = _membrane(mesh, elements.stretching, x)
+    edges, areas = triangle_frames(mesh.points, mesh.triangles)
+    angle = frame_angles(mesh.points, mesh.triangles)
+    patches = elements.patches
+    half = np.einsum("cha,ca->ch", patches.shares, theta).reshape(*patches.members.shape, 3)
+    own = np.zeros((len(areas), 3))
+    own[patches.members[patches.members >= 0]] = half[patches.members >= 0]
+    curvature = np.einsum("tij,tj->ti", curvature_maps(edges, areas), own)
+    moments = in_axes(material.bending(sheet), angle).stress(curvature)
+    return Resultants(sheet, strain, _turned(curvature, -angle, 0.5), forces, _turned(moments, -angle, 1.0))
+
+
+def _membrane(mesh: SheetMesh, stretching: Stretching, x: Array) -> tuple[Array, Array]:
+    """(t, 3) strains and membrane forces: of the cells, shared with the triangles by area."""
+    topology = mesh.topology
+    beside = topology.edge_triangles[topology.hinge_edges]
+    out = np.zeros((2, len(mesh.triangles), 3))
+    for number, (cells, strain, force) in enumerate(stretching.strains_and_forces(x)):
+        angle = -cells.angle(mesh.points)
+        both = np.stack((_turned(strain, angle, 0.5), _turned(force, angle, 1.0)))
+        sides = cells.source[:, None] if number == 0 else beside[cells.source]
+        for side, share in zip(sides.T, (cells.share, 1.0 - cells.share), strict=False):
+            for k in range(2):
+                np.add.at(out[k], side, (share * cells.area)[:, None] * both[k])
+    out /= mesh.areas[:, None]
+    return out[0], out[1]
+
+
+def _turned(values: Array, angle: Array, shear: float) -> Array:
+    """(k, 3) components in axes at angles (k,) to their own; `shear` is xy over the third component."""
+    c, s = np.cos(angle), np.sin(angle)
+    xx, yy, xy = values[:, 0], values[:, 1], shear * values[:, 2]
+    mixed = c * s * (yy - xx) + (c * c - s * s) * xy
+    return np.column_stack(
+        (
+            c * c * xx + s * s * yy + 2.0 * c * s * xy,
+            s * s * xx + c * c * yy - 2.0 * c * s * xy,
+            mixed / shear,
+        )
+    )
