@@ -1,7 +1,8 @@
 """Curves that drawing programs have: cubic Bezier curves, arcs of ellipses, and chains of pieces. mm, rad.
 
-A drawing is read into them, sampled for its mesh, and written from them, so that a cutter gets what was drawn. The chords of a
-piece depend on the piece and the tolerance alone: a line that is written and read again has the same points.
+A drawing is read into them, sampled for its mesh, and written from them, so that a cutter gets what was drawn. The
+chords of a piece depend on the piece and the tolerance alone: a line that is written and read again has
+the same points.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -210,7 +212,7 @@ def chain_of(curve: Curve) -> Chain:
 
 def lines_through(points: Array) -> Chain:
     """A chain of lines through points (k, 2), mm."""
-    return Chain(tuple(Line(_pair(a), _pair(b)) for a, b in zip(points[:-1], points[1:], strict=True)))
+    return Chain(tuple(Line(_pair(a), _pair(b)) for a, b in pairwise(points)))
 
 
 def quadratic(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> Bezier:

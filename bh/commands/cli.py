@@ -285,17 +285,45 @@ def export(
     ],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="What to write; its suffix is the format.")],
     state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
-    facets: Annotated[bool, typer.Option("--facets", help="Also the edges of the mesh (SVG, DXF).")] = False,
+    facets: Annotated[bool, typer.Option("--facets", help="Also lines that do not fold (SVG, DXF).")] = False,
+    kerf: Annotated[
+        str | None, typer.Option("--kerf", help="Width of the beam: outline out, holes in.")
+    ] = None,
+    perforate: Annotated[
+        str | None, typer.Option("--perforate", metavar="CUT,LEFT", help="Creases as dashes: 3,1 (mm).")
+    ] = None,
+    units: Annotated[str, typer.Option("--units", help="mm or in.")] = "mm",
+    angles: Annotated[
+        str | None, typer.Option("--angles", help="Fold angles as names of layers (layer) or as text.")
+    ] = None,
+    marks: Annotated[
+        bool, typer.Option("--marks", help="Mark the pinches, on a layer of their own.")
+    ] = False,
 ) -> None:
-    """Write a flat pattern or a folded sheet for other programs."""
+    """Write a flat pattern (as drawn, from a scene or a drawing) or a folded sheet for other programs."""
+    from bh.commands.flat import cutting
     from bh.errors import InputError
     from bh.paths.export import write_flat, write_state
+    from meshes.io.drawing import DRAWINGS
 
-    if source.suffix.lower() == ".toml":
+    how = cutting(facets, kerf, perforate, units, angles, marks)
+    if source.suffix.lower() in (".toml", *DRAWINGS):
+        from bh.scene.flat import write_flat_pattern
         from bh.scene.load import load_scene
 
-        done = write_flat(file, load_scene(source).model.mesh, facets)
+        scene = load_scene(source) if source.suffix.lower() == ".toml" else source
+        if file.suffix.lower() in (".svg", ".dxf"):
+            done = write_flat_pattern(file, scene, how)
+        elif isinstance(scene, Path):
+            raise InputError(f"'{source}' is a drawing: write it as .svg or .dxf, or fold it (bh fold)")
+        else:
+            done = write_flat(file, scene.model.mesh, facets)
     else:
+        if (kerf, perforate, angles, marks, units) != (None, None, None, False, "mm"):
+            raise InputError(
+                f"'{source}' knows its mesh only: --kerf, --perforate, --units, --angles and --marks are for the "
+                "scene that it was made from, or its drawing"
+            )
         from bh.commands.occupied import path_file
         from bh.paths.path import Path as Trace
 

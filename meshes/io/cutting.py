@@ -75,7 +75,7 @@ def kerfed(lines: Sequence[FlatLine], kerf: float) -> list[FlatLine]:
         own = [
             k
             for k, shape in zip(rim, shapes, strict=True)
-            if ring.distance(shape.interpolate(0.5, True)) < 10.0 * JOIN
+            if ring.distance(shape.interpolate(0.5, normalized=True)) < 10.0 * JOIN
         ]
         used.update(own)
         found.append(replace(lines[own[0]], curve=_moved(lines[own[0]], len(own), ring, grown)))

@@ -193,7 +193,7 @@ def read_graph(
         angle = math.pi * stroke.opacity if partly and kind in FOLDED else math.nan
         if kind in FOLDED and not math.isnan(said := layer_angle(stroke.layer)):
             angle = said
-        curve = None if stroke.curve is None else stroke.curve.placed(unit, moved)
+        curve = None if stroke.curve is None else stroke.curve.placed(unit, moved.tolist())
         place = _clean((points - moved) * unit, 1e-9 * diagonal)
         drawn.append(DrawnLine(place, kind, stroke.name, angle, curve, stroke.layer))
     drawn = [line for line in drawn if len(line.points) > 1]

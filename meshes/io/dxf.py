@@ -11,8 +11,8 @@ import numpy as np
 
 from meshes.curves import Array
 from meshes.errors import FileFormatError
-from meshes.io.files import drawing_bytes
 from meshes.io.dxf_curves import dxf_curve
+from meshes.io.files import drawing_bytes
 from meshes.io.strokes import Colour, Dash, Stroke, Strokes, dash_kind, drawn_curve
 from meshes.limits import check_limit
 
@@ -195,14 +195,14 @@ def _stroke(drawing: Any, entity: Any, around: Look | None, number: int) -> Stro
         check_limit("control_points", points, name, FileFormatError)
     try:
         curve = dxf_curve(entity)
-        flatten = _flattening(entity) if curve is None else None
-        first = (flatten or curve.sampled)(1e300)
+        sampler = _flattening(entity) if curve is None else curve.sampled
+        first = sampler(1e300)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         return None  # no points, no radius, no knots: nothing is drawn
     if len(first) < 2 or (np.isfinite(first).all() and not np.ptp(first, axis=0).any()):
         return None
     return Stroke(
-        drawn_curve(curve, name) if flatten is None else _flat(flatten, name),
+        _flat(sampler, name) if curve is None else drawn_curve(curve, name),
         name,
         _colour(drawing, entity, around),
         _layer_name(entity, around),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ def dxf_curve(entity: Any) -> Chain | None:
     if kind == "LINE":
         return _lines([entity.dxf.start, entity.dxf.end])
     if kind in ("ARC", "CIRCLE"):
-        from ezdxf.entities import Ellipse
+        from ezdxf.entities.ellipse import Ellipse
 
         return _ellipse(Ellipse.from_arc(entity))
     if kind == "ELLIPSE":
@@ -43,11 +44,7 @@ def _lines(points: Sequence[Any]) -> Chain | None:
     if not _is_flat(places):
         return None
     kept = places[np.append(True, np.any(np.diff(places, axis=0) != 0.0, axis=1)), :2]
-    return (
-        Chain(tuple(Line(_pair(a), _pair(b)) for a, b in zip(kept[:-1], kept[1:], strict=True)))
-        if len(kept) > 1
-        else None
-    )
+    return Chain(tuple(Line(_pair(a), _pair(b)) for a, b in pairwise(kept))) if len(kept) > 1 else None
 
 
 def _ellipse(entity: Any) -> Chain | None:

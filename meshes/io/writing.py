@@ -1,7 +1,7 @@
 """Flat patterns as SVG and DXF, for laser cutters and other programs; `meshes.io.read_pattern` reads them.
 
-One layer a kind of line: "boundary", "cut", "mountain", "valley", "flat" and "facet", or the layers of the drawing. Arcs
-stay arcs, ellipses ellipses, and splines splines, so that what is read back is the same pattern.
+One layer a kind of line: "boundary", "cut", "mountain", "valley", "flat" and "facet", or the layers of the
+drawing. Arcs stay arcs, ellipses ellipses, and splines splines, so that what is read back is the same pattern.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from meshes.curves import Arc, Array, Curve, Line, Polyline, sample
+from meshes.curves import Arc, Curve, Line, Polyline, sample
 from meshes.drawn_curves import Bezier, Chain, EllipseArc, Piece, chain_of, lines_through
 from meshes.errors import FileFormatError
 from meshes.io.cutting import check_cutting, kerfed, perforated
@@ -279,7 +279,7 @@ def _write_dxf(
 
 
 def _entities(chain: Chain) -> list[Chain]:
-    """The chain as parts that one entity can hold: lines and arcs of circles; or lines and Bezier curves; an ellipse."""
+    """Parts of a chain that one entity can hold: lines and arcs of circles, lines and Bezier curves, or an ellipse."""
     pieces = [_circular(piece) for piece in _merged(chain.pieces)]
     parts: list[list[Piece]] = []
     for piece in pieces:
