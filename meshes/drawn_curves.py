@@ -59,7 +59,12 @@ class Bezier:
         return _chords(bend, tolerance)
 
     def placed(self, scale: float, origin: Sequence[float]) -> Bezier:
-        """Where its points minus `origin` lie, `scale` times as large."""
+        """Where its points minus `origin` lie, `scale` times as large.
+
+        Args:
+            scale: a factor.
+            origin: (x, y), mm.
+        """
         a, b, c, d = ((np.asarray(p) - origin) * scale for p in self.points)
         return Bezier((_pair(a), _pair(b), _pair(c), _pair(d)))
 
@@ -107,7 +112,12 @@ class EllipseArc:
         return max(_chords(bend, tolerance), 8 if self.closed else 1)
 
     def placed(self, scale: float, origin: Sequence[float]) -> EllipseArc:
-        """Where its points minus `origin` lie, `scale` times as large."""
+        """Where its points minus `origin` lie, `scale` times as large.
+
+        Args:
+            scale: a factor.
+            origin: (x, y), mm.
+        """
         return replace(
             self,
             centre=_pair((np.asarray(self.centre) - origin) * scale),
@@ -189,7 +199,12 @@ class Chain:
         return np.vstack(points)
 
     def placed(self, scale: float, origin: Sequence[float]) -> Chain:
-        """Where its points minus `origin` lie, `scale` times as large."""
+        """Where its points minus `origin` lie, `scale` times as large.
+
+        Args:
+            scale: a factor.
+            origin: (x, y), mm.
+        """
         return Chain(tuple(_placed(piece, scale, origin) for piece in self.pieces))
 
 
@@ -216,7 +231,13 @@ def lines_through(points: Array) -> Chain:
 
 
 def quadratic(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> Bezier:
-    """The quadratic Bezier curve of three control points (x, y), which is a cubic one."""
+    """The quadratic Bezier curve of three control points, which is a cubic one.
+
+    Args:
+        a: its beginning (x, y), mm.
+        b: the control point between, mm.
+        c: its end, mm.
+    """
     one, two, three = np.asarray(a), np.asarray(b), np.asarray(c)
     return Bezier(
         (_pair(one), _pair((one + 2.0 * two) / 3.0), _pair((three + 2.0 * two) / 3.0), _pair(three))

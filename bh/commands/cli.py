@@ -20,6 +20,7 @@ try:
     import typer
 
     from bh.commands.compare import compare
+    from bh.commands.flat import export
     from bh.commands.fold_options import fold
     from bh.commands.response import response
     from bh.runtime.consent import take_options
@@ -278,66 +279,7 @@ def view(
             raise InputError(f"{error}, or {again}") from error
 
 
-@app.command()
-def export(
-    source: Annotated[
-        Path, typer.Argument(metavar="SOURCE", help="A scene (flat), or a path or run's folder (folded).")
-    ],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="What to write; its suffix is the format.")],
-    state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
-    facets: Annotated[bool, typer.Option("--facets", help="Also lines that do not fold (SVG, DXF).")] = False,
-    kerf: Annotated[
-        str | None, typer.Option("--kerf", help="Width of the beam: outline out, holes in.")
-    ] = None,
-    perforate: Annotated[
-        str | None, typer.Option("--perforate", metavar="CUT,LEFT", help="Creases as dashes: 3,1 (mm).")
-    ] = None,
-    units: Annotated[str, typer.Option("--units", help="mm or in.")] = "mm",
-    angles: Annotated[
-        str | None, typer.Option("--angles", help="Fold angles as names of layers (layer) or as text.")
-    ] = None,
-    marks: Annotated[
-        bool, typer.Option("--marks", help="Mark the pinches, on a layer of their own.")
-    ] = False,
-) -> None:
-    """Write a flat pattern (as drawn, from a scene or a drawing) or a folded sheet for other programs."""
-    from bh.commands.flat import cutting
-    from bh.errors import InputError
-    from bh.paths.export import write_flat, write_state
-    from meshes.io.drawing import DRAWINGS
-
-    how = cutting(facets, kerf, perforate, units, angles, marks)
-    if source.suffix.lower() in (".toml", *DRAWINGS):
-        from bh.scene.flat import write_flat_pattern
-        from bh.scene.load import load_scene
-
-        scene = load_scene(source) if source.suffix.lower() == ".toml" else source
-        if file.suffix.lower() in (".svg", ".dxf"):
-            done = write_flat_pattern(file, scene, how)
-        elif isinstance(scene, Path):
-            raise InputError(f"'{source}' is a drawing: write it as .svg or .dxf, or fold it (bh fold)")
-        else:
-            done = write_flat(file, scene.model.mesh, facets)
-    else:
-        if (kerf, perforate, angles, marks, units) != (None, None, None, False, "mm"):
-            raise InputError(
-                f"'{source}' knows its mesh only: --kerf, --perforate, --units, --angles and --marks are for the "
-                "scene that it was made from, or its drawing"
-            )
-        from bh.commands.occupied import path_file
-        from bh.paths.path import Path as Trace
-
-        solved = Trace.load(path_file(source) if source.is_dir() else source)
-        if not -len(solved) <= state < len(solved):
-            raise InputError(
-                f"--state {state}: '{source}' has the states 0 to {len(solved) - 1}; -1 is the last"
-            )
-        last = state % len(solved)
-        if file.suffix.lower() in (".svg", ".dxf"):
-            done = write_flat(file, solved.model.mesh, facets)
-        else:
-            done = write_state(file, [solved[k] for k in range(last + 1)], source.stem)
-    say(f"wrote {done}")
+app.command()(export)
 
 
 @app.command()

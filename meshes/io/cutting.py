@@ -22,6 +22,10 @@ SPIKE = 5.0  # longest mitre, times half the kerf
 def check_cutting(perforate: tuple[float, float] | None, kerf: float) -> None:
     """Refuse lengths that cannot be.
 
+    Args:
+        perforate: cut and left, mm, or None.
+        kerf: width of the beam, mm.
+
     Raises:
         FileFormatError: one line with the value and what to give.
     """
@@ -41,6 +45,9 @@ def kerfed(lines: Sequence[FlatLine], kerf: float) -> list[FlatLine]:
     Args:
         lines: among them a closed outline, mm.
         kerf: mm.
+
+    Returns:
+        the outline and holes first, then the other lines.
 
     Raises:
         FileFormatError: the outline is not closed, or a hole is narrower than the beam.

@@ -51,6 +51,9 @@ def drawn_lines(path: str | os.PathLike[str], **options: Unpack[DrawingOptions])
         path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
         **options: as for `meshes.io.read_pattern`.
 
+    Returns:
+        the lines, outline and cuts first.
+
     Raises:
         FileFormatError: as for `meshes.io.read_pattern`.
     """
@@ -78,6 +81,9 @@ def with_angles(
         lines: of the pattern, or of its drawing.
         pattern: has the creases, mm.
         angles: rad, by crease; lines of creases that are not in it keep theirs.
+
+    Returns:
+        the lines in the same order.
     """
     import shapely
 

@@ -138,7 +138,15 @@ def always(points: Array) -> Callable[[float], Array]:
 
 
 def drawn_curve(curve: Chain, name: str) -> Callable[[float], Array]:
-    """A sampler of a drawn curve that refuses more chords than a line may have; `name` for the message."""
+    """A sampler of a drawn curve that refuses more chords than a line may have.
+
+    Args:
+        curve: in units of the drawing.
+        name: for the message.
+
+    Returns:
+        a function of the tolerance (in that unit) that gives points (k, 2).
+    """
 
     def sample(tolerance: float) -> Array:
         check_limit("vertices", curve.chords(tolerance), name, FileFormatError)
