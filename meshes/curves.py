@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,14 @@ class Curve(Protocol):
 
     def point(self, u: Array) -> Array:
         """(k, 2) points, mm, at (k,) parameters in [0, 1]."""
+
+
+@runtime_checkable
+class Sampled(Protocol):
+    """A curve that knows its own chords."""
+
+    def sampled(self, tolerance: float) -> Array:
+        """(k, 2) ends of chords that stay within `tolerance` (mm) of the curve."""
 
 
 def arc_lengths(points: Array) -> Array:
@@ -219,6 +227,8 @@ def sample(curve: Curve, tolerance: float = 1e-3) -> Array:
         return curve.vertices
     if isinstance(curve, ArcChain):
         return curve.point(_chain_samples(curve, tolerance))
+    if isinstance(curve, Sampled):
+        return curve.sampled(tolerance)
     count = 1
     if isinstance(curve, Arc):
         # sagitta of a chord over angle a: radius (1 - cos(a / 2))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshes.curves import Array, arc_lengths
+from meshes.drawn_curves import Chain
 from meshes.errors import PatternError
 from meshes.limits import check_limit
 from meshes.topology import Ints
@@ -37,12 +38,16 @@ class DrawnLine:
         kind: what it stands for, one of `RANK`.
         name: for messages.
         angle: drawn fold angle, rad, or nan.
+        curve: what the points were taken from, mm; None for these points themselves.
+        layer: the name of its layer in the drawing, or "".
     """
 
     points: Array
     kind: str
     name: str
     angle: float = float("nan")
+    curve: Chain | None = None
+    layer: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,8 @@ class Graph:
         joined: how many ends were moved.
         gap: the distance that did it, mm.
         remarks: lines of both folds that lie over each other, and which of them was taken; one line each.
+        origin: of one sheet out of several: the place in the drawing, mm, that its own origin is.
+        scale: of one sheet out of several: how much larger it is than in the drawing.
     """
 
     points: Array
@@ -66,6 +73,8 @@ class Graph:
     joined: int
     gap: float
     remarks: tuple[str, ...] = ()
+    origin: tuple[float, float] = (0.0, 0.0)
+    scale: float = 1.0
 
     def select(self, kinds: Sequence[str]) -> Ints:
         """Numbers of the edges of some kinds, rising.

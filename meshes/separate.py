@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from meshes.curves import Array
 from meshes.errors import PatternError
 from meshes.planar import Graph
 
@@ -52,11 +51,14 @@ def one_sheet(graph: Graph, number: int, fit: float | None, move: bool) -> Graph
         raise PatternError(f"sheet = {number} cannot be; the drawing holds {_counted(len(sheets))}")
     middles = shapely.points(graph.points[graph.edges].mean(axis=1))
     own = np.argmin([shapely.distance(sheet, middles) for sheet in sheets], axis=0) == number - 1
-    points = _placed(graph.points, sheets[number - 1].bounds, fit, move)
-    larger = 1.0 if fit is None else fit / _longer(sheets[number - 1].bounds)
+    box = sheets[number - 1].bounds
+    larger = 1.0 if fit is None else fit / _longer(box)
+    origin = (box[0], box[1]) if move else (0.0, 0.0)
     return replace(
         graph,
-        points=points,
+        points=(graph.points - origin) * larger,
+        origin=origin,
+        scale=larger,
         edges=graph.edges[own],
         kinds=tuple(kind for kind, kept in zip(graph.kinds, own, strict=True) if kept),
         lines=tuple(line for line, kept in zip(graph.lines, own, strict=True) if kept),
@@ -76,11 +78,6 @@ def several(sheets: Sequence[Any]) -> str:
         f"the drawing holds {len(sheets)} separate sheets (at {spots}); choose one: sheet = 1 to {len(sheets)}, "
         "counted in rows from the top left"
     )
-
-
-def _placed(points: Array, box: tuple[float, float, float, float], fit: float | None, move: bool) -> Array:
-    larger = 1.0 if fit is None else fit / _longer(box)
-    return (points - np.array(box[:2])) * larger if move else points * larger
 
 
 def _longer(box: tuple[float, float, float, float]) -> float:

@@ -20,6 +20,7 @@ try:
     import typer
 
     from bh.commands.compare import compare
+    from bh.commands.flat import export
     from bh.commands.fold_options import fold
     from bh.commands.response import response
     from bh.runtime.consent import take_options
@@ -285,38 +286,7 @@ def view(
             raise InputError(f"{error}, or {again}") from error
 
 
-@app.command()
-def export(
-    source: Annotated[
-        Path, typer.Argument(metavar="SOURCE", help="A scene (flat), or a path or run's folder (folded).")
-    ],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="What to write; its suffix is the format.")],
-    state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
-    facets: Annotated[bool, typer.Option("--facets", help="Also the edges of the mesh (SVG, DXF).")] = False,
-) -> None:
-    """Write a flat pattern or a folded sheet for other programs."""
-    from bh.errors import InputError
-    from bh.paths.export import write_flat, write_state
-
-    if source.suffix.lower() == ".toml":
-        from bh.scene.load import load_scene
-
-        done = write_flat(file, load_scene(source).model.mesh, facets)
-    else:
-        from bh.commands.occupied import path_file
-        from bh.paths.path import Path as Trace
-
-        solved = Trace.load(path_file(source) if source.is_dir() else source)
-        if not -len(solved) <= state < len(solved):
-            raise InputError(
-                f"--state {state}: '{source}' has the states 0 to {len(solved) - 1}; -1 is the last"
-            )
-        last = state % len(solved)
-        if file.suffix.lower() in (".svg", ".dxf"):
-            done = write_flat(file, solved.model.mesh, facets)
-        else:
-            done = write_state(file, [solved[k] for k in range(last + 1)], source.stem)
-    say(f"wrote {done}")
+app.command()(export)
 
 
 @app.command()

@@ -26,6 +26,7 @@ from bh.paths.path import Path as Trace
 from bh.paths.storage import PathFile, reading
 from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter
+from bh.scene.flat import write_flat_pattern
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
 from bh.solvers.walk import Strategy
@@ -379,5 +380,9 @@ def extras(
         name = f"folded{mark}.{suffix}"
         files[name] = partial(write_state, folder / name, [path[-1]], scene.name)
     for suffix in scene.outputs.flat:
-        files[f"flat.{suffix}"] = partial(write_flat, folder / f"flat.{suffix}", scene.model.mesh)
+        file = folder / f"flat.{suffix}"
+        if suffix == "fold":
+            files[file.name] = partial(write_flat, file, scene.model.mesh)
+        else:
+            files[file.name] = partial(write_flat_pattern, file, scene)
     return files

@@ -26,7 +26,7 @@ from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, select
 from bh.model.until import Until
 from bh.scene.changes import set_keys
-from bh.scene.meshing import mesh_of
+from bh.scene.meshing import Drawn, mesh_of
 from bh.scene.reading import (
     arguments,
     as_table,
@@ -104,6 +104,7 @@ class Scene:
         strategy: of the increments, or None for the default: `bh.trace(..., strategy=scene.strategy)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
+        drawn: what the mesh was made from, or None for a scene that was put together in Python.
     """
 
     model: Model
@@ -113,6 +114,7 @@ class Scene:
     accuracy: Goal | None = None
     symmetry: Plane | None = None
     strategy: Strategy | None = None
+    drawn: Drawn | None = None
 
 
 def load_scene(path: str | Path, changes: Sequence[str] = ()) -> Scene:
@@ -213,8 +215,9 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
+    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data)
     model = Model(
-        mesh=mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data),
+        mesh=drawn.mesh,
         sheet=_sheet(sheet),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(steps)),
@@ -230,6 +233,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         accuracy=wanted_accuracy(data, model),
         symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None,
         strategy=Settling() if how.strategy == "settling" else None,
+        drawn=drawn,
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bh.errors import SceneError
 from bh.model.plugins import made
@@ -12,9 +14,29 @@ from bh.scene.tables import DrawnTable, GmshTable, MeshTable
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.choices import first_mesh
 
+if TYPE_CHECKING:
+    from meshes.io.drawing import DrawingOptions
 
-def mesh_of(pattern: object, mesh: object, folder: Path, anew: bool = False) -> SheetMesh:
-    """The meshed sheet of a scene.
+
+@dataclass(frozen=True)
+class Drawn:
+    """What the mesh of a scene was made from.
+
+    Attributes:
+        mesh: of the sheet.
+        pattern: that was meshed; None where the faces of a file are the mesh.
+        file: of the drawing, or None for a pattern of the library.
+        options: by which the file was read.
+    """
+
+    mesh: SheetMesh
+    pattern: CreasePattern | None = None
+    file: Path | None = None
+    options: DrawingOptions = field(default_factory=dict)  # type: ignore[assignment]
+
+
+def mesh_of(pattern: object, mesh: object, folder: Path, anew: bool = False) -> Drawn:
+    """The meshed sheet of a scene, and what it was made from.
 
     Args:
         pattern: table [pattern].
@@ -32,11 +54,11 @@ def mesh_of(pattern: object, mesh: object, folder: Path, anew: bool = False) -> 
     drawn = _drawn(table)
     if mesh is None:
         with within("pattern"):
-            return first_mesh(drawn)
+            return Drawn(first_mesh(drawn), drawn)
     how = _mesh_table(as_table(mesh, "mesh"))
     if isinstance(how, DrawnTable):
         raise SceneError('mesh.kind = "drawn" is for files; use along or aspect_ratio')
-    return _meshed(drawn, how)
+    return Drawn(_meshed(drawn, how), drawn)
 
 
 def _drawn(table: dict[str, object]) -> CreasePattern:
@@ -85,9 +107,9 @@ def _mesh_table(table: dict[str, object]) -> MeshTable | GmshTable | DrawnTable:
     return read_table(MeshTable, table, "mesh")
 
 
-def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: bool) -> SheetMesh:
+def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: bool) -> Drawn:
     from meshes.io import read_drawn, read_fold, read_pattern
-    from meshes.io.drawing import PATTERNS, DrawingOptions
+    from meshes.io.drawing import PATTERNS
 
     suffix = Path(str(table["file"])).suffix.lower()
     if suffix not in PATTERNS:
@@ -112,10 +134,10 @@ def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: 
     own_faces = isinstance(how, DrawnTable) or (mesh is None and not anew)
     with within("pattern.file"):
         if suffix == ".fold" and own_faces and given.sheet is None:
-            return read_fold(file, given.frame, scale=given.scale, fit=given.fit)
+            return Drawn(read_fold(file, given.frame, scale=given.scale, fit=given.fit))
         if isinstance(how, DrawnTable) or (suffix == ".fold" and own_faces):
-            return read_drawn(file, **options)
+            return Drawn(read_drawn(file, **options), None, file, options)
         drawn = read_pattern(file, **options)
         if how is None:
-            return first_mesh(drawn)
-    return _meshed(drawn, how)
+            return Drawn(first_mesh(drawn), drawn, file, options)
+    return Drawn(_meshed(drawn, how), drawn, file, options)

@@ -18,7 +18,8 @@ from bh.scene.load import Scene
 from meshes import SheetMesh
 from meshes.curves import Array, sample
 from meshes.io.export import replacing
-from meshes.io.writing import LOOKS, flat_lines
+from meshes.io.flat_lines import flat_lines
+from meshes.io.writing import LOOKS
 from meshes.mesh import count
 
 if TYPE_CHECKING:

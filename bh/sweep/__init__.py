@@ -27,6 +27,7 @@ from bh.runtime.lock import only_writer
 from bh.sweep import runner
 from bh.sweep.dataset import ABOUT_RUN, Label, dataset, load, save
 from bh.sweep.journal import Journal, Meta
+from bh.sweep.measures import Measure
 from bh.sweep.points import Points, SweepError, grid, read_csv, table
 from bh.sweep.pools import Dask, Given, Here, Local, Pool
 from bh.sweep.progress import Bar, Silent
@@ -45,6 +46,7 @@ __all__ = [
     "Here",
     "Label",
     "Local",
+    "Measure",
     "Measured",
     "Points",
     "SceneTask",
@@ -86,6 +88,7 @@ def scene(
     keys: Mapping[str, str | Sequence[str]],
     places: Sequence[str] = (),
     shape: bool = False,
+    values: Sequence[Measure] = (),
 ) -> SceneTask:
     """The task of solving a scene file with some of its keys set; see `SceneTask`.
 
@@ -95,6 +98,8 @@ def scene(
             "steps[0].fold.to".
         places: whose node positions are measured, such as "corner:inner-end".
         shape: also measure the positions of all nodes.
+        values: numbers to read beside energies and angles, such as
+            `Measure("tip", "displacement_z", "corner:inner-end", since=0)`.
 
     Raises:
         SweepError: the file cannot be read, or the scene has no such key.
@@ -105,7 +110,7 @@ def scene(
         why = getattr(error, "strerror", None) or error
         raise SweepError(f"the scene '{file}' cannot be read ({why}); check the name") from error
     every = {name: (key,) if isinstance(key, str) else tuple(key) for name, key in keys.items()}
-    return SceneTask(text, every, Path(file).parent.resolve(), tuple(places), shape)
+    return SceneTask(text, every, Path(file).parent.resolve(), tuple(places), shape, values=tuple(values))
 
 
 def run(

@@ -13,6 +13,7 @@ from bh.errors import InputError
 from bh.scene.reading import Table, as_table, check_keys, inside, one_line, read_table, read_toml
 from bh.sweep import SceneTask, scene
 from bh.sweep.dataset import Label
+from bh.sweep.measures import Measure
 from bh.sweep.points import Points, SweepError, Value, grid, read_csv
 from meshes.quantities import of_any_kind
 
@@ -66,11 +67,26 @@ class SampleTable(Table):
     keys: dict[str, str | list[str]] = Field(description="for every column " + KEY)
 
 
+class ValueTable(Table):
+    """One number of a path: `bh.sweep.measures.Measure`."""
+
+    observable: str = Field(description="what is read, such as displacement_z, reaction_x or stiffness_z")
+    of: str | None = Field(None, description="the crease or place that it is read from")
+    step: Annotated[int, Field(ge=0)] | None = Field(
+        None, description="the step after which it is read, from 0; the last one if not given"
+    )
+    since: Annotated[int, Field(ge=0)] | None = Field(
+        None, description="the step from whose end on it is counted, from 0"
+    )
+    hold: list[str] = Field([], description="a list of places that are fixed while a stiffness is probed")
+
+
 class MeasureTable(Table):
     """What is measured beside energies and angles."""
 
     places: list[str] = Field([], description="a list of places whose node positions are measured")
     shape: bool = Field(False, description="true or false: positions of all nodes")
+    values: dict[str, ValueTable] = Field({}, description="tables [measure.values.NAME]")
 
 
 @dataclass(frozen=True)
@@ -135,7 +151,12 @@ def _sweep(data: dict[str, object], file: Path) -> Sweep:
             raise SweepError(
                 f"table.keys and the columns of '{sample.file}' do not fit: look at {', '.join(wrong)}"
             )
-    task = scene(inside(file.parent, file_of_scene, "scene"), keys, measure.places, measure.shape)
+    values = tuple(
+        Measure(name, value.observable, value.of, value.step, value.since, tuple(value.hold))
+        for name, value in measure.values.items()
+    )
+    place = inside(file.parent, file_of_scene, "scene")
+    task = scene(place, keys, measure.places, measure.shape, values)
     return Sweep(task, points, labels, file.stem)
 
 

@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from bh.errors import InputError, SceneError
@@ -16,13 +16,24 @@ from bh.paths.path import Path as Trace
 from bh.scene.changes import setter
 from bh.scene.load import Scene, scene_from_tables
 from bh.scene.reading import read_toml
+from bh.solvers.arc_length import ArcLength
+from bh.solvers.automatic import Automatic
+from bh.solvers.load_control import LoadControl
+from bh.solvers.outcome import Outcome
 from bh.solving.trace import trace
 from bh.sweep.dataset import Label
-from bh.sweep.points import SweepError, Value
+from bh.sweep.measures import Measure
+from bh.sweep.points import OWN, SweepError, Value
 from bh.sweep.task import Measured
 
 MEASURED = re.compile(
     r"(energy|dihedral|points)_.*|stable|critical_points|iterations|unknowns|points|flat_points|node|node_.*|xyz?"
+)
+RETRIED = (Outcome.LIMIT_POINT, Outcome.STALLED)  # outcomes that finer increments may mend
+FINER = Automatic(
+    LoadControl(first_rotation=0.1, largest_rotation=0.2, first=0.02, largest=0.05),
+    ArcLength(most=1000),
+    patience=2e-4,
 )
 ENERGIES = ("stretching", "bending", "folding", "total")
 
@@ -40,6 +51,7 @@ class SceneTask:
         warm: points that come together are a line along one axis and may begin at each other's states:
             `bh.sweep.warm`.
         labels: of the parameters, in front of those that the task knows.
+        values: numbers to read beside energies and angles.
 
     Raises:
         SweepError: the scene has no such key.
@@ -52,10 +64,16 @@ class SceneTask:
     shape: bool = False
     warm: bool = False
     labels: Mapping[str, Label] = field(default_factory=dict)
+    values: tuple[Measure, ...] = ()
 
     def __post_init__(self) -> None:
         """See that the scene has the keys."""
         tables = read_toml(self.text)
+        for value in self.values:
+            if MEASURED.fullmatch(value.name) or value.name in (*self.keys, *OWN, "retried"):
+                raise SweepError(
+                    f"measure.values.{value.name} is the name of something else; give it another"
+                )
         for name, keys in self.keys.items():
             if MEASURED.fullmatch(name):
                 raise SweepError(
@@ -74,6 +92,8 @@ class SceneTask:
             "shape": self.shape,
             "warm": self.warm,
         }
+        if self.values:
+            data["values"] = [asdict(value) for value in self.values]
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
     def scene(self, parameters: Mapping[str, Value]) -> Scene:
@@ -92,10 +112,16 @@ class SceneTask:
         """Solve the scene of a point and measure its last state."""
         scene = self.scene(parameters)
         path = trace(scene.model, accuracy=scene.accuracy, strategy=scene.strategy, warn=False)
-        if not path.reached:
-            where = f"step {len(path.steps)}, lambda {path.records[-1].lam:.6g}"
-            return Measured({}, path.outcome, f"{where}: {path.reason}")
-        return Measured(self.measure(path))
+        if path.reached:
+            return Measured(self.measure(path))
+        why = f"{path.outcome} at {_where(path)}"
+        if path.outcome not in RETRIED or scene.strategy is not None:
+            return Measured({}, path.outcome, f"{_where(path)}: {path.reason}")
+        finer = trace(scene.model, accuracy=scene.accuracy, strategy=FINER, warn=False)
+        if finer.reached:
+            return Measured(self.measure(finer) | {"retried": 1}, reason=f"by finer increments, after {why}")
+        tried = f"{_where(finer)}: {finer.reason} (by finer increments; before {why})"
+        return Measured({}, finer.outcome, tried)
 
     def line(self, points: Sequence[Mapping[str, Value]]) -> list[Measured] | None:
         """All points of a line by warm starts, or None where one of them cannot be or is not reached.
@@ -136,6 +162,7 @@ class SceneTask:
                 }
         for place in self.places:
             found[f"points_{word(place)}"] = state.points[select(mesh, place)]
+        found |= {value.name: value.read(path) for value in self.values}
         if self.shape:
             found |= {"points": state.points, "flat_points": mesh.points}
         found |= {
@@ -143,6 +170,7 @@ class SceneTask:
             "critical_points": len(path.critical_points),
             "iterations": path.iterations,
             "unknowns": path.unknowns,
+            "retried": 0,
         }
         return found
 
@@ -159,6 +187,8 @@ class SceneTask:
             )
         known["points"] = Label("mm", "positions of all nodes", ("node", "xyz"))
         known["flat_points"] = Label("mm", "positions in the flat sheet", ("node", "xy"))
+        known |= {value.name: Label(value.unit, _described(value)) for value in self.values}
+        known["retried"] = Label("", "1 reached by finer increments only")
         known["stable"] = Label("", "1 stable, 0 not stable, -1 not known")
         for name, keys in self.keys.items():
             known[name] = Label("", ", ".join(keys))
@@ -173,9 +203,11 @@ class SceneTask:
         errors = []
         for parameters in tried:
             try:
-                mesh = self.scene(parameters).model.mesh
+                model = self.scene(parameters).model
                 for place in self.places:
-                    select(mesh, place)
+                    select(model.mesh, place)
+                for value in self.values:
+                    value.check(model)
                 return
             except InputError as error:
                 errors.append(error)
@@ -188,6 +220,17 @@ def _setter(tables: dict[str, object], key: str, name: str) -> Callable[[Value],
         return setter(tables, key)
     except SceneError as error:
         raise SweepError(f"parameter '{name}': {error}") from error
+
+
+def _where(path: Trace) -> str:
+    return f"step {len(path.steps)}, lambda {path.records[-1].lam:.6g}"
+
+
+def _described(value: Measure) -> str:
+    """A measure in words: "displacement_z of corner:inner-end, after step 1, since step 0"."""
+    of = f" of {value.of}" if value.of else ""
+    step = "" if value.step is None else f", after step {value.step}"
+    return f"{value.observable}{of}{step}" + ("" if value.since is None else f", since step {value.since}")
 
 
 def word(place: str) -> str:

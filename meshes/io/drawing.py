@@ -17,11 +17,11 @@ from meshes.errors import FileFormatError, InputError
 from meshes.io.export import one_line, shown
 from meshes.io.perforation import join_dashes
 from meshes.io.sizes import check_lengths, size_remarks
-from meshes.io.strokes import Rules, Stroke, Strokes
+from meshes.io.strokes import Rules, Stroke, Strokes, layer_angle
 from meshes.limits import check_limit
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
-from meshes.planar import RIM, DrawnLine, Graph, check_crossings, heal
+from meshes.planar import FOLDED, RIM, DrawnLine, Graph, check_crossings, heal
 from meshes.separate import one_sheet
 
 OUTLINES = ("drawn", "hull")
@@ -187,11 +187,15 @@ def read_graph(
     if scale is None:
         remarks += size_remarks(unit * float((high - low).max()), found.stated)
     moved = np.zeros(2) if Path(path).suffix.lower() in UPWARDS and fit is None else low
-    partly = any(stroke.opacity < 1.0 for stroke, kind in kept if kind in ("mountain", "valley"))
+    partly = any(stroke.opacity < 1.0 for stroke, kind in kept if kind in FOLDED)
     drawn = []
     for (stroke, kind), points in zip(kept, sampled, strict=True):
-        angle = math.pi * stroke.opacity if partly and kind in ("mountain", "valley") else math.nan
-        drawn.append(DrawnLine(_clean((points - moved) * unit, 1e-9 * diagonal), kind, stroke.name, angle))
+        angle = math.pi * stroke.opacity if partly and kind in FOLDED else math.nan
+        if kind in FOLDED and not math.isnan(said := layer_angle(stroke.layer)):
+            angle = said
+        curve = None if stroke.curve is None else stroke.curve.placed(unit, moved.tolist())
+        place = _clean((points - moved) * unit, 1e-9 * diagonal)
+        drawn.append(DrawnLine(place, kind, stroke.name, angle, curve, stroke.layer))
     drawn = [line for line in drawn if len(line.points) > 1]
     lengths = np.array([_length(line.points) for line in drawn])
     if gap is None:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from meshes.curves import Array
 from meshes.errors import FileFormatError
+from meshes.io.dxf_curves import dxf_curve
 from meshes.io.files import drawing_bytes
-from meshes.io.strokes import Colour, Dash, Stroke, Strokes, dash_kind
+from meshes.io.strokes import Colour, Dash, Stroke, Strokes, dash_kind, drawn_curve
 from meshes.limits import check_limit
 
 UNITS = {
@@ -193,12 +194,27 @@ def _stroke(drawing: Any, entity: Any, around: Look | None, number: int) -> Stro
         points = max(entity.control_point_count(), entity.fit_point_count())
         check_limit("control_points", points, name, FileFormatError)
     try:
-        flatten = _flattening(entity)
-        first = flatten(1e300)
+        curve = dxf_curve(entity)
+        sampler = _flattening(entity) if curve is None else curve.sampled
+        first = sampler(1e300)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         return None  # no points, no radius, no knots: nothing is drawn
     if len(first) < 2 or (np.isfinite(first).all() and not np.ptp(first, axis=0).any()):
         return None
+    return Stroke(
+        _flat(sampler, name) if curve is None else drawn_curve(curve, name),
+        name,
+        _colour(drawing, entity, around),
+        _layer_name(entity, around),
+        _dash(drawing, entity, around),
+        1.0 - entity.transparency,
+        key=f"handle:{entity.dxf.handle}",
+        curve=curve,
+    )
+
+
+def _flat(flatten: Callable[[float], Array], name: str) -> Callable[[float], Array]:
+    """A sampler that gives points (k, 2) of one with points (k, 3), if these lie in the xy plane."""
 
     def sample(tolerance: float) -> Array:
         points = flatten(tolerance)
@@ -206,15 +222,7 @@ def _stroke(drawing: Any, entity: Any, around: Look | None, number: int) -> Stro
             raise FileFormatError(f"{name} is not in the xy plane; flatten the drawing")
         return np.asarray(points[:, :2], dtype=float)
 
-    return Stroke(
-        sample,
-        name,
-        _colour(drawing, entity, around),
-        _layer_name(entity, around),
-        _dash(drawing, entity, around),
-        1.0 - entity.transparency,
-        key=f"handle:{entity.dxf.handle}",
-    )
+    return sample
 
 
 def _flattening(entity: Any) -> Any:

@@ -65,7 +65,9 @@ def join_dashes(lines: Sequence[DrawnLine], near: float) -> tuple[list[DrawnLine
             points = _lengthened(np.vstack(parts), 1.5 * gap, tree, rows)
             points = _lengthened(points[::-1], 1.5 * gap, tree, rows)[::-1]
             first = lines[rows[0]]
-            out[rows[0]] = replace(first, points=points, name=f"{first.name} and the dashes after it")
+            out[rows[0]] = replace(
+                first, points=points, name=f"{first.name} and the dashes after it", curve=None
+            )
             gone.update(rows[1:])
             dashes, creases = dashes + len(rows), creases + 1
     if not creases:

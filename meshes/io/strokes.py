@@ -7,13 +7,16 @@ can be overruled by a mapping such as {"#00aa00": "valley", "layer:score": "moun
 from __future__ import annotations
 
 import colorsys
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from meshes.curves import Array
+from meshes.drawn_curves import Chain
 from meshes.errors import FileFormatError
+from meshes.limits import check_limit
 
 LineKind = Literal["mountain", "valley", "flat", "boundary", "cut", "facet", "ignore"]
 Dash = Literal["solid", "dashed", "dotted", "dashdot"]
@@ -39,7 +42,19 @@ LAYERS: dict[LineKind, tuple[str, ...]] = {
     ),
     "cut": ("cut", "cuts", "cutting", "slit", "slits", "schnitt", "schneiden", "coupe", "corte"),
     "facet": ("facet", "facets", "triangulation", "ruling", "rulings", "f"),
-    "ignore": ("ignore", "text", "notes", "dimensions", "construction", "guide", "guides", "hidden"),
+    "ignore": (
+        "pinch",
+        "angle",
+        "angles",
+        "ignore",
+        "text",
+        "notes",
+        "dimensions",
+        "construction",
+        "guide",
+        "guides",
+        "hidden",
+    ),
 }
 # layers of creases that do not say which way they fold: a mountain where their colour does not tell either
 SCORES = (
@@ -86,6 +101,7 @@ class Stroke:
         opacity: 0 to 1; as a part of 180 degrees it says how far to fold.
         key: "id:NAME" or "handle:NUMBER" by which a mapping can name this line alone, or "".
         unknown: what its colour says where that is not understood; `colour` is None then.
+        curve: what was drawn, in units of the drawing, y upwards; None where only points are known.
     """
 
     sample: Callable[[float], Array]
@@ -96,6 +112,7 @@ class Stroke:
     opacity: float = 1.0
     unknown: str = ""
     key: str = ""
+    curve: Chain | None = None
 
 
 @dataclass(frozen=True)
@@ -118,6 +135,30 @@ class Strokes:
 def always(points: Array) -> Callable[[float], Array]:
     """A sampler of a line that is a polyline already: any tolerance gives its own points (k, 2)."""
     return lambda _: points
+
+
+def drawn_curve(curve: Chain, name: str) -> Callable[[float], Array]:
+    """A sampler of a drawn curve that refuses more chords than a line may have.
+
+    Args:
+        curve: in units of the drawing.
+        name: for the message.
+
+    Returns:
+        a function of the tolerance (in that unit) that gives points (k, 2).
+    """
+
+    def sample(tolerance: float) -> Array:
+        check_limit("vertices", curve.chords(tolerance), name, FileFormatError)
+        return curve.sampled(tolerance)
+
+    return sample
+
+
+def layer_angle(layer: str) -> float:
+    """The fold angle, rad, that a layer such as "mountain 62.5deg" says its lines have; nan where it says none."""
+    found = re.search(r"(?<![\d.])(\d+(?:\.\d+)?) ?deg\b", layer.lower())
+    return math.radians(float(found[1])) if found and float(found[1]) <= 180.0 else math.nan
 
 
 class Rules:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -14,12 +15,12 @@ from xml.etree.ElementTree import ParseError
 
 import numpy as np
 
-from meshes.curves import Array
+from meshes.curves import Line
+from meshes.drawn_curves import Bezier, Chain, EllipseArc, Piece, quadratic
 from meshes.errors import FileFormatError
 from meshes.io.files import drawing_bytes
-from meshes.io.strokes import Colour, Dash, Stroke, Strokes, always, dash_kind
+from meshes.io.strokes import Colour, Dash, Stroke, Strokes, always, dash_kind, drawn_curve
 from meshes.io.svg_tree import CLIP, CLIP_SHAPE, svg_tree
-from meshes.limits import check_limit
 
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 PIXELS = 96.0  # an inch, as CSS has it
@@ -81,8 +82,9 @@ def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
             name = f"'{shape.id}'" if shape.id else f"line {number} ({type(shape).__name__.lower()})"
             if part:
                 name += f", part {part + 1}"
+            curve = _curve(se, segments)
             stroke = Stroke(
-                _sampler(se, segments),
+                drawn_curve(curve, "a line of this drawing"),
                 name,
                 colour,
                 layer,
@@ -90,6 +92,7 @@ def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
                 _opacity(shape),
                 unknown,
                 f"id:{shape.id}" if shape.id else "",
+                curve,
             )
             yield from _clipped(stroke, clips)
 
@@ -153,7 +156,7 @@ def _region(se: Any, group: Any) -> Any:
         box = path.bbox()
         size = max(box[2] - box[0], box[3] - box[1]) if box is not None else 0.0
         for _, segments in _parts(se, path):
-            points = _sampler(se, segments)(max(FINE * size, 1e-12))
+            points = drawn_curve(_curve(se, segments), "a clip path")(max(FINE * size, 1e-12))
             if len(points) > 2:
                 areas.append(shapely.make_valid(shapely.Polygon(points)))
     return shapely.union_all(areas)
@@ -180,7 +183,7 @@ def _clipped(stroke: Stroke, clips: tuple[Any, ...]) -> Iterator[Stroke]:
         if piece.geom_type == "LineString" and piece.length > 0.0:
             points = np.asarray(piece.coords)
             name = stroke.name + (f", clipped part {number + 1}" if number else ", clipped")
-            yield replace(stroke, sample=always(points), name=name)
+            yield replace(stroke, sample=always(points), name=name, curve=None)
 
 
 def _hidden(shape: Any) -> bool:
@@ -232,41 +235,33 @@ def _dash(shape: Any) -> Dash:
         return "solid"
 
 
-def _sampler(se: Any, segments: list[Any]) -> Any:
-    curved = (se.CubicBezier, se.QuadraticBezier, se.Arc)
-    if not any(isinstance(segment, curved) for segment in segments):
-        check_limit("vertices", len(segments), "a line of this drawing", FileFormatError)
-        ends = [segments[0].start, *(segment.end for segment in segments)]
-        return always(np.array([[end.x, end.y] for end in ends]) * (1.0, -1.0))
-
-    def sample(tolerance: float) -> Array:
-        points = [np.array([[segments[0].start.x, segments[0].start.y]])]
-        pieces = [_pieces(se, s, tolerance) if isinstance(s, curved) else 1 for s in segments]
-        check_limit("vertices", sum(pieces), "a line of this drawing", FileFormatError)
-        for segment, chords in zip(segments, pieces, strict=True):
-            if not isinstance(segment, curved):
-                points.append(np.array([[segment.end.x, segment.end.y]]))
-                continue
-            t = np.linspace(0.0, 1.0, chords + 1)[1:]
-            points.append(np.array([[p.x, p.y] for p in map(segment.point, t)]))
-            points[-1][-1] = segment.end.x, segment.end.y
-        flipped: Array = np.vstack(points) * (1.0, -1.0)
-        return flipped
-
-    return sample
+def _curve(se: Any, segments: list[Any]) -> Chain:
+    """The segments of a path, y upwards."""
+    return Chain(tuple(_piece(se, segment) for segment in segments))
 
 
-@np.errstate(invalid="ignore", over="ignore")  # what is not finite is refused later
-def _pieces(se: Any, segment: Any, tolerance: float) -> int:
-    """How many chords keep within the tolerance: the error of one is max |c''| / (8 n^2)."""
+def _piece(se: Any, segment: Any) -> Piece:
     if isinstance(segment, se.CubicBezier):
-        p = [np.array([q.x, q.y]) for q in (segment.start, segment.control1, segment.control2, segment.end)]
-        bend = 6.0 * max(np.linalg.norm(p[0] - 2 * p[1] + p[2]), np.linalg.norm(p[1] - 2 * p[2] + p[3]))
-    elif isinstance(segment, se.QuadraticBezier):
-        p = [np.array([q.x, q.y]) for q in (segment.start, segment.control, segment.end)]
-        bend = 2.0 * np.linalg.norm(p[0] - 2 * p[1] + p[2])
-    else:
-        bend = max(abs(segment.rx), abs(segment.ry)) * float(segment.sweep) ** 2
-    if not np.isfinite(bend):
-        return 1
-    return int(min(max(np.ceil(np.sqrt(bend / (8.0 * tolerance))), 1 if bend < tolerance else 2), 20_000))
+        ends = (segment.start, segment.control1, segment.control2, segment.end)
+        a, b, c, d = (_up(point) for point in ends)
+        return Bezier((a, b, c, d))
+    if isinstance(segment, se.QuadraticBezier):
+        return quadratic(*(_up(point) for point in (segment.start, segment.control, segment.end)))
+    if isinstance(segment, se.Arc):
+        centre, u, v = (_up(point) for point in (segment.center, segment.prx, segment.pry))
+        half = (u[0] - centre[0], u[1] - centre[1]), (v[0] - centre[0], v[1] - centre[1])
+        start = float(segment.get_start_t())
+        ellipse = EllipseArc(centre, *half, start, float(segment.sweep))
+        # svgelements mirrors v where the sweep runs from u away from it
+        off = [
+            math.dist(ellipse.at(np.array([part]))[0], _up(end))
+            for part, end in ((0.0, segment.start), (1.0, segment.end))
+        ]
+        if max(off) > 1e-6 * max(math.hypot(*half[0]), math.hypot(*half[1])):
+            ellipse = replace(ellipse, v=(-half[1][0], -half[1][1]))
+        return ellipse
+    return Line(_up(segment.start), _up(segment.end))
+
+
+def _up(point: Any) -> tuple[float, float]:
+    return float(point.x), -float(point.y)

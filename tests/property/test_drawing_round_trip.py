@@ -17,7 +17,7 @@ from meshes import CreasePattern
 from meshes.curves import sample
 from meshes.drawn_pattern import pattern_of
 from meshes.io import read_pattern, write_pattern
-from meshes.io.writing import flat_lines
+from meshes.io.flat_lines import flat_lines
 from meshes.pattern import FoldKind
 from meshes.planar import DrawnLine, heal
 from meshes.unstructured import sheet_area

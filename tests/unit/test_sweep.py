@@ -408,3 +408,109 @@ def test_warm_starts_are_given_up_where_states_differ(monkeypatch: pytest.Monkey
 def test_warm_starts_need_a_scene(tmp_path: Path, tasks: Any) -> None:
     with pytest.raises(bh.sweep.SweepError, match="need a scene and a grid"):
         bh.sweep.run(tasks.waves, GRID, tmp_path / "w.nc", pool=0, warm=True)
+
+
+# --- measures -----------------------------------------------------------------------------------------------
+
+STRIP = """
+[pattern]
+kind = "strip"
+length = 40.0
+width = 20.0
+creases = [10.0]
+[sheet]
+E = 4000.0
+t = 0.2
+[mesh]
+along = 8
+[[supports]]
+at = "edge:start"
+fix = "xyz"
+clamp = true
+[[steps]]
+force = { at = "edge:end", total = [0.0, 0.0, 0.001] }
+[[steps]]
+force = { at = "edge:end", total = [0.0, 0.0, 0.003] }
+"""
+MEASURES = """
+scene = "strip.toml"
+[axes.t]
+key = "sheet.t"
+values = [0.2, 0.4]
+[measure.values.tip]
+observable = "displacement_z"
+of = "edge:end"
+[measure.values.further]
+observable = "displacement_z"
+of = "edge:end"
+since = 0
+[measure.values.first]
+observable = "displacement_z"
+of = "edge:end"
+step = 0
+[measure.values.held]
+observable = "reaction_z"
+of = "edge:start"
+[measure.values.k]
+observable = "stiffness_z"
+of = "edge:end"
+"""
+
+
+@pytest.fixture
+def measured(tmp_path: Path) -> Path:
+    (tmp_path / "strip.toml").write_text(STRIP)
+    (tmp_path / "m.toml").write_text(MEASURES)
+    return tmp_path / "m.toml"
+
+
+def test_any_observable_changes_forces_and_stiffness(measured: Path, tmp_path: Path) -> None:
+    asked = load_sweep(measured)
+    data = bh.sweep.run(asked.task, asked.points, tmp_path / "m.nc", pool=0, labels=asked.labels)
+    np.testing.assert_allclose(data["held"], -0.003, rtol=1e-6)
+    np.testing.assert_allclose(data["further"], data["tip"] - data["first"], rtol=1e-12)
+    np.testing.assert_allclose(0.003 / data["tip"], data["k"], rtol=0.02)  # nearly linear
+    assert data["k"][1] / data["k"][0] == pytest.approx(8.0, rel=0.02)  # with t^3
+    assert data["k"].attrs["units"] == "N/mm"
+    assert data["retried"].values.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"displacement_z"', '"displacment_z"', "displacement_z"),
+        ("since = 0", "since = 1", "does not lie before"),
+        ("step = 0", "step = 2", "no step"),
+        ('of = "edge:end"\nsince', "since", "name the place"),
+        ("[measure.values.k]", "[measure.values.energy_total]", "name of something else"),
+    ],
+)
+def test_measures_that_no_scene_has(
+    measured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
+) -> None:
+    measured.write_text(measured.read_text().replace(old, new, 1))
+    assert main(["sweep", str(measured), "-o", str(tmp_path / "bad.nc"), "-w", "0", "-q"]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_a_point_that_ends_early_is_retried_finer(measured: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first try is made to end at a limit point; the second one is the real one."""
+    from bh.solvers.outcome import Outcome
+    from bh.sweep import scenes
+
+    task = load_sweep(measured).task
+    solve, tried = scenes.trace, []
+
+    class Early:
+        outcome, reached, reason, steps = Outcome.LIMIT_POINT, False, "the load turns back", (1,)
+        records = (type("R", (), {"lam": 0.5}),)
+
+    def first_fails(model: Any, **options: Any) -> Any:
+        tried.append(options["strategy"])
+        return Early() if len(tried) == 1 else solve(model, **options)
+
+    monkeypatch.setattr(scenes, "trace", first_fails)
+    found = task({"t": 0.2})
+    assert tried == [None, scenes.FINER]
+    assert found.values["retried"] == 1
+    assert found.reason == "by finer increments, after limit-point at step 1, lambda 0.5"
