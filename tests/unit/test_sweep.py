@@ -496,11 +496,11 @@ def test_measures_that_no_scene_has(
 def test_a_point_that_ends_early_is_retried_finer(measured: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first try is made to end at a limit point; the second one is the real one."""
     from bh.solvers.outcome import Outcome
-    from bh.solving.trace import trace
+    from bh.solving.trace import trace as solve
     from bh.sweep import scenes
 
     task = load_sweep(measured).task
-    solve, tried = trace, []
+    tried: list[Any] = []
 
     class Early:
         outcome, reached, reason, steps = Outcome.LIMIT_POINT, False, "the load turns back", (1,)
