@@ -28,13 +28,19 @@ def wound(state: bh.State) -> float:
     return float(np.degrees(np.arctan2(axis @ np.cross(*across), across[0] @ across[1])))
 
 
-for name, off in (("along", 0.0), ("diagonal", 0.25 * np.pi), ("across", 0.5 * np.pi)):
+GRAINS = {
+    "grain_directions_along.png": 0.0,
+    "grain_directions_diagonal.png": 0.25 * np.pi,
+    "grain_directions_across.png": 0.5 * np.pi,
+}
+for picture, off in GRAINS.items():
     card = bh.materials.sheet("card-300", grain=ALONG + off)
     path = bh.trace(bh.Model(mesh, card).fold("crease", by="60deg")).require()
     last = path[-1]
     ends = [last.points[mesh.nodes(f"edge:{side}")].mean(axis=0) for side in ("start", "end")]
+    apart = np.linalg.norm(ends[1] - ends[0])
     print(
-        f"grain {name}: energy {last.energy.total:.3f} N mm, ends {np.linalg.norm(ends[1] - ends[0]):.2f} mm apart, "
+        f"grain at {np.degrees(off):.0f} degrees: energy {last.energy.total:.3f} N mm, ends {apart:.2f} mm apart, "
         f"wound by {wound(last):.2f} degrees, stress up to {last.stress().worst().utilisation:.2f} of the strength"
     )
-    bh.plotting.picture(last, f"grain_directions_{name}.png", "utilisation", (900, 560))
+    bh.plotting.picture(last, picture, "utilisation", (900, 560))

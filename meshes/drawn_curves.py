@@ -187,6 +187,7 @@ class Chain:
         """Of all pieces together."""
         return sum(_piece_chords(piece, tolerance) for piece in self.pieces)
 
+    @np.errstate(invalid="ignore", over="ignore")  # what is not finite is refused by who reads it
     def sampled(self, tolerance: float) -> Array:
         """(k, 2) ends of chords that stay within `tolerance` (mm) of the curve, the ends of its pieces among them."""
         points = [self.pieces[0].point(np.zeros(1))]

@@ -70,7 +70,7 @@ def export(  # noqa: PLR0913 - the options of a command line
         bool, typer.Option("--marks", help="Mark the pinches, on a layer of their own.")
     ] = False,
 ) -> None:
-    """Write a flat pattern (as drawn, from a scene or a drawing) or a folded sheet for other programs."""
+    """Write a flat pattern as it was drawn, or a folded sheet."""
     from bh.errors import InputError
     from bh.paths.export import write_flat, write_state
     from meshes.io.drawing import DRAWINGS

@@ -69,6 +69,7 @@ def pulled(formulation: str, size: float) -> tuple[float, float, float]:
     return state.energy.total, float(force), float(np.ptp(state.points[:, 2]))
 
 
+@pytest.mark.slow
 def test_kirigami_opens_as_its_shell() -> None:
     """Finer, they come together: 61.2 N mm and 32.4 N (constant strains, 0.8 mm), 62.1 and 32.7 (shell, 2 mm).
 

@@ -17,6 +17,8 @@ import pytest
 
 import bh
 from bh.formulations.protocols import Formulation
+from bh.loading.builder import load_steps
+from bh.scene.load import load_scene
 from bh.solvers.system import System
 from tests.unit.browsers import needs_browser
 from tests.unit.test_plotting import needs_opengl
@@ -134,7 +136,7 @@ def built(folder: Path, *options: str) -> Path:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The pages and the gallery; the reference, which takes longer than both, is in `test_the_whole_site`."""
+    """With the gallery, which runs every example for some two minutes, and without the reference."""
     return built(tmp_path_factory.mktemp("docs"), "--no-reference")
 
 
@@ -160,8 +162,21 @@ def links_lead_somewhere(site: Path) -> None:
                     assert anchor in ids[there], f"{file.name}: {link}"
 
 
+def test_pages_link_to_each_other_and_load_nothing_from_elsewhere(tmp_path: Path) -> None:
+    """The pages alone; with gallery and reference they are slow tests, and what `make docs` builds."""
+    links_lead_somewhere(built(tmp_path, "--no-reference", "--no-gallery"))
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_scenes_of_the_gallery_are_read(file: Path) -> None:
+    """And meshed, and their steps become loads; the gallery solves them."""
+    model = load_scene(file).model
+    assert len(load_steps(model)) == len(model.steps)
+
+
+@pytest.mark.slow
 @needs_opengl
-def test_pages_link_to_each_other_and_load_nothing_from_elsewhere(site: Path) -> None:
+def test_the_gallery(site: Path) -> None:
     links_lead_somewhere(site)
     gallery = {file.stem for file in (site / "gallery").glob("*.html")}
     assert gallery == {"index", *(file.stem for file in (*SCENES, *SCRIPTS))}
@@ -175,6 +190,7 @@ def test_the_whole_site(tmp_path: Path) -> None:
     assert len(list((site / "reference").glob("*.html"))) > 50
 
 
+@pytest.mark.slow
 @needs_opengl
 @pytest.mark.parametrize("file", SCRIPTS, ids=lambda file: file.stem)
 def test_scripts_of_the_gallery_run(file: Path, site: Path) -> None:
@@ -191,6 +207,7 @@ def test_scripts_of_the_gallery_run(file: Path, site: Path) -> None:
     assert others == {"index.md"}
 
 
+@pytest.mark.slow
 @needs_opengl
 @needs_browser
 def test_sheets_of_the_gallery_turn(chromium: Any, site: Path) -> None:

@@ -225,6 +225,7 @@ def test_a_point_with_a_direction() -> None:
     assert found.landing.frame[0, 0] < -math.cos(math.radians(1.0))
 
 
+@pytest.mark.slow
 def test_robust_designs_move_less() -> None:
     """A fifth here, with one segment more and a descent on the movements; they still end where they should."""
     target = (50.0, 150.0, 0.0)

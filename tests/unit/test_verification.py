@@ -64,6 +64,8 @@ SLOW = {
     "appendix_b_shell",  # test_shell_convergence.py has the same figures
     "shell_benchmarks",  # the same
     "appendix_b_cross",
+    "branches",
+    "convergence",
     "appendix_b_fields",
     "fig3_11",
     "forward",
@@ -485,20 +487,20 @@ def played_here(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Results that are stored are not played again; a half-written line and those of other versions are."""
     monkeypatch.setattr(campaign, "environment", lambda: {"python": "x"})
-    few = campaign.scenes(3)
+    few = campaign.scenes(2)
     store = tmp_path / "campaign.jsonl"
     told: list[str] = []
     whole = campaign.play_all(few, store, told.append)
-    assert [r.outcome for r in whole] == ["reached"] * 3
+    assert [r.outcome for r in whole] == ["reached"] * 2
     assert told == []
     lines = store.read_text().splitlines()
-    assert len(lines) == 4
+    assert len(lines) == 3
     marked = json.dumps({**json.loads(lines[1]), "iterations": 12345})
     store.write_text("\n".join([lines[0], marked, lines[2][:20]]))
     again = campaign.play_all(few, store, told.append)
     assert sorted(r.iterations for r in again)[-1] == 12345
-    assert sorted(r.outcome for r in again) == ["reached"] * 3
-    assert "1 of 3 scenes are known" in told[0]
+    assert sorted(r.outcome for r in again) == ["reached"] * 2
+    assert "1 of 2 scenes are known" in told[0]
     monkeypatch.setattr(campaign, "environment", lambda: {"python": "y"})
     anew = campaign.play_all(few, store, told.append)
     assert [r.iterations for r in anew] == [r.iterations for r in whole]
@@ -507,12 +509,12 @@ def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytes
 @pytest.mark.usefixtures("played_here")
 def test_long_cases_come_from_the_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run without them shows the kept run, with its own date; a run of them replaces it."""
-    few = campaign.scenes(2)
-    monkeypatch.setattr(campaign, "QUICK_SCENES", 2)
+    few = campaign.scenes(1)
+    monkeypatch.setattr(campaign, "QUICK_SCENES", 1)
     run(["campaign"], tmp_path / "long", quick=True)
     (tmp_path / "records").mkdir()
     kept = tmp_path / "records" / "campaign.json"
-    kept.write_text((tmp_path / "long" / "checks.json").read_text().replace('"2 random scenes"', '"kept"'))
+    kept.write_text((tmp_path / "long" / "checks.json").read_text().replace('"1 random scenes"', '"kept"'))
     monkeypatch.setattr(runner, "RECORDS", tmp_path / "records")
     data = run(["shear_calibration"], tmp_path / "short")
     assert [info["name"] for info in data["cases"]] == ["shear_calibration"]
