@@ -55,6 +55,7 @@ from bh.scene.tables import (
 from bh.scene.wanted_accuracy import wanted_accuracy
 from bh.solvers.settling import Settling
 from bh.solvers.walk import Strategy
+from meshes.io.files import refuse_others
 from meshes.limits import check_limit
 
 SECTIONS = (
@@ -144,6 +145,7 @@ def load_scene(path: str | Path, changes: Sequence[str] = ()) -> Scene:
             content = file.read(LONGEST_FILE + 1)
         if len(content) > LONGEST_FILE:
             raise SceneError(f"the file is longer than {LONGEST_FILE // 10**6} MB; give a scene file (TOML)")
+        refuse_others(content, "a scene or a drawing")
         text = content.decode("utf-8-sig")
         scene = _scene(text, path.parent, changes)
     except FileNotFoundError as error:

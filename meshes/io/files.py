@@ -51,10 +51,23 @@ def drawing_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
         raise FileFormatError(f"cannot be read ({why}); check the name and rights") from error
     if data.startswith(_GZIP):
         data = _unpacked(data)
+    refuse_others(data, kind)
+    return data
+
+
+def refuse_others(data: bytes, kind: str) -> None:
+    """Refuse a file that begins as one of another kind, whatever its name is.
+
+    Args:
+        data: its first bytes, or all.
+        kind: what it should be, for the message.
+
+    Raises:
+        FileFormatError: one line with what it is and the mend.
+    """
     for begin, what, mend in _OTHERS:
         if data.startswith(begin):
             raise FileFormatError(f"this is {what}, not {kind}; {mend}")
-    return data
 
 
 def _unpacked(data: bytes) -> bytes:

@@ -16,6 +16,7 @@ import shapely
 from ezdxf.document import Drawing
 from ezdxf.filemanagement import new
 
+import bh
 from meshes import CreasePattern
 from meshes.curves import sample
 from meshes.errors import FileFormatError
@@ -467,6 +468,12 @@ def test_cp_and_opx(tmp_path: Path) -> None:
 def test_files_of_other_kinds_are_named(tmp_path: Path, name: str, begin: bytes, words: str) -> None:
     (tmp_path / name).write_bytes(begin + bytes(100))
     assert words in refused(lambda: read_pattern(tmp_path / name))
+
+
+def test_a_file_of_no_known_name_is_named_by_its_content(tmp_path: Path) -> None:
+    (tmp_path / "a.ai").write_bytes(b"%PDF-1.5\xff")
+    with pytest.raises(bh.SceneError, match="this is a PDF .*, not a scene or a drawing; open it there"):
+        bh.load_scene(tmp_path / "a.ai")
 
 
 def test_bombs_are_refused_within_seconds(tmp_path: Path) -> None:
