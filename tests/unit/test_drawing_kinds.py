@@ -472,7 +472,7 @@ def test_files_of_other_kinds_are_named(tmp_path: Path, name: str, begin: bytes,
 
 def test_a_file_of_no_known_name_is_named_by_its_content(tmp_path: Path) -> None:
     (tmp_path / "a.ai").write_bytes(b"%PDF-1.5\xff")
-    with pytest.raises(bh.SceneError, match="this is a PDF .*, not a scene or a drawing; open it there"):
+    with pytest.raises(bh.SceneError, match=r"this is a PDF .*, not a scene or a drawing; open it there"):
         bh.load_scene(tmp_path / "a.ai")
 
 
