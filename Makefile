@@ -9,8 +9,6 @@
 
 VENV := .venv
 PY   := $(VENV)/bin/python
-# one more worker than cores: some tests wait for browsers and for other processes
-WORKERS := $(PY) -c 'import os; print(min(4, 1 + (os.cpu_count() or 1)))'
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
@@ -28,12 +26,12 @@ report: setup ## set everything up, then write the report (QUICK=1 for fewer poi
 
 test: lint ## set everything up, then run the linters and the tests (PYTEST_ARGS="-k name")
 	@echo "== pytest"
-	@$(PY) -m pytest -n $$($(WORKERS)) --dist worksteal $(PYTEST_ARGS)
+	@$(PY) -m pytest -n auto --maxprocesses=4 --dist worksteal $(PYTEST_ARGS)
 
 coverage: setup ## run the tests and write which lines they reach into build/coverage/html
 	@echo "== pytest, with coverage"
 	@mkdir -p build/coverage
-	@$(PY) -m pytest -n $$($(WORKERS)) --dist worksteal --cov --cov-report=term --cov-report=html $(PYTEST_ARGS)
+	@$(PY) -m pytest -n auto --maxprocesses=4 --dist worksteal --cov --cov-report=term --cov-report=html $(PYTEST_ARGS)
 	@echo "coverage: $(CURDIR)/build/coverage/html/index.html"
 
 lint: setup ## ruff check, ruff format --check, mypy

@@ -244,6 +244,7 @@ def test_projected_rule_is_the_sources() -> None:
     assert rule.measure(shipped(), 0.2 * k0, length, np.zeros((1, 3), dtype=bool)).tolist() == [0.0]
 
 
+@pytest.mark.slow
 def test_shorter_creases_miss_by_more() -> None:
     """A front: longer the nearer, allowed by the rules, and shorter than what reaches the point without asking."""
     from bh.applications.inverse.pareto import pareto

@@ -65,6 +65,7 @@ SLOW = {
     "shell_benchmarks",  # the same
     "appendix_b_cross",
     "branches",
+    "consistent",
     "convergence",
     "appendix_b_fields",
     "fig3_11",
@@ -487,20 +488,23 @@ def played_here(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Results that are stored are not played again; a half-written line and those of other versions are."""
     monkeypatch.setattr(campaign, "environment", lambda: {"python": "x"})
-    few = campaign.scenes(2)
+    monkeypatch.setattr(
+        campaign, "play", lambda scene: campaign.Result(scene, "reached", "", 0.0, 7, 99, 0.1)
+    )
+    few = campaign.scenes(3)
     store = tmp_path / "campaign.jsonl"
     told: list[str] = []
     whole = campaign.play_all(few, store, told.append)
-    assert [r.outcome for r in whole] == ["reached"] * 2
+    assert [r.outcome for r in whole] == ["reached"] * 3
     assert told == []
     lines = store.read_text().splitlines()
-    assert len(lines) == 3
+    assert len(lines) == 4
     marked = json.dumps({**json.loads(lines[1]), "iterations": 12345})
     store.write_text("\n".join([lines[0], marked, lines[2][:20]]))
     again = campaign.play_all(few, store, told.append)
     assert sorted(r.iterations for r in again)[-1] == 12345
-    assert sorted(r.outcome for r in again) == ["reached"] * 2
-    assert "1 of 2 scenes are known" in told[0]
+    assert sorted(r.outcome for r in again) == ["reached"] * 3
+    assert "1 of 3 scenes are known" in told[0]
     monkeypatch.setattr(campaign, "environment", lambda: {"python": "y"})
     anew = campaign.play_all(few, store, told.append)
     assert [r.iterations for r in anew] == [r.iterations for r in whole]
