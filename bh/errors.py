@@ -9,6 +9,10 @@ class ModelError(InputError):
     """A model that cannot be solved as described."""
 
 
+class TooCoarseError(ModelError):
+    """A mesh that is too coarse for what is asked of it; a finer one will do."""
+
+
 class NotHeldError(ModelError):
     """Supports that leave rigid motions free, in the state in which a step begins."""
 

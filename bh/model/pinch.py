@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.errors import ModelError
+from bh.errors import ModelError, TooCoarseError
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.step import Actuation, StepBuilder, Zone
 from meshes import SheetMesh
@@ -257,13 +257,14 @@ def zone_length(line: Chain, name: str, at: float, length: float | None) -> floa
         length: of the zone, mm; None for a fifth of the crease.
 
     Raises:
-        ModelError: the zone leaves the crease, or is shorter than two edges of the mesh.
+        TooCoarseError: the zone is shorter than two edges of the mesh.
+        ModelError: the zone leaves the crease.
     """
     whole = line.length
     length = 0.2 * whole if length is None else length
     edge = whole / len(line.ends)
     if length < 1.999 * edge:
-        raise ModelError(
+        raise TooCoarseError(
             f"pinch of crease '{name}': its zone of {length:.4g} mm is shorter than two edges of the mesh "
             f"({edge:.4g} mm each); give a longer one, or a finer mesh"
         )

@@ -164,7 +164,9 @@ def _check_actuation(model: Model, item: Any, where: str) -> None:
                 raise ModelError(
                     f"{where}.{key} gives every edge of one mesh its angle; give one angle, or no accuracy"
                 )
-    elif hasattr(item, "at"):
+    elif hasattr(item, "at") and not isinstance(
+        item.at, float | int
+    ):  # a pinch is at a part of its crease's length
         _check_place(item.at, where)
         if isinstance(item, Force) and item.each is not None and len(select(model.mesh, item.at)) > 1:
             raise ModelError(

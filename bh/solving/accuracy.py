@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.analysis.stiffness_probe import Probe
-from bh.errors import ModelError
+from bh.errors import ModelError, TooCoarseError
 from bh.formulations.protocols import Mirrored, Refinable
 from bh.formulations.registry import formulation, names
 from bh.loading.builder import load_steps
@@ -89,7 +89,7 @@ def solve(
         try:
             coarser = found[-1].path if found and found[-1].formulation == name else None
             path, trial = task.solve(ladders[name], name, race.tried[name][-1], step, coarser)
-        except MeshError as error:
+        except (MeshError, TooCoarseError) as error:
             failed = failed or error
             race.out[name] = f"{name} has no mesh of this sheet ({error.args[0].split(';')[0]})"
             continue

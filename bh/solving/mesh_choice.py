@@ -1,8 +1,9 @@
 """The meshes of a run to an accuracy: a first one that can be made and solved, and its cells halved again and again.
 
 Not every pattern has the mesh that a formulation would begin with: chords of coarse cells cross, a curved edge turns a
-triangle of the shell inside out, tapered panels have no mirrored cells. Then finer cells along are tried, more rows,
-other cuts and gmsh, in the order of `meshes.choices.choices`, and what was taken is noted.
+triangle of the shell inside out, tapered panels have no mirrored cells, a pinched zone is shorter than two edges. Then
+finer cells along are tried, more rows, other cuts and gmsh, in the order of `meshes.choices.choices`, and what was
+taken is noted.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from bh.errors import TooCoarseError
 from bh.paths.path import Path
 from meshes import CreasePattern, MeshError, SheetMesh
 from meshes.cells import Cells, Kind
@@ -51,15 +53,16 @@ class Ladder:
         Raises:
             MeshError: no mesh of this pattern can be made for the formulation (what was wrong with the first), or the
                 ladder was begun and its next mesh cannot be made.
+            TooCoarseError: what is asked of the sheet needs a finer mesh than any that was tried.
         """
         if self._cells is not None:
             cells = self._cells.refined(2**step)
             return how(cut(self.pattern, cells), cells), cells
-        first: MeshError | None = None
+        first: MeshError | TooCoarseError | None = None
         for cells in choices(self.pattern, self.kind, self.level):
             try:
                 path = how(cut(self.pattern, cells), cells)
-            except MeshError as error:
+            except (MeshError, TooCoarseError) as error:
                 first = first or error
                 continue
             self._cells = cells
@@ -70,5 +73,5 @@ class Ladder:
         raise first
 
 
-def _why(error: MeshError) -> str:
+def _why(error: MeshError | TooCoarseError) -> str:
     return str(error).split(";")[0]

@@ -207,6 +207,16 @@ def test_a_path_that_ends_early_has_no_estimate() -> None:
     assert not path.accuracy.met
 
 
+def test_a_pinch_is_at_the_same_place_of_every_mesh() -> None:
+    """Its place is a part of the crease's length, and names no node."""
+    folded = model(meshes.annulus_sector(60.0, 10.0, 0.8)).fold("crease", by=1.0)
+    path = bh.trace(folded.step(bh.Pinch("crease", at=0.5, by=1.6, length=12.0)), accuracy=bh.Goal(0.3))
+    assert path.reached
+    assert path.accuracy is not None
+    assert len(path.accuracy.trials) > 1
+    assert any("is shorter than two edges" in note for note in path.accuracy.notes)
+
+
 def test_scene_of_the_training_seed_is_honest() -> None:
     assert examine(TRAINING, 1).honest
 
