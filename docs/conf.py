@@ -27,7 +27,7 @@ html_theme_options = {
 
 default_role = "py:obj"  # `names` in docstrings link to what they name, where that is public
 toc_object_entries = (
-    False  # the tree of pages on every page has pages, not names: half of the time went into it
+    False  # the tree of pages on every page has pages, not names: an eighth of the time went into it
 )
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
