@@ -26,9 +26,8 @@ html_theme_options = {
 }
 
 default_role = "py:obj"  # `names` in docstrings link to what they name, where that is public
-toc_object_entries = (
-    False  # the tree of pages on every page has pages, not names: an eighth of the time went into it
-)
+# the tree of pages on every page has pages, not names: an eighth of the time went into it
+toc_object_entries = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
