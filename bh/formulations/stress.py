@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.formulations import yielding
+from bh.formulations import yield_criteria
 from bh.formulations.recovery import corner_values
 from bh.model.sheet import Sheet
 from meshes import SheetMesh
@@ -106,7 +106,7 @@ class Stress:
         Args:
             side: "top", "middle" or "bottom".
         """
-        return yielding.principal(self.at(side))
+        return yield_criteria.principal(self.at(side))
 
     def equivalent(self, side: str = "top") -> Array:
         """(...,) von Mises's stress; of a sheet with a grain Hill's, which is a pull along the grain, MPa.
@@ -117,7 +117,7 @@ class Stress:
         Raises:
             ModelError: a sheet with a grain whose strengths are not given.
         """
-        return yielding.equivalent(self.at(side), self.sheet)
+        return yield_criteria.equivalent(self.at(side), self.sheet)
 
     def utilisation(self, side: str = "top") -> Array:
         """(...,) equivalent stress over the strength of the sheet; yield begins at 1.

@@ -146,8 +146,10 @@ def _trial(data: Mapping[str, Any]) -> Trial:
         "outcome": Outcome(data["outcome"]),
         "snaps": tuple(data.get("snaps", ())),
     }
-    older = {"snapped"}  # once whether, not where
-    return Trial(**{**{key: data[key] for key in data if key not in older}, **told})
+    known = {
+        key: value for key, value in data.items() if key != "snapped"
+    }  # older files: whether, not in which steps
+    return Trial(**{**known, **told})
 
 
 def _plain(value: Array) -> list[float] | None:

@@ -62,6 +62,7 @@ def add_estimate(
             progress=report,
             strategy=strategy,
             symmetry=symmetry,
+            neighbours=False,  # its energy is what is wanted, and no remark of it is shown
         )
     except InputError as error:
         path.estimate_reason = (

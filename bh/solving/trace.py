@@ -52,7 +52,6 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
             cost; where it cannot be had, `path.estimate_reason` says why.
         after: a solved path of the same model with fewer steps, whose states this one begins with.
         warn: give a `bh.NotReachedWarning` where the path ends early; False where the caller looks at its outcome.
-
         neighbours: at the end of each step look for other stable states beside it, such as one of lower energy, and
             say so in `path.remarks`; None looks where an increment was cut, a branch was left or a mode hardly
             resists. With an accuracy every mesh is solved as by None.

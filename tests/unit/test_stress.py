@@ -16,7 +16,7 @@ from bh import Displace, Force, Model, ModelError, Sheet, Weight
 from bh.analysis.yielding import Yielding
 from bh.analysis.yielding import yielding as yielding_of
 from bh.commands.run import solve
-from bh.formulations import yielding
+from bh.formulations import yield_criteria
 from bh.formulations.recovery import corner_values
 from bh.model.serialise import describe, rebuild
 from bh.paths.export import cell_data
@@ -152,12 +152,12 @@ def test_equivalent_stresses() -> None:
     """Von Mises's of plain cases, Hill's without a grain is the same; principal stresses of a pure shear."""
     stress = np.array([[100.0, 0.0, 0.0], [100.0, 100.0, 0.0], [0.0, 0.0, 10.0], [30.0, -20.0, 5.0]])
     mises = [100.0, 100.0, 10.0 * math.sqrt(3.0), math.sqrt(900 + 600 + 400 + 75)]
-    assert np.allclose(yielding.von_mises(stress), mises)
-    assert np.allclose(yielding.hill(stress, 1.0, 1.0 / math.sqrt(3.0)), mises)
-    assert np.allclose(yielding.principal(stress[2]), [10.0, -10.0])
-    turned = yielding.along_grain(stress, 0.7)
-    assert np.allclose(yielding.von_mises(turned), mises)
-    assert np.allclose(yielding.along_grain(np.array([1.0, 0.0, 0.0]), math.pi / 4.0), [0.5, 0.5, -0.5])
+    assert np.allclose(yield_criteria.von_mises(stress), mises)
+    assert np.allclose(yield_criteria.hill(stress, 1.0, 1.0 / math.sqrt(3.0)), mises)
+    assert np.allclose(yield_criteria.principal(stress[2]), [10.0, -10.0])
+    turned = yield_criteria.along_grain(stress, 0.7)
+    assert np.allclose(yield_criteria.von_mises(turned), mises)
+    assert np.allclose(yield_criteria.along_grain(np.array([1.0, 0.0, 0.0]), math.pi / 4.0), [0.5, 0.5, -0.5])
 
 
 def test_yield_begins_where_the_closed_form_says() -> None:
