@@ -5,19 +5,11 @@ Everything below is loaded when it is first used, so that `import bh` is quick.
 
 from __future__ import annotations
 
-import sys as _sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-try:
-    from importlib import import_module
-    from typing import TYPE_CHECKING, Any
-
-    from bh.runtime import viewer as _viewer
-    from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
-except KeyboardInterrupt:  # of the command `bh` alone; of a user's own program it is the user's
-    if _sys.argv[0].rpartition("/")[2] != "bh":
-        raise
-    _sys.stderr.write("bh: interrupted\n")
-    raise SystemExit(130) from None
+from bh.runtime import viewer as _viewer
+from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
     from bh.applications.calibration import Calibration, Measured, calibrate
