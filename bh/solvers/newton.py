@@ -23,12 +23,14 @@ from bh.solvers.modes import (
     without,
 )
 from bh.solvers.pseudo_transient import PseudoTransient
-from bh.solvers.system import Evaluation, System, limited
+from bh.solvers.system import Evaluation, Rounded, System, limited
 
 Array = NDArray[np.float64]
 INDEFINITE = "indefinite tangent"  # why full Newton gave up
 ALONG = "out of balance along the neutral mode"
 NEUTRAL_IMBALANCE = 100.0  # of the tolerance: what a neutral mode may have
+HIDING = 1e-3  # forces of rounding over the typical one, above which a guess in balance may only look so
+FALL = 1e-9  # part of the energy that a step has to gain to show it
 NO_STEP = 1e-10  # of the unknowns: a step that changes nothing
 ENDLESS = 1e100  # size of a step that a singular tangent has made
 NEAR_SADDLE = 1e-3  # imbalance below which an indefinite tangent is that of a saddle
@@ -276,9 +278,31 @@ class Newton:
     def _finish(
         self, system: System, q: Array, lam: float, now: Evaluation, iterations: int, globalised: bool
     ) -> Solution:
+        if iterations == 0 and not self.unstable:
+            q, now, iterations = self._past_rounding(system, q, lam, now)
         matrix = system.tangent(q, lam, now.forces).matrix
         negative = count_negative(matrix, GAP if self.held is None else KNOWN_GAP)
         return Solution(q, now, iterations, True, "", negative, globalised)
+
+
+    def _past_rounding(
+        self, system: System, q: Array, lam: float, now: Evaluation
+    ) -> tuple[Array, Evaluation, int]:
+        """A step from a guess that was in balance as it was, where rounding hides the forces under tiny loads.
+
+        They are sums of large ones along stiff directions; what bends the sheet is known much better, so the step is
+        good where the balance says nothing. It is kept where the energy falls by it.
+        """
+        if not isinstance(system, Rounded) or system.rounding(q, lam) < HIDING:
+            return q, now, 0
+        factor = self._full_factor(system.tangent(q, lam, now.forces).matrix)
+        if factor is None:
+            return q, now, 0
+        there = q + limited(system, q, self._full_step(factor, now.residual), lam)
+        then = system.evaluate(there, lam)
+        if then.imbalance > self.tolerance or not now.energy - then.energy > FALL * abs(then.energy):
+            return q, now, 0
+        return there, then, 1
 
 
 def exhaust(steps: Generator[Array, None, Solution]) -> Solution:

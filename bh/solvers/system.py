@@ -206,6 +206,15 @@ class Rounded(Protocol):
         """
         ...
 
+    def noise(self, q: Array, lam: float) -> float:
+        """Energy that rounding of the positions alone makes of a state, N mm.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        ...
+
 
 @runtime_checkable
 class Limited(Protocol):

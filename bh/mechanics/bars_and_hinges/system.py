@@ -158,13 +158,13 @@ class BarsAndHingesSystem(SupportedSheet):
 
     def _floor(self, x: Array) -> float:
         """Coordinates are rounded to eps |x| and angles to eps; the stiffest elements make forces of that."""
-        return ROUNDING * (self._stiffest_bar * float(np.abs(x).max()) + self._stiffest_hinge)
+        return ROUNDING * (self._stiffest_edge * float(np.abs(x).max()) + self._stiffest_hinge)
 
     def _size(self, x: Array, q: Array, lam: float) -> float:
         return self.internal_forces(x, q, lam)[1]
 
     @cached_property
-    def _stiffest_bar(self) -> float:
+    def _stiffest_edge(self) -> float:
         return float(self.elements.bar_stiffness.max())
 
     @cached_property

@@ -263,6 +263,10 @@ class ConsistentSystem(SupportedSheet):
         out[e.rotation[used]] = height.ravel()[e.patches.half_edge[used]]
         return out
 
+    @property
+    def _stiffest_edge(self) -> float:
+        return self._stiffest[0]
+
     @cached_property
     def _stiffest(self) -> tuple[float, float]:
         """Largest stiffness of an edge, N/mm, and of a hinge over the height of its wing, N / rad."""

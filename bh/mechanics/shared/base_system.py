@@ -141,6 +141,15 @@ class SupportedSheet:
         typical = typical_force(self._size(x, q, lam), self.force.at(lam))
         return self._floor(x) / typical if typical > TINIEST else 0.0
 
+    def noise(self, q: Array, lam: float) -> float:
+        """Energy of rounding, N mm, see `bh.solvers.system.Rounded`: a force of rounding in as many edges as nodes."""
+        return 0.5 * len(self.mesh.points) * self._floor(self.near(q, lam)) ** 2 / self._stiffest_edge
+
+    @property
+    def _stiffest_edge(self) -> float:
+        """Largest stiffness of an edge, N / mm."""
+        raise NotImplementedError
+
     def _floor(self, x: Array) -> float:
         """Largest force of rounding, N, at positions x (n, 3), that nobody can balance."""
         raise NotImplementedError
