@@ -284,7 +284,6 @@ class Newton:
         negative = count_negative(matrix, GAP if self.held is None else KNOWN_GAP)
         return Solution(q, now, iterations, True, "", negative, globalised)
 
-
     def _past_rounding(
         self, system: System, q: Array, lam: float, now: Evaluation
     ) -> tuple[Array, Evaluation, int]:

@@ -65,7 +65,7 @@ def test_a_signal_before_the_program_is_told_apart() -> None:
     assert before(-2, f"{site}{start}KeyboardInterrupt\n")
     assert not before(-2, "")
     assert not before(130, "bh: interrupted\n", heeds=False)
-    for place in (f"{OURS[0]}\", line 9, in main", f"{OURS[1]}__init__.py\", line 1, in <module>"):
+    for place in (f'{OURS[0]}", line 9, in main', f'{OURS[1]}__init__.py", line 1, in <module>'):
         assert not before(-2, f'{site}{start}  File "{place}\nKeyboardInterrupt\n')
 
 
