@@ -151,7 +151,7 @@ def run(context: Context) -> CaseResult:
     _against(result, "folded strip", SHELL, "presses and Hz", exact, _trough, shown)
     result.notes.append(
         "Masses are lumped at the nodes, and Green's strain lets a pressed sheet shorten before it buckles (2e-5 of "
-        "its length for the column). Of the folded strip the buckling loads are multiples of a press by 0.01 mm, and its "
+        "its length for the column). Of the folded strip the buckling loads are multiples of a press by 0.01 mm, its "
         "frequencies are those with the supports that it was folded with."
     )
     return result
