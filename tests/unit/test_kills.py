@@ -19,6 +19,7 @@ import meshes
 from bh.commands.cli import main
 from bh.errors import InputError, PathFileError
 from bh.runtime.lock import only_writer
+from bh.sweep.journal import Journal, Meta
 from bh.sweep.pools import reach
 from verification.framework import run as runner
 from verification.framework.checks import CaseResult
@@ -339,3 +340,21 @@ def test_a_cluster_of_ones_own_is_not_open_to_others(monkeypatch: pytest.MonkeyP
                 reach(address)
     finally:
         pool.close()
+
+
+def test_a_journal_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sweep that was killed while its journal was made could not go on: "has format 0"."""
+    file = tmp_path / "sweep.nc.points"
+    meta = Meta(identity="a", names=[], values=[], grid=True, labels={}, attributes={})
+    seen: list[bool] = []
+
+    def look(value: object) -> str:
+        seen.append(file.exists())
+        return json_text(value)
+
+    json_text = json.dumps
+    monkeypatch.setattr("bh.sweep.journal.json.dumps", look)
+    journal = Journal.create(file, meta)
+    assert (seen, journal.meta["identity"]) == ([False] * len(meta), "a")
+    journal.close()
+    assert [place.name for place in tmp_path.iterdir()] == [file.name]

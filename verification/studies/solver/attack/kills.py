@@ -132,7 +132,7 @@ def _disturbed(target: Target, send: signal.Signals, folder: Path, random: np.ra
     failures: list[str] = []
     worst, tried, before = 0.0, 0, 0
     write(folder)
-    for _ in range(2 * CHAIN):
+    for _ in range(4 * CHAIN):
         words = target.words if (folder / target.holds).exists() else target.first
         ended = play((*BH, *words), folder, send=send, after_s=random.uniform(0.0, min(seconds, MOST_S)))
         if ended.before:
@@ -237,7 +237,7 @@ def _cases(words: Sequence[str], send: signal.Signals, folder: Path, random: np.
     failures: list[str] = []
     worst, tried, early = 0.0, 0, 0
     file = folder / "results" / "checks.json"
-    for _ in range(2 * CHAIN):
+    for _ in range(4 * CHAIN):
         if tried == CHAIN:
             break
         before = case_bits(file) if file.exists() else {}
