@@ -22,6 +22,7 @@ class Limits:
         creases: of a pattern of the library, side by side.
         pieces: of a crease that is made of arcs.
         steps: load steps of a scene.
+        entries: of a scene, a sweep or a target: lines, keys and values of lists, some microseconds each to parse.
         triangles: of a mesh; gmsh makes some twenty thousand a second, a million take gigabytes to solve.
         entities: of a drawing's file, every <use> and block written out; rows of a .cp file; vertices, edges or
             faces of a frame of a FOLD file.
@@ -35,6 +36,7 @@ class Limits:
     creases: int = 1_000
     pieces: int = 1_000
     steps: int = 1_000
+    entries: int = 100_000
     triangles: int = 250_000
     entities: int = 20_000
     lines: int = 5_000

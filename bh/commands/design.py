@@ -39,6 +39,7 @@ from bh.scene.reading import (
     one_line,
     read_table,
     read_toml,
+    toml_bytes,
 )
 from meshes import parallel_creases
 from meshes.curves import arc_lengths, interpolated
@@ -166,7 +167,7 @@ def solve(file: str | Path) -> Answer:
     """
     file = Path(file)
     try:
-        data = read_toml(file.read_text(encoding="utf-8-sig"))
+        data = read_toml(toml_bytes(file).decode("utf-8-sig"))
         check_keys("", data, ("target", "search"))
         if "target" not in data:
             raise DesignError("target is missing; add a table [target] with point, curve or move_tip")

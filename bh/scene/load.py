@@ -39,6 +39,7 @@ from bh.scene.reading import (
     read_table,
     read_toml,
     shown,
+    toml_bytes,
     waits,
     within,
     without,
@@ -71,7 +72,6 @@ SECTIONS = (
     "symmetry",
 )
 CHANGES = ("support", "hold", "release")  # keys of a step beside its actuations
-LONGEST_FILE = 20_000_000  # bytes
 
 
 @dataclass(frozen=True)
@@ -141,10 +141,7 @@ def load_scene(path: str | Path, changes: Sequence[str] = ()) -> Scene:
     if waits(path):
         raise SceneError(one_line(f"'{path}' is a pipe, which may never end; give a file"))
     try:
-        with path.open("rb") as file:
-            content = file.read(LONGEST_FILE + 1)
-        if len(content) > LONGEST_FILE:
-            raise SceneError(f"the file is longer than {LONGEST_FILE // 10**6} MB; give a scene file (TOML)")
+        content = toml_bytes(path)
         refuse_others(content, "a scene or a drawing")
         text = content.decode("utf-8-sig")
         scene = _scene(text, path.parent, changes)

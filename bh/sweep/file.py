@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from bh.errors import InputError
-from bh.scene.reading import Table, as_table, check_keys, inside, one_line, read_table, read_toml
+from bh.scene.reading import Table, as_table, check_keys, inside, one_line, read_table, read_toml, toml_bytes
 from bh.sweep import SceneTask, scene
 from bh.sweep.dataset import Label
 from bh.sweep.measures import Measure
@@ -114,7 +114,7 @@ def load_sweep(file: str | Path) -> Sweep:
     """
     file = Path(file)
     try:
-        return _sweep(read_toml(file.read_text(encoding="utf-8-sig")), file)
+        return _sweep(read_toml(toml_bytes(file).decode("utf-8-sig")), file)
     except InputError as error:
         raise SweepError(one_line(f"{file}: {error}")) from error
     except (OSError, ValueError) as error:

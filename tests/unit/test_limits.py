@@ -14,6 +14,7 @@ from ezdxf.filemanagement import new
 
 import bh
 import meshes
+from bh.sweep.file import load_sweep
 from meshes.choices import first_mesh
 from meshes.errors import InputError
 from meshes.io import read_fold, read_pattern, svg
@@ -196,6 +197,28 @@ def test_a_thousand_sines_are_meshed_in_seconds() -> None:
     began = time.process_time()
     first_mesh(meshes.sine_tessellation(creases=250, amplitude=0.001))
     assert time.process_time() - began < 5.0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a = [" + "0," * 200 + "]", "202 entries, more than 100.*BH_LIMIT_ENTRIES"),
+        ("".join(f"k{i} = 1\n" for i in range(60)), "120 entries, more than 100.*BH_LIMIT_ENTRIES"),
+        ("a." * 40 + "a = 1", "a key of 41 parts with dots, more than 16; write tables of fewer"),
+        ("['a' . " + '"b".' * 40 + "a]", "a key of 42 parts with dots, more than 16"),
+    ],
+)
+def test_toml_is_counted_before_it_is_parsed(
+    text: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of scenes and sweeps; tomllib is not called."""
+    monkeypatch.setenv("BH_LIMIT_ENTRIES", "100")
+    monkeypatch.setattr("bh.scene.reading.tomllib.loads", Mock(side_effect=AssertionError("it was parsed")))
+    file = tmp_path / "bomb.toml"
+    file.write_text(text, encoding="utf-8")
+    for read in (bh.load_scene, load_sweep):
+        with pytest.raises(InputError, match=words):
+            read(file)
 
 
 def test_limits_are_raised_and_lowered_by_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
