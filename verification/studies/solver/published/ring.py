@@ -1,0 +1,99 @@
+"""A closed ring folded along its circle: it buckles to a saddle of constant crease curvature (`verification.theory.folded_ring`).
+
+A quarter of it, from a crest to a trough, between two mirror planes. Energies are reported only: rulings lean, so the
+isometric state would need a moment at the free edges, which a layer of width sqrt(t R) takes off slowly with t.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import meshes
+from bh import Model, Path, Sheet, trace
+from bh.formulations.state import State
+from verification.framework.checks import CaseResult, Context
+from verification.studies.solver.published.common import Claim, Level, by_shell, converged
+from verification.theory import folded_ring as theory
+
+SOURCE = "Dias, Dudte, Mahadevan and Santangelo (2012), Dias and Audoly (2014); the rod solved in verification.theory.folded_ring"
+RADIUS, WIDTH = 100.0, 5.0  # mm
+SHEET = Sheet(E=4000.0, nu=0.0, t=0.02)
+ANGLES = (120.0, 90.0)  # dihedral, degrees
+LEVELS = ((24, 1), (48, 2), (96, 4))  # cells along a quarter, rows a panel
+SHELL = (48, 2)
+HEIGHT = CURVATURE = 1e-3  # relative tolerances, set before the first run
+
+
+def ring_model(angle: float, formulation: str, along: int, rows: int) -> Model:
+    """A quarter of the ring, folded to a dihedral angle.
+
+    Args:
+        angle: degrees.
+        formulation: by name.
+        along: cells along the quarter.
+        rows: of cells in each panel.
+    """
+    pattern = meshes.annulus_sector(RADIUS, WIDTH, 0.5 * math.pi)
+    kind = "mirrored" if formulation == "shell" else "staggered"
+    model = Model(
+        meshes.structured(pattern, along=along, rows=rows, kind=kind), SHEET, formulation=formulation
+    )
+    model = model.support("edge:start", "y", clamp=True).support("edge:end", "x", clamp=True)
+    return model.support("rigid-body").fold("crease", to=math.radians(angle))
+
+
+def height(state: State) -> float:
+    """From trough to crest of the crease, over R."""
+    return float(np.ptp(state.crease_points("crease")[:, 2])) / RADIUS
+
+
+def crease_curvature(state: State) -> np.ndarray:
+    """(k,) curvature of the circles through three neighbouring nodes of the crease, 1 / mm."""
+    p = state.crease_points("crease")
+    a, b, c = p[1:-1] - p[:-2], p[2:] - p[1:-1], p[2:] - p[:-2]
+    sides = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1) * np.linalg.norm(c, axis=1)
+    return np.asarray(2.0 * np.linalg.norm(np.cross(a, b), axis=1) / sides)
+
+
+def ring(result: CaseResult, context: Context) -> None:
+    """Two dihedral angles; one in a quick run."""
+    for angle in ANGLES[1:] if context.quick else ANGLES:
+        exact = theory.folded_ring(math.radians(angle))
+        params = {"sheet": "ring", "dihedral angle": angle}
+        high = Claim("height of the crease over R", exact.height, SOURCE, HEIGHT, params)
+        bent = Claim("mean of kappa R sin(theta / 2) along the crease", 1.0, SOURCE, CURVATURE, params)
+        levels = LEVELS[:2] if context.quick else LEVELS
+        found = [(n, rows, _solved(angle, "consistent", n, rows)) for n, rows in levels]
+        sine = math.sin(0.5 * math.radians(angle))
+        converged(result, high, [_level(n, rows, path, height) for n, rows, path in found])
+        converged(result, bent, [_level(n, rows, path, _turn(sine)) for n, rows, path in found])
+        path = _solved(angle, "shell", *SHELL)
+        by_shell(result, high, _level(*SHELL, path, height))
+        by_shell(result, bent, _level(*SHELL, path, _turn(sine)))
+        for formulation, last in (("consistent", found[-1][2]), ("shell", path)):
+            _reported(result, {**params, "formulation": formulation}, last, exact.energy)
+
+
+def _solved(angle: float, formulation: str, along: int, rows: int) -> Path:
+    return trace(ring_model(angle, formulation, along, rows), neighbours=False)
+
+
+def _turn(sine: float):  # type: ignore[no-untyped-def]
+    return lambda state: float(crease_curvature(state).mean()) * RADIUS * sine
+
+
+def _level(along: int, rows: int, path: Path, read) -> Level:  # type: ignore[no-untyped-def]
+    return Level(f"{along} x {rows}", 1.0 / rows, read(path[-1]), path)
+
+
+def _reported(result: CaseResult, params: dict[str, object], path: Path, energy: float) -> None:
+    """Energy over that of a narrow isometric ring, and how much the curvature varies."""
+    state, sine = path[-1], math.sin(0.5 * math.radians(float(params["dihedral angle"])))  # type: ignore[arg-type]
+    bent = crease_curvature(state) * RADIUS * sine
+    scale = SHEET.bending_stiffness() * WIDTH / RADIUS * energy
+    result.check("energy over that of the narrow isometric ring", 4.0 * state.energy.total / scale, params=params, path=path)
+    result.check("least kappa R sin(theta / 2)", float(bent.min()), params=params, path=path)
+    result.check("largest kappa R sin(theta / 2)", float(bent.max()), params=params, path=path)
+    result.check("the state is stable", path.stable is True, reference=1.0, source="asked", tolerance=0.0, params=params, path=path)

@@ -1,0 +1,114 @@
+"""Sine creases with imposed angles: energy and length of an exact folded family (`verification.theory.sine`).
+
+Three panels between sines; both creases are folded edge by edge to the closed form, nothing else is held. The outer panels
+end in free edges, where the isometric state would need a moment: a layer of width sqrt(t R) takes it off and with it some
+energy, so the panel in the middle is judged, and all three are reported.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import meshes
+from bh import Fold, Model, Path, Sheet, trace
+from bh.formulations.state import State
+from meshes.curves import Polyline
+from verification.framework.checks import CaseResult, Context
+from verification.studies.solver.published.common import Claim, Level, by_shell, converged
+from verification.theory.sine import SineFold
+
+SOURCE = "Karami, Reddy and Nassar (2024): the folded family of sine creases, integrated in verification.theory.sine"
+SHEET = Sheet(E=4000.0, nu=0.0, t=0.02)
+AMPLITUDE, WAVE, PITCH = 12.0, 100.0, 30.0  # mm
+SHARES = (0.3, 0.6, 0.85)  # of the steepest inclination
+LEVELS = ((32, 2), (64, 4), (128, 8))  # cells along a wave, rows a panel
+SHELL = (32, 2)
+ENERGY, LENGTH = 0.01, 1e-3  # relative tolerances, set before the first run
+CHORDS = 2048
+
+
+def sine_model(share: float, formulation: str, along: int, rows: int) -> Model:
+    """Three panels folded to a share of the steepest inclination.
+
+    Args:
+        share: th / Theta.
+        formulation: by name.
+        along: cells along the wave.
+        rows: of cells in each panel.
+    """
+    family = SineFold(AMPLITUDE, WAVE, PITCH, share)
+    x = np.linspace(0.0, WAVE, CHORDS + 1)
+    rails = [
+        Polyline(np.column_stack((x, i * PITCH + AMPLITUDE * np.sin(family.q * x)))) for i in range(4)
+    ]
+    pattern = meshes.library.between_rails(rails, ["mountain", "valley"])
+    kind = "mirrored" if formulation == "shell" else "staggered"
+    mesh = meshes.structured(pattern, along=along, rows=rows, kind=kind)
+    folds = []
+    for name, sense in (("crease-1", 1.0), ("crease-2", -1.0)):
+        middle = mesh.points[mesh.edge_sets[f"crease:{name}"], 0].mean(axis=1)
+        folds.append(Fold(name, to=(np.pi - sense * family.fold_angle(middle)).tolist()))
+    return Model(mesh, SHEET, formulation=formulation).step(*folds)
+
+
+def panel_energies(state: State) -> list[float]:
+    """Elastic energy of the sheet in each of the three panels, N mm."""
+    mesh = state.mesh
+    centre = mesh.points[mesh.triangles].mean(axis=1)
+    height = centre[:, 1] - AMPLITUDE * np.sin(2.0 * np.pi / WAVE * centre[:, 0])
+    panel = np.clip(np.floor(height / PITCH), 0, 2)
+    density = state.energy_density["stretching"] + state.energy_density["bending"]
+    return [float((density * mesh.areas)[panel == i].sum()) for i in range(3)]
+
+
+def wave_length(state: State) -> float:
+    """Distance of the ends of the wave, mean over both creases, mm."""
+    ends = [state.crease_points(name)[[0, -1]] for name in ("crease-1", "crease-2")]
+    return float(np.mean([np.linalg.norm(b - a) for a, b in ends]))
+
+
+def sine(result: CaseResult, context: Context) -> None:
+    """Three inclinations; one in a quick run."""
+    for share in SHARES[1:2] if context.quick else SHARES:
+        family = SineFold(AMPLITUDE, WAVE, PITCH, share)
+        params = {"sheet": "sine creases", "th / Theta": share}
+        middle = Claim(
+            "energy of the middle panel over the closed form", 1.0, SOURCE, ENERGY, params
+        )
+        length = Claim("length of the folded wave", family.length, SOURCE, LENGTH, params, "mm", LENGTH)
+        exact = family.energy(SHEET.bending_stiffness())
+        levels = LEVELS[:2] if context.quick else LEVELS
+        found = [_level(share, "consistent", *mesh) for mesh in levels]
+        _whole(result, params, "consistent", found[-1], exact)
+        converged(result, middle, [_read(level, exact) for level in found])
+        converged(result, length, [_long(level) for level in found])
+        shell = _level(share, "shell", *SHELL)
+        _whole(result, params, "shell", shell, exact)
+        by_shell(result, middle, _read(shell, exact))
+        by_shell(result, length, _long(shell))
+
+
+Solved = tuple[str, float, Path]
+
+
+def _level(share: float, formulation: str, along: int, rows: int) -> Solved:
+    return f"{along} x {rows}", 1.0 / rows, trace(sine_model(share, formulation, along, rows), neighbours=False)
+
+
+def _read(solved: Solved, exact: float) -> Level:
+    return Level(*solved[:2], panel_energies(solved[2][-1])[1] / exact, solved[2])
+
+
+def _long(solved: Solved) -> Level:
+    return Level(*solved[:2], wave_length(solved[2][-1]), solved[2])
+
+
+def _whole(result: CaseResult, params: dict[str, object], formulation: str, solved: Solved, exact: float) -> None:
+    result.check(
+        "energy of all three panels over the closed form",
+        sum(panel_energies(solved[2][-1])) / (3.0 * exact),
+        reference=1.0,
+        source=SOURCE,
+        params={**params, "formulation": formulation, "mesh": solved[0]},
+        path=solved[2],
+    )
