@@ -8,22 +8,22 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from verification.framework.checks import CaseResult, Context
-from verification.studies.solver.published.angle_section import angle_section
-from verification.studies.solver.published.clamped_fold import clamped_fold
-from verification.studies.solver.published.cones import cones
-from verification.studies.solver.published.ring import ring
-from verification.studies.solver.published.sine import sine
-from verification.studies.solver.published.turned_clamps import turned_clamps
+from verification.studies.solver.published.angle_section import compressed_section
+from verification.studies.solver.published.clamped_fold import folded_between_clamps
+from verification.studies.solver.published.cones import creased_cones
+from verification.studies.solver.published.ring import closed_ring
+from verification.studies.solver.published.sine import sine_creases
+from verification.studies.solver.published.turned_clamps import snapping_strip
 from verification.studies.solver.published.vee import folded_strip
 
 STUDIES: dict[str, Callable[[CaseResult, Context], None]] = {
     "a folded strip pulled open": folded_strip,
-    "a folded strip between turned clamps": clamped_fold,
-    "an angle section compressed along its crease": angle_section,
-    "a buckled strip snapped by turning its clamps": turned_clamps,
-    "sine creases": sine,
-    "a closed ring": ring,
-    "creased cones": cones,
+    "a folded strip between turned clamps": folded_between_clamps,
+    "an angle section compressed along its crease": compressed_section,
+    "a buckled strip snapped by turning its clamps": snapping_strip,
+    "sine creases": sine_creases,
+    "a closed ring": closed_ring,
+    "creased cones": creased_cones,
 }
 
 

@@ -52,7 +52,7 @@ def factor(path: Path) -> float:
     return found[0] * ENOUGH * exact(LENGTH, LEG, SHEET.nu) if found else math.nan
 
 
-def angle_section(result: CaseResult, context: Context) -> None:
+def compressed_section(result: CaseResult, context: Context) -> None:
     """Its buckling load."""
     params = {"sheet": "angle section", "a / b": LENGTH / LEG}
     claim = Claim(

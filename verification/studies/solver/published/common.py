@@ -7,9 +7,38 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bh import Path
+import numpy as np
+
 from bh.analysis.richardson import judged
-from verification.framework.checks import CaseResult, Cost
+from meshes import SheetMesh
+from verification.framework.checks import CaseResult, Cost, Solved
+
+def strip_mesh(lines: Sequence[float], breadth: float, along: int, creases: Mapping[str, float]) -> SheetMesh:
+    """A strip along y, cut across at any heights: cells as long as it pleases, diagonals in turn.
+
+    Args:
+        lines: rising heights y of the node lines, mm.
+        breadth: along x, mm.
+        along: cells along x.
+        creases: heights of node lines that are creases, by name.
+    """
+    x = np.linspace(0.0, breadth, along + 1)
+    points = np.array([(a, b) for b in lines for a in x])
+    node = np.arange(len(points)).reshape(len(lines), along + 1)
+    triangles = []
+    for j in range(len(lines) - 1):
+        for i in range(along):
+            a, b, c, d = node[j, i], node[j, i + 1], node[j + 1, i + 1], node[j + 1, i]
+            triangles += [(a, b, c), (a, c, d)] if (i + j) % 2 == 0 else [(a, b, d), (b, c, d)]
+    at = {name: int(np.argmin(np.abs(np.asarray(lines) - y))) for name, y in creases.items()}
+    sets = {f"crease:{name}": np.column_stack((node[k, :-1], node[k, 1:])) for name, k in at.items()}
+    sets |= {
+        f"edge:{name}": np.column_stack((node[k, :-1], node[k, 1:])) for name, k in (("inner", 0), ("outer", -1))
+    }
+    return SheetMesh(
+        points=points, triangles=np.array(triangles), edge_sets=sets, folds=dict.fromkeys(creases, "mountain")
+    )
+
 
 LEAST_LEVELS = 3  # fewer show no order
 
@@ -28,7 +57,7 @@ class Level:
     mesh: str
     size: float
     value: float
-    path: Path
+    path: Solved
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,7 @@ def cone_model(disc: Disc, formulation: str, half: int, rings: int) -> Model:
     """
     mesh = disc_mesh(disc.creases, half, rings)
     tips = [int(mesh.edge_sets[f"crease:{name}"][-1, 1]) for name in mesh.folds]
-    model = Model(mesh, SHEET, formulation=formulation).support(tips, "z")
+    model = Model(mesh, SHEET, formulation=formulation).support(tips, "z").support("rigid-body")
     model = model.step(*(Fold(name, to=math.pi - PSI) for name in mesh.folds))
     for push in (-disc.push, disc.push):
         model = model.step(Displace("edge:inner", "z", further=push)).step(release="edge:inner")
@@ -118,7 +118,7 @@ def elevations(state: State) -> tuple[float, float]:
     return float(rise[turn == half].mean()), float(rise[turn == 0].mean())
 
 
-def cones(result: CaseResult, context: Context) -> None:
+def creased_cones(result: CaseResult, context: Context) -> None:
     """Both states of discs with four and three creases; four in a quick run."""
     for disc in DISCS[:1] if context.quick else DISCS:
         levels = LEVELS[:2] if context.quick else LEVELS

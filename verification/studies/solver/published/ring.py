@@ -57,7 +57,7 @@ def crease_curvature(state: State) -> np.ndarray:
     return np.asarray(2.0 * np.linalg.norm(np.cross(a, b), axis=1) / sides)
 
 
-def ring(result: CaseResult, context: Context) -> None:
+def closed_ring(result: CaseResult, context: Context) -> None:
     """Two dihedral angles; one in a quick run."""
     for angle in ANGLES[1:] if context.quick else ANGLES:
         exact = theory.folded_ring(math.radians(angle))

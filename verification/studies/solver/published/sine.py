@@ -1,30 +1,36 @@
 """Sine creases with imposed angles: energy and length of an exact folded family (`verification.theory.sine`).
 
-Three panels between sines; both creases are folded edge by edge to the closed form, nothing else is held. The outer panels
-end in free edges, where the isometric state would need a moment: a layer of width sqrt(t R) takes it off and with it some
-energy, so the panel in the middle is judged, and all three are reported.
+Three panels between sines; creases and edges are brought to their heights, and both creases are folded edge by edge to the
+closed form. (Held at their angles alone the creases leave their planes, as torsion is free: all three panels have 0.83
+of the energy then by the shell, and the wave is 0.6 % too long.) The outer panels end in edges without moment, which the
+isometric state would need there: a layer of width sqrt(t R) takes it off and with it some energy, so the panel in the middle is
+judged, and all three are reported.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 import meshes
-from bh import Fold, Model, Path, Sheet, trace
+from bh import Displace, Fold, Model, Path, Sheet, trace
 from bh.formulations.state import State
+from meshes import SheetMesh
 from meshes.curves import Polyline
 from verification.framework.checks import CaseResult, Context
 from verification.studies.solver.published.common import Claim, Level, by_shell, converged
 from verification.theory.sine import SineFold
 
 SOURCE = "Karami, Reddy and Nassar (2024): the folded family of sine creases, integrated in verification.theory.sine"
-SHEET = Sheet(E=4000.0, nu=0.0, t=0.02)
+SHEET = Sheet(E=4000.0, nu=0.0, t=0.1)
 AMPLITUDE, WAVE, PITCH = 12.0, 100.0, 30.0  # mm
 SHARES = (0.3, 0.6, 0.85)  # of the steepest inclination
 LEVELS = ((32, 2), (64, 4), (128, 8))  # cells along a wave, rows a panel
 SHELL = (32, 2)
 ENERGY, LENGTH = 0.01, 1e-3  # relative tolerances, set before the first run
 CHORDS = 2048
+SENSES = {"crease-1": 1.0, "crease-2": -1.0}
 
 
 def sine_model(share: float, formulation: str, along: int, rows: int) -> Model:
@@ -36,19 +42,26 @@ def sine_model(share: float, formulation: str, along: int, rows: int) -> Model:
         along: cells along the wave.
         rows: of cells in each panel.
     """
-    family = SineFold(AMPLITUDE, WAVE, PITCH, share)
     x = np.linspace(0.0, WAVE, CHORDS + 1)
     rails = [
-        Polyline(np.column_stack((x, i * PITCH + AMPLITUDE * np.sin(family.q * x)))) for i in range(4)
+        Polyline(np.column_stack((x, i * PITCH + AMPLITUDE * np.sin(2.0 * np.pi / WAVE * x)))) for i in range(4)
     ]
     pattern = meshes.library.between_rails(rails, ["mountain", "valley"])
     kind = "mirrored" if formulation == "shell" else "staggered"
     mesh = meshes.structured(pattern, along=along, rows=rows, kind=kind)
-    folds = []
-    for name, sense in (("crease-1", 1.0), ("crease-2", -1.0)):
-        middle = mesh.points[mesh.edge_sets[f"crease:{name}"], 0].mean(axis=1)
-        folds.append(Fold(name, to=(np.pi - sense * family.fold_angle(middle)).tolist()))
-    return Model(mesh, SHEET, formulation=formulation).step(*folds)
+    family = SineFold(AMPLITUDE, WAVE, PITCH, share)
+    up = PITCH * math.sin(family.incline)
+    heights = {"edge:inner": 0.0, "crease:crease-1": up, "crease:crease-2": 0.0, "edge:outer": up}
+    model = Model(mesh, SHEET, formulation=formulation).support("rigid-body")
+    model = model.support("edge:inner", "z").support("crease:crease-2", "z")
+    up = PITCH * math.sin(family.incline)
+    raised = [Displace(place, "z", by=up) for place in ("crease:crease-1", "edge:outer")]
+    return model.step(*raised, *(_folded(mesh, name, sense, family) for name, sense in SENSES.items()))
+
+
+def _folded(mesh: SheetMesh, name: str, sense: float, family: SineFold) -> Fold:
+    middle = mesh.points[mesh.edge_sets[f"crease:{name}"], 0].mean(axis=1)
+    return Fold(name, to=(np.pi - sense * family.fold_angle(middle)).tolist())
 
 
 def panel_energies(state: State) -> list[float]:
@@ -67,7 +80,7 @@ def wave_length(state: State) -> float:
     return float(np.mean([np.linalg.norm(b - a) for a, b in ends]))
 
 
-def sine(result: CaseResult, context: Context) -> None:
+def sine_creases(result: CaseResult, context: Context) -> None:
     """Three inclinations; one in a quick run."""
     for share in SHARES[1:2] if context.quick else SHARES:
         family = SineFold(AMPLITUDE, WAVE, PITCH, share)

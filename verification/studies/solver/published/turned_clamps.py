@@ -11,115 +11,134 @@ import math
 
 import numpy as np
 
-import meshes
-from bh import Displace, Fold, Model, Path, Sheet, trace
-from bh.solvers.outcome import Critical
-from verification.framework.checks import CaseResult, Context
-from verification.studies.solver.published.common import Claim, Level, by_shell, converged
+from bh import Displace, Fold, Model, Path, Sheet, Until, trace
+from bh.solvers.outcome import Critical, Outcome
+from verification.framework.checks import CaseResult, Context, Cost
+from verification.studies.solver.published.common import (
+    Claim,
+    Level,
+    by_shell,
+    converged,
+    strip_mesh,
+)
 from verification.theory import clamped_arch as theory
 
 SOURCE = "Gomez, Moulton and Vella (2017), Radisson and Kanso (2023); the elastica for small slopes solved in verification.theory.clamped_arch"
-LENGTH, BREADTH, STUB = 100.0, 10.0, 5.0  # mm
+LENGTH, BREADTH = 100.0, 10.0  # mm
+STUB = 0.1  # mm; its own bending makes a clamp softer by a third of its length
 SHEET = Sheet(E=4000.0, nu=0.0, t=0.02)
 NEARER = 1e-3  # dL / L: slopes are small, and stretching is 2e-4 of it
 UNIT = math.sqrt(NEARER)  # slope at mu = 1
-FAR = 1.2  # of the critical mu, where the clamp is turned to
-LEVELS = (8, 16, 32)  # rows a panel
-SHELL = 8
+FAR = 1.2  # of the critical mu, where the clamp is turned to; only just beyond where both are
+FAR_BOTH = 1.05
+LEVELS = ((2, 16), (4, 32), (8, 64))  # cells across the strip, rows between the clamps
+SHELL = (2, 16)
 TOLERANCE, BARRIER = 5e-3, 0.01  # relative, set before the first run
-BEFORE = 2  # steps before the clamp is turned against the arch
+REST, AGAINST = 2, 3  # steps: the arch between straight clamps; the clamp turned against it
 
 
-def strip_model(both: bool, formulation: str, rows: int) -> Model:
-    """The strip, its clamp turned a little and its ends brought nearer, turned back to none, against it, and back again.
+def strip_model(both: bool, formulation: str, along: int, rows: int, side: float = 1.0) -> Model:
+    """The strip: its clamp turned a little, its ends brought nearer, the clamp turned back to none, and against the arch.
+
+    One clamp is turned until the middle of the strip is level, which is the unstable state at mu = 0.
 
     Args:
         both: both clamps are turned, mirrored.
         formulation: by name.
-        rows: of cells between the clamps.
+        along: cells across the strip.
+        rows: of cells between the clamps, an even number.
+        side: 1 for the arch above, -1 for the one below.
     """
-    pattern = meshes.strip(BREADTH, LENGTH + 2.0 * STUB, [STUB, STUB + LENGTH])
-    kind = "mirrored" if formulation == "shell" else "staggered"
-    mesh = meshes.structured(pattern, along=1, rows=rows, kind=kind)
+    lines = [0.0, *(STUB + np.linspace(0.0, LENGTH, rows + 1)), LENGTH + 2.0 * STUB]
+    mesh = strip_mesh(lines, BREADTH, along, {"crease-1": STUB, "crease-2": STUB + LENGTH})
     y = mesh.points[:, 1]
     first, last = (np.flatnonzero(part).tolist() for part in (y < STUB + 1e-9, y > STUB + LENGTH - 1e-9))
     model = Model(mesh, SHEET, formulation=formulation).support(first, "xyz").support(last, "xz")
-    far = FAR * (2.0 if both else theory.snap()[0])
+    # without its own clamp so short a part could bow between its nodes
+    model = model.support("edge:inner", "z", clamp=True).support("edge:outer", "z", clamp=True)
 
     def turn(mu: float) -> list[Fold]:
-        return [Fold(name, to=math.pi + mu * UNIT) for name in (("crease-1", "crease-2") if both else ("crease-1",))]
+        names = ("crease-1", "crease-2") if both else ("crease-1",)
+        return [Fold(name, to=math.pi + side * mu * UNIT) for name in names]
 
     still = [] if both else [Fold("crease-2", to=math.pi)]
-    model = model.step(*turn(-0.5), *still, Displace(last, "y", by=-0.1 * NEARER * LENGTH))
-    model = model.step(Displace(last, "y", by=-NEARER * LENGTH)).step(*turn(0.0))
-    model = model.step(*turn(far))
-    return model if both else model.step(*turn(-far))
+    model = model.step(*turn(0.5), *still).step(Displace(last, "y", by=-NEARER * LENGTH)).step(*turn(0.0))
+    middle = int(np.argmin(np.abs(mesh.points - [0.0, STUB + 0.5 * LENGTH, 0.0]).sum(axis=1)))
+    level = None if both else Until("displacement_z", 0.0, of=f"node:{middle}", tolerance=1e-4)
+    return model.step(*turn(-farthest(both)), until=level)
 
 
-def critical(path: Path, step: int, kind: Critical, both: bool) -> float:
-    """mu at the first critical point of a kind in a step of `strip_model`; nan where there is none."""
-    far = FAR * (2.0 if both else theory.snap()[0])
-    begin, end = {3: (0.0, far), 4: (far, -far)}[step]
-    found = [begin + at.lam * (end - begin) for index, at in path.critical_points if index == step and at.kind is kind]
-    return found[0] if found else math.nan
+def farthest(both: bool) -> float:
+    """mu that the clamps are turned to against the arch.
+
+    Args:
+        both: both clamps are turned.
+    """
+    return 2.0 * FAR_BOTH if both else FAR * theory.snap()[0]
 
 
-def turned_clamps(result: CaseResult, context: Context) -> None:
+def critical(path: Path, kind: Critical, both: bool) -> float:
+    """mu against the arch at the first critical point of a kind; nan where there is none.
+
+    Args:
+        path: of `strip_model`.
+        kind: of the point.
+        both: both clamps are turned.
+    """
+    found = [at.lam for step, at in path.critical_points if step == AGAINST and at.kind is kind]
+    return found[0] * farthest(both) if found else math.nan
+
+
+def snapping_strip(result: CaseResult, context: Context) -> None:
     """One clamp (limit points, barrier), and both (a bifurcation before the limit point)."""
     levels = LEVELS[:2] if context.quick else LEVELS
-    _one(result, levels)
+    for side, name in ((1.0, "arch above"),) if context.quick else ((1.0, "arch above"), (-1.0, "arch below")):
+        _one(result, levels if side > 0.0 else levels[-1:], side, name)
     params = {"sheet": "buckled strip", "turned": "both clamps"}
     claim = Claim("mu where the symmetric strip branches", 2.0, SOURCE, TOLERANCE, params)
     found = []
-    for formulation, rows in [*(("consistent", n) for n in levels), ("shell", SHELL)]:
-        path = trace(strip_model(True, formulation, rows), neighbours=False)
-        found.append(Level(f"{rows} rows", 1.0 / rows, critical(path, 3, Critical.BIFURCATION, True), path))
+    for formulation, mesh in [*(("consistent", mesh) for mesh in levels), ("shell", SHELL)]:
+        path = trace(strip_model(True, formulation, *mesh), neighbours=False)
+        found.append(_level(mesh, critical(path, Critical.BIFURCATION, True), path))
     converged(result, claim, found[:-1])
     by_shell(result, claim, found[-1])
 
 
-def _one(result: CaseResult, levels: tuple[int, ...]) -> None:
-    params = {"sheet": "buckled strip", "turned": "one clamp"}
+def _one(result: CaseResult, levels: tuple[tuple[int, int], ...], side: float, name: str) -> None:
+    params = {"sheet": "buckled strip", "turned": "one clamp", "from": name}
     arch, saddle = (NEARER / LENGTH * SHEET.bending_stiffness() * BREADTH * e for e in theory.energies())
-    mu = theory.snap()[0]
     claims = (
-        Claim("mu at the limit point, from one arch", mu, SOURCE, TOLERANCE, params),
-        Claim("mu at the limit point, from the other arch", -mu, SOURCE, TOLERANCE, params),
+        Claim("mu at the limit point", theory.snap()[0], SOURCE, TOLERANCE, params),
+        Claim("mu of the saddle between the arches over its own at the limit point", 0.0, SOURCE, TOLERANCE, params),
         Claim("energy of the arch over the closed form", 1.0, SOURCE, BARRIER, params),
         Claim("barrier between the arches over the closed form", 1.0, SOURCE, BARRIER, params),
     )
-    paths = [(n, trace(strip_model(False, "consistent", n), neighbours=False)) for n in levels]
-    shell = trace(strip_model(False, "shell", SHELL), neighbours=False)
+    paths = [(mesh, trace(strip_model(False, "consistent", *mesh, side), neighbours=False)) for mesh in levels]
+    shell = trace(strip_model(False, "shell", *SHELL, side), neighbours=False)
 
     def values(path: Path) -> tuple[float, ...]:
-        limits = [critical(path, step, Critical.LIMIT, False) for step in (3, 4)]
-        at_rest = rest_energy(path)
-        return (*limits, at_rest / arch, (saddle_energy(path) - at_rest) / (saddle - arch))
+        rest, level = (_end(path, step) for step in (REST, AGAINST))
+        at = path[-1].lam * FAR if _level_met(path) else math.nan
+        return critical(path, Critical.LIMIT, False), at, rest / arch, (level - rest) / (saddle - arch)
 
     read = [values(path) for _, path in paths]
     for i, claim in enumerate(claims):
-        converged(
-            result, claim, [Level(f"{n} rows", 1.0 / n, v[i], path) for (n, path), v in zip(paths, read, strict=True)]
-        )
-        by_shell(result, claim, Level(f"{SHELL} rows", 1.0 / SHELL, values(shell)[i], shell))
+        converged(result, claim, [_level(mesh, v[i], path) for (mesh, path), v in zip(paths, read, strict=True)])
+        by_shell(result, claim, _level(SHELL, values(shell)[i], shell))
 
 
-def rest_energy(path: Path) -> float:
-    """Of the arch with straight clamps, N mm."""
-    ends = [state for state in path if state.step == BEFORE]
-    return ends[-1].energy.total if ends else math.nan
+def _level_met(path: Path) -> bool:
+    return path.outcome in (Outcome.REACHED, Outcome.UNSTABLE) and len(path.steps) == AGAINST + 1
 
 
-def saddle_energy(path: Path) -> float:
-    """Of the unstable state at mu = 0 on the way from one arch to the other, N mm; nan where the path has none.
+def _level(mesh: tuple[int, int], value: float, path: Path) -> Level:
+    """A mesh; that a path ends in the saddle, which is not stable, is what is asked of it."""
+    found = path.outcome is Outcome.UNSTABLE
+    took = Cost.of(path, outcome=Outcome.REACHED) if found else path
+    return Level("{} x {}".format(*mesh), 1.0 / mesh[1], value, took)
 
-    A polynomial through the four states about it; mu runs monotonically there.
-    """
-    states = [state for state in path if state.step == BEFORE + 1]
-    mu = [float(state.dihedral("crease-1").mean()) - math.pi for state in states]
-    for i in range(2, len(states) - 1):
-        if mu[i - 1] > 0.0 >= mu[i]:
-            part = slice(i - 2, i + 2)
-            energies = [state.energy.total for state in states[part]]
-            return float(np.polyfit(np.array(mu[part]) / UNIT, energies, 3)[-1])
-    return math.nan
+
+def _end(path: Path, step: int) -> float:
+    """Energy at the end of a step, N mm; nan where it was not reached."""
+    ends = [state for state in path if state.step == step]
+    return ends[-1].energy.total if ends and (step < AGAINST or _level_met(path)) else math.nan
