@@ -7,7 +7,7 @@ import math
 import pytest
 
 from bh import trace
-from verification.studies.solver.published import INCLINE, spans, vee_model
+from verification.studies.solver.published.vee import INCLINE, spans, vee_model
 from verification.theory.vee import compliance, opened
 
 

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 
 def rayleigh(length: float, leg: float, nu: float) -> float:
-    """k in N = k pi^2 D / b^2 for w = y sin(pi x / a), an upper bound: (6 / pi^2)(1 - nu) + (b / a)^2.
+    """K in N = k pi^2 D / b^2 for w = y sin(pi x / a), an upper bound: (6 / pi^2)(1 - nu) + (b / a)^2.
 
     Args:
         length: a, mm.
@@ -25,7 +25,7 @@ def rayleigh(length: float, leg: float, nu: float) -> float:
 
 
 def exact(length: float, leg: float, nu: float) -> float:
-    """k of the plate equation: the lowest root of the condition at the free edge.
+    """K of the plate equation: the lowest root of the condition at the free edge.
 
     Y = A sinh(p y) + C sin(r y), p^2 = m^2 + m sqrt(N / D), r^2 = -m^2 + m sqrt(N / D); free of moment and force:
     Y'' - nu m^2 Y = 0 and Y''' - (2 - nu) m^2 Y' = 0.

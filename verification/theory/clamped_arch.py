@@ -24,12 +24,14 @@ Array = NDArray[np.float64]
 
 @cache
 def second_mode() -> float:
-    """tau of the second mode between clamps: tan(tau / 2) = tau / 2."""
-    return float(brentq(lambda tau: math.sin(0.5 * tau) - 0.5 * tau * math.cos(0.5 * tau), 7.0, 9.2, xtol=1e-14))
+    """Tau of the second mode between clamps: tan(tau / 2) = tau / 2."""
+    return float(
+        brentq(lambda tau: math.sin(0.5 * tau) - 0.5 * tau * math.cos(0.5 * tau), 7.0, 9.2, xtol=1e-14)
+    )
 
 
 def _unit(tau: float) -> tuple[float, Array]:
-    """int w'^2 for mu = 1, and w = a + b x + c cos(tau x) + d sin(tau x)."""
+    """Int w'^2 for mu = 1, and w = a + b x + c cos(tau x) + d sin(tau x)."""
     c, s = math.cos(tau), math.sin(tau)
     rows = [[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, tau], [1.0, 1.0, c, s], [0.0, 1.0, -tau * s, tau * c]]
     w = np.linalg.solve(rows, [0.0, 1.0, 0.0, 0.0])
@@ -50,9 +52,11 @@ def turned(tau: float) -> float:
 
 @cache
 def snap() -> tuple[float, float]:
-    """mu at the limit point of one turned clamp, and tau there."""
+    """Mu at the limit point of one turned clamp, and tau there."""
     low, high = 2.0 * math.pi + 1e-6, second_mode() - 1e-6
-    found = minimize_scalar(lambda tau: -turned(tau), bounds=(low, high), method="bounded", options={"xatol": 1e-10})
+    found = minimize_scalar(
+        lambda tau: -turned(tau), bounds=(low, high), method="bounded", options={"xatol": 1e-10}
+    )
     return turned(float(found.x)), float(found.x)
 
 

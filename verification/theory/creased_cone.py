@@ -53,14 +53,28 @@ def small(creases: int, snapped: bool) -> tuple[float, float, float]:
     """
     alpha = math.pi / creases
     if snapped:
-        k = _root(lambda k: (k * k - 1.0) * math.sinh(2.0 * k * alpha) / (2.0 * k) - (k * k + 1.0) * alpha, 1.001, 6.0)
-        slope, top, square = k * math.sinh(k * alpha), math.cosh(k * alpha), 0.5 * alpha + math.sinh(2 * k * alpha) / (4 * k)
+        k = _root(
+            lambda k: (k * k - 1.0) * math.sinh(2.0 * k * alpha) / (2.0 * k) - (k * k + 1.0) * alpha,
+            1.001,
+            6.0,
+        )
+        slope, top, square = (
+            k * math.sinh(k * alpha),
+            math.cosh(k * alpha),
+            0.5 * alpha + math.sinh(2 * k * alpha) / (4 * k),
+        )
         factor = 1.0 + k * k
     else:
         k = _root(
-            lambda k: (k * k - 1.0) * alpha - (k * k + 1.0) * math.sin(2.0 * k * alpha) / (2.0 * k), 1.001, 0.999 * creases
+            lambda k: (k * k - 1.0) * alpha - (k * k + 1.0) * math.sin(2.0 * k * alpha) / (2.0 * k),
+            1.001,
+            0.999 * creases,
         )
-        slope, top, square = -k * math.sin(k * alpha), math.cos(k * alpha), 0.5 * alpha + math.sin(2 * k * alpha) / (4 * k)
+        slope, top, square = (
+            -k * math.sin(k * alpha),
+            math.cos(k * alpha),
+            0.5 * alpha + math.sin(2 * k * alpha) / (4 * k),
+        )
         factor = 1.0 - k * k
     size = 0.5 / slope
     return size, size * top, creases * (factor * size) ** 2 * square
@@ -81,7 +95,10 @@ def cone_state(creases: int, psi: float, snapped: bool) -> ConeState:
     alpha = math.pi / creases
     middle, _, _ = small(creases, snapped)
     k_squared = _factor(creases, snapped)
-    at, unknown = 0.0, np.array([middle, k_squared * middle])  # elevation and curvature in the middle, over psi
+    at, unknown = (
+        0.0,
+        np.array([middle, k_squared * middle]),
+    )  # elevation and curvature in the middle, over psi
     while at < psi:
         at = min(at + STEP, psi)
         found = root(lambda x, at=at: _gap(alpha, at, x), unknown, tol=1e-13)
@@ -93,7 +110,7 @@ def cone_state(creases: int, psi: float, snapped: bool) -> ConeState:
 
 
 def _factor(creases: int, snapped: bool) -> float:
-    """lambda of small slopes, the ratio of g and f."""
+    """Lambda of small slopes, the ratio of g and f."""
     middle, crease, _ = small(creases, snapped)
     alpha, ratio = math.pi / creases, crease / middle
     k = math.acosh(ratio) / alpha if snapped else math.acos(ratio) / alpha

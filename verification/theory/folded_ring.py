@@ -46,7 +46,7 @@ class FoldedRing:
 
 
 def curvature(theta: float) -> float:
-    """kappa R.
+    """Kappa R.
 
     Args:
         theta: dihedral angle, rad.
@@ -108,7 +108,9 @@ def _along(theta: float, unknown: Array, at: Array) -> Array:
 
 def _torsion(couple: float, kn: float) -> float:
     """The torsion at which f' = 4 tau (kn^2 + tau^2) / kn^2 has a value."""
-    u = 2.0 / math.sqrt(3.0) * math.sinh(math.asinh(0.375 * math.sqrt(3.0) * couple / kn) / 3.0)  # u + u^3 = couple / 4 kn
+    u = (
+        2.0 / math.sqrt(3.0) * math.sinh(math.asinh(0.375 * math.sqrt(3.0) * couple / kn) / 3.0)
+    )  # u + u^3 = couple / 4 kn
     return kn * u
 
 

@@ -41,12 +41,12 @@ class SineFold:
 
     @property
     def incline(self) -> float:
-        """th of the rulings, rad."""
+        """Th of the rulings, rad."""
         return self.share * math.atan(1.0 / (self.amplitude * self.q))
 
     @property
     def parameter(self) -> float:
-        """m = (tan th / tan Theta)^2, of the elliptic integrals."""
+        """M = (tan th / tan Theta)^2, of the elliptic integrals."""
         return (math.tan(self.incline) * self.amplitude * self.q) ** 2
 
     @property

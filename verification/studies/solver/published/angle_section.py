@@ -47,7 +47,7 @@ def shortening(share: float) -> float:
 
 
 def factor(path: Path) -> float:
-    """k at the first point where the straight section branches; nan if it does not."""
+    """K at the first point where the straight section branches; nan if it does not."""
     found = [at.lam for step, at in path.critical_points if step == 1 and at.kind is Critical.BIFURCATION]
     return found[0] * ENOUGH * exact(LENGTH, LEG, SHEET.nu) if found else math.nan
 
@@ -55,9 +55,7 @@ def factor(path: Path) -> float:
 def compressed_section(result: CaseResult, context: Context) -> None:
     """Its buckling load."""
     params = {"sheet": "angle section", "a / b": LENGTH / LEG}
-    claim = Claim(
-        "buckling load b^2 N / (pi^2 D)", exact(LENGTH, LEG, SHEET.nu), SOURCE, TOLERANCE, params
-    )
+    claim = Claim("buckling load b^2 N / (pi^2 D)", exact(LENGTH, LEG, SHEET.nu), SOURCE, TOLERANCE, params)
     levels = []
     for along, rows in LEVELS[:2] if context.quick else LEVELS:
         path = trace(section_model("consistent", along, rows), neighbours=False)

@@ -24,7 +24,9 @@ from verification.studies.solver.published.common import (
     strip_mesh,
 )
 
-SOURCE = "Frontiers in Materials 6 (2019) 41: curvature tuning in folded strips; the beam solved in this study"
+SOURCE = (
+    "Frontiers in Materials 6 (2019) 41: curvature tuning in folded strips; the beam solved in this study"
+)
 LENGTH, BREADTH = 80.0, 10.0  # mm
 STUB = 0.1  # mm; its own bending makes a clamp softer by a third of its length
 SHEET = Sheet(E=4500.0, nu=0.0, t=0.2)  # B = 3 N mm
@@ -85,8 +87,12 @@ def folded_between_clamps(result: CaseResult, context: Context) -> None:
     for turn in TURNS:
         params = {"sheet": "strip with a fold", "th1": turn[0], "th2": turn[1]}
         kink = Claim("kink that is left, over its rest", kink_left(turn) / KINK, SOURCE, TOLERANCE, params)
-        couple = Claim("couple of the first clamp", clamp_couple(turn), SOURCE, TOLERANCE, params, "N mm / mm")
-        found = [(rows, _solved(turn, "consistent", rows)) for rows in (LEVELS[:2] if context.quick else LEVELS)]
+        couple = Claim(
+            "couple of the first clamp", clamp_couple(turn), SOURCE, TOLERANCE, params, "N mm / mm"
+        )
+        found = [
+            (rows, _solved(turn, "consistent", rows)) for rows in (LEVELS[:2] if context.quick else LEVELS)
+        ]
         shell = _solved(turn, "shell", SHELL)
         for claim, read in ((kink, _kink), (couple, _couple)):
             converged(result, claim, [Level(f"{n} rows", 1.0 / n, read(path[-1]), path) for n, path in found])

@@ -13,6 +13,7 @@ from bh.analysis.richardson import judged
 from meshes import SheetMesh
 from verification.framework.checks import CaseResult, Cost, Solved
 
+
 def strip_mesh(lines: Sequence[float], breadth: float, along: int, creases: Mapping[str, float]) -> SheetMesh:
     """A strip along y, cut across at any heights: cells as long as it pleases, diagonals in turn.
 
@@ -33,7 +34,8 @@ def strip_mesh(lines: Sequence[float], breadth: float, along: int, creases: Mapp
     at = {name: int(np.argmin(np.abs(np.asarray(lines) - y))) for name, y in creases.items()}
     sets = {f"crease:{name}": np.column_stack((node[k, :-1], node[k, 1:])) for name, k in at.items()}
     sets |= {
-        f"edge:{name}": np.column_stack((node[k, :-1], node[k, 1:])) for name, k in (("inner", 0), ("outer", -1))
+        f"edge:{name}": np.column_stack((node[k, :-1], node[k, 1:]))
+        for name, k in (("inner", 0), ("outer", -1))
     }
     return SheetMesh(
         points=points, triangles=np.array(triangles), edge_sets=sets, folds=dict.fromkeys(creases, "mountain")
@@ -68,7 +70,7 @@ class Claim:
         quantity: in words.
         reference: what it should be.
         source: where that comes from.
-        tolerance: relative, of the limit of the consistent formulation and of the shell.
+        tolerance: relative, of the limit of the consistent formulation and of the shell; None only reports.
         params: what tells it from others of the same quantity.
         unit: of the values.
         finest: relative tolerance of the finest mesh itself, or None.
@@ -77,7 +79,7 @@ class Claim:
     quantity: str
     reference: float
     source: str
-    tolerance: float
+    tolerance: float | None
     params: Mapping[str, Any]
     unit: str = ""
     finest: float | None = None
@@ -110,7 +112,11 @@ def converged(result: CaseResult, claim: Claim, levels: Sequence[Level]) -> None
     values = [level.value for level in levels]
     if not all(map(math.isfinite, values)):
         result.check(
-            f"{claim.quantity}, limit", math.nan, reference=claim.reference, tolerance=claim.tolerance, params=params
+            f"{claim.quantity}, limit",
+            math.nan,
+            reference=claim.reference,
+            tolerance=claim.tolerance,
+            params=params,
         )
         return
     seen = judged(values, [level.size for level in levels])

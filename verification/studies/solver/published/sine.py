@@ -10,6 +10,7 @@ judged, and all three are reported.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +24,10 @@ from verification.studies.solver.published.common import Claim, Level, by_shell,
 from verification.theory.sine import SineFold
 
 SOURCE = "Karami, Reddy and Nassar (2024): the folded family of sine creases, integrated in verification.theory.sine"
-SHEET = Sheet(E=4000.0, nu=0.0, t=0.1)
+SHEET = Sheet(E=4000.0, nu=0.0, t=0.05)
 AMPLITUDE, WAVE, PITCH = 12.0, 100.0, 30.0  # mm
 SHARES = (0.3, 0.6, 0.85)  # of the steepest inclination
-LEVELS = ((32, 2), (64, 4), (128, 8))  # cells along a wave, rows a panel
+LEVELS = ((32, 2), (48, 3), (64, 4))  # cells along a wave, rows a panel
 SHELL = (32, 2)
 ENERGY, LENGTH = 0.01, 1e-3  # relative tolerances, set before the first run
 CHORDS = 2048
@@ -44,7 +45,8 @@ def sine_model(share: float, formulation: str, along: int, rows: int) -> Model:
     """
     x = np.linspace(0.0, WAVE, CHORDS + 1)
     rails = [
-        Polyline(np.column_stack((x, i * PITCH + AMPLITUDE * np.sin(2.0 * np.pi / WAVE * x)))) for i in range(4)
+        Polyline(np.column_stack((x, i * PITCH + AMPLITUDE * np.sin(2.0 * np.pi / WAVE * x))))
+        for i in range(4)
     ]
     pattern = meshes.library.between_rails(rails, ["mountain", "valley"])
     kind = "mirrored" if formulation == "shell" else "staggered"
@@ -85,9 +87,7 @@ def sine_creases(result: CaseResult, context: Context) -> None:
     for share in SHARES[1:2] if context.quick else SHARES:
         family = SineFold(AMPLITUDE, WAVE, PITCH, share)
         params = {"sheet": "sine creases", "th / Theta": share}
-        middle = Claim(
-            "energy of the middle panel over the closed form", 1.0, SOURCE, ENERGY, params
-        )
+        middle = Claim("energy of the middle panel over the closed form", 1.0, SOURCE, ENERGY, params)
         length = Claim("length of the folded wave", family.length, SOURCE, LENGTH, params, "mm", LENGTH)
         exact = family.energy(SHEET.bending_stiffness())
         levels = LEVELS[:2] if context.quick else LEVELS
@@ -105,7 +105,11 @@ Solved = tuple[str, float, Path]
 
 
 def _level(share: float, formulation: str, along: int, rows: int) -> Solved:
-    return f"{along} x {rows}", 1.0 / rows, trace(sine_model(share, formulation, along, rows), neighbours=False)
+    return (
+        f"{along} x {rows}",
+        1.0 / rows,
+        trace(sine_model(share, formulation, along, rows), neighbours=False),
+    )
 
 
 def _read(solved: Solved, exact: float) -> Level:
@@ -116,7 +120,9 @@ def _long(solved: Solved) -> Level:
     return Level(*solved[:2], wave_length(solved[2][-1]), solved[2])
 
 
-def _whole(result: CaseResult, params: dict[str, object], formulation: str, solved: Solved, exact: float) -> None:
+def _whole(
+    result: CaseResult, params: dict[str, Any], formulation: str, solved: Solved, exact: float
+) -> None:
     result.check(
         "energy of all three panels over the closed form",
         sum(panel_energies(solved[2][-1])) / (3.0 * exact),

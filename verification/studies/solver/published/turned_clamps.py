@@ -69,7 +69,7 @@ def strip_model(both: bool, formulation: str, along: int, rows: int, side: float
 
 
 def farthest(both: bool) -> float:
-    """mu that the clamps are turned to against the arch.
+    """Mu that the clamps are turned to against the arch.
 
     Args:
         both: both clamps are turned.
@@ -78,7 +78,7 @@ def farthest(both: bool) -> float:
 
 
 def critical(path: Path, kind: Critical, both: bool) -> float:
-    """mu against the arch at the first critical point of a kind; nan where there is none.
+    """Mu against the arch at the first critical point of a kind; nan where there is none.
 
     Args:
         path: of `strip_model`.
@@ -92,7 +92,9 @@ def critical(path: Path, kind: Critical, both: bool) -> float:
 def snapping_strip(result: CaseResult, context: Context) -> None:
     """One clamp (limit points, barrier), and both (a bifurcation before the limit point)."""
     levels = LEVELS[:2] if context.quick else LEVELS
-    for side, name in ((1.0, "arch above"),) if context.quick else ((1.0, "arch above"), (-1.0, "arch below")):
+    for side, name in (
+        ((1.0, "arch above"),) if context.quick else ((1.0, "arch above"), (-1.0, "arch below"))
+    ):
         _one(result, levels if side > 0.0 else levels[-1:], side, name)
     params = {"sheet": "buckled strip", "turned": "both clamps"}
     claim = Claim("mu where the symmetric strip branches", 2.0, SOURCE, TOLERANCE, params)
@@ -109,11 +111,19 @@ def _one(result: CaseResult, levels: tuple[tuple[int, int], ...], side: float, n
     arch, saddle = (NEARER / LENGTH * SHEET.bending_stiffness() * BREADTH * e for e in theory.energies())
     claims = (
         Claim("mu at the limit point", theory.snap()[0], SOURCE, TOLERANCE, params),
-        Claim("mu of the saddle between the arches over its own at the limit point", 0.0, SOURCE, TOLERANCE, params),
+        Claim(
+            "mu of the saddle between the arches over its own at the limit point",
+            0.0,
+            SOURCE,
+            TOLERANCE,
+            params,
+        ),
         Claim("energy of the arch over the closed form", 1.0, SOURCE, BARRIER, params),
         Claim("barrier between the arches over the closed form", 1.0, SOURCE, BARRIER, params),
     )
-    paths = [(mesh, trace(strip_model(False, "consistent", *mesh, side), neighbours=False)) for mesh in levels]
+    paths = [
+        (mesh, trace(strip_model(False, "consistent", *mesh, side), neighbours=False)) for mesh in levels
+    ]
     shell = trace(strip_model(False, "shell", *SHELL, side), neighbours=False)
 
     def values(path: Path) -> tuple[float, ...]:
@@ -123,7 +133,9 @@ def _one(result: CaseResult, levels: tuple[tuple[int, int], ...], side: float, n
 
     read = [values(path) for _, path in paths]
     for i, claim in enumerate(claims):
-        converged(result, claim, [_level(mesh, v[i], path) for (mesh, path), v in zip(paths, read, strict=True)])
+        converged(
+            result, claim, [_level(mesh, v[i], path) for (mesh, path), v in zip(paths, read, strict=True)]
+        )
         by_shell(result, claim, _level(SHELL, values(shell)[i], shell))
 
 
