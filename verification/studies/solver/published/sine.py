@@ -53,7 +53,6 @@ def sine_model(share: float, formulation: str, along: int, rows: int) -> Model:
     mesh = meshes.structured(pattern, along=along, rows=rows, kind=kind)
     family = SineFold(AMPLITUDE, WAVE, PITCH, share)
     up = PITCH * math.sin(family.incline)
-    heights = {"edge:inner": 0.0, "crease:crease-1": up, "crease:crease-2": 0.0, "edge:outer": up}
     model = Model(mesh, SHEET, formulation=formulation).support("rigid-body")
     model = model.support("edge:inner", "z").support("crease:crease-2", "z")
     up = PITCH * math.sin(family.incline)
