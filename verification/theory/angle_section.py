@@ -1,8 +1,9 @@
-"""Torsional buckling of an angle section compressed along its crease (Timoshenko and Gere, Theory of Elastic Stability, 9.4).
+"""Torsional buckling of an angle section compressed along its crease (Timoshenko and Gere, section 9.4).
 
-Two equal legs meet at a straight crease whose angle is kept. Both turn the same way, so neither bends the other at the crease,
-and each leg is a plate of width b and length a, simply supported at the crease and at its ends, free at the outer edge:
-w = Y(y) sin(pi x / a) with D (Y'''' - 2 m^2 Y'' + m^4 Y) = N m^2 Y, m = pi / a.
+Two equal legs meet at a straight crease whose angle is kept. Both turn the same way, so neither bends the
+other at the crease, and each leg is a plate of width b and length a, simply supported at the crease and at
+its ends, free at the outer edge: w = Y(y) sin(pi x / a) with D (Y'''' - 2 m^2 Y'' + m^4 Y) = N m^2 Y, m = pi
+/ a.
 """
 
 from __future__ import annotations

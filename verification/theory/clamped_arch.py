@@ -1,13 +1,15 @@
-"""A strip buckled between two clamps, one or both of which are turned (Gomez, Moulton and Vella 2017, Nat. Phys. 13, 142).
+"""A strip buckled between two clamps, one or both of which are turned (Gomez, Moulton, Vella 2017, Nat. Phys. 13, 142).
 
-Small slopes, lengths over that of the strip, w over sqrt(dL / L), with dL what its ends are brought nearer by:
+Small slopes, lengths over that of the strip, w over sqrt(dL / L), with dL what its ends are brought nearer
+by:
 
     w'''' + tau^2 w'' = 0,   w = 0 and given slopes at both ends,   1/2 int w'^2 = 1,
 
-tau^2 the compression. The slope of the turned clamp, over sqrt(dL / L), is mu; its largest value is a limit point, behind
-which the strip snaps. With both clamps turned alike (mirrored) an unsymmetric state branches off before, at tan(tau / 2) =
-tau / 2, where mu = 2. The energy over B dL / L^2 a width is 1/2 int w''^2. At mu = 0 the arch has tau = 2 pi and the saddle
-between the two arches the second mode, tau = 8.98682: energies tau^2, since int w''^2 = tau^2 int w'^2 for modes.
+tau^2 the compression. The slope of the turned clamp, over sqrt(dL / L), is mu; its largest value is a limit
+point, behind which the strip snaps. With both clamps turned alike (mirrored) an unsymmetric state branches
+off before, at tan(tau / 2) = tau / 2, where mu = 2. The energy over B dL / L^2 a width is 1/2 int w''^2. At
+mu = 0 the arch has tau = 2 pi and the saddle between the two arches the second mode, tau = 8.98682:
+energies tau^2, since int w''^2 = tau^2 int w'^2 for modes.
 """
 
 from __future__ import annotations

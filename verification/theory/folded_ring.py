@@ -1,14 +1,16 @@
 """A closed ring folded along its circle by one dihedral angle everywhere (Dias, Dudte, Mahadevan and Santangelo 2012).
 
-The crease keeps its geodesic curvature 1 / R in both panels, so its curvature is kappa = 1 / (R sin(theta / 2)) everywhere,
-whatever the mechanics. A narrow ring then has the energy B w int (kn^2 + tau^2)^2 / kn^2 ds with kn = cot(theta / 2) / R
-(developable panels whose rulings lean by tau / kn; Dias and Audoly 2014): a rod with one curvature frozen. With T, N and
-B the frame of the crease and f = (kn^2 + tau^2)^2 / kn^2, rotations of the rod conserve M = f'(tau) T + Mn N + Mb B:
+The crease keeps its geodesic curvature 1 / R in both panels, so its curvature is kappa = 1 / (R sin(theta /
+2)) everywhere, whatever the mechanics. A narrow ring then has the energy B w int (kn^2 + tau^2)^2 / kn^2 ds
+with kn = cot(theta / 2) / R (developable panels whose rulings lean by tau / kn; Dias and Audoly 2014): a rod
+with one curvature frozen. With T, N and B the frame of the crease and f = (kn^2 + tau^2)^2 / kn^2, rotations
+of the rod conserve M = f'(tau) T + Mn N + Mb B:
 
     (f')' = kappa Mn,   Mn' = tau Mb - kappa f',   Mb' = -tau Mn.
 
-The state in two waves has a mirror plane at each crest and trough, and a two-fold axis along N halfway: tau(0) = 0,
-Mn(L / 8) = 0, and the planes of neighbouring crest and trough are at right angles, T(0) . N(L / 8) = -cos 45 degrees.
+The state in two waves has a mirror plane at each crest and trough, and a two-fold axis along N halfway:
+tau(0) = 0, Mn(L / 8) = 0, and the planes of neighbouring crest and trough are at right angles, T(0) . N(L /
+8) = -cos 45 degrees.
 """
 
 from __future__ import annotations

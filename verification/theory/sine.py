@@ -1,9 +1,10 @@
 """Folded family of parallel sine creases (Karami, Reddy and Nassar 2024, PRL 132, 108201, "curved-crease Miura").
 
-Creases y = i b + a sin(q x), mountain and valley in turn, panels isometric. Every ruling stays parallel to y in the flat
-sheet and is turned to (0, cos th, +-sin th), alike for all rulings. With s = dy/dx the tangent of a crease keeps its length,
-1 + s^2, and its product s with both rulings, so it is (sqrt(1 - s^2 tan^2 th), s / cos th, 0): creases stay plane. The family
-ends at tan Theta = 1 / (a q). Everything below follows by integration; B is the bending stiffness a width.
+Creases y = i b + a sin(q x), mountain and valley in turn, panels isometric. Every ruling stays parallel to y
+in the flat sheet and is turned to (0, cos th, +-sin th), alike for all rulings. With s = dy/dx the tangent of
+a crease keeps its length, 1 + s^2, and its product s with both rulings, so it is (sqrt(1 - s^2 tan^2 th), s /
+cos th, 0): creases stay plane. The family ends at tan Theta = 1 / (a q). Everything below follows by
+integration; B is the bending stiffness a width.
 """
 
 from __future__ import annotations
@@ -57,8 +58,8 @@ class SineFold:
     def energy(self, stiffness: float) -> float:
         """Bending energy of one panel over one wave, N mm.
 
-        The curvature across rulings is y'' tan th / sqrt(1 - s^2 tan^2 th), and int cos^2 / (1 - m sin^2) over a turn is
-        2 pi (1 - sqrt(1 - m)) / m, so U = pi B b q (1 - sqrt(1 - m)).
+        The curvature across rulings is y'' tan th / sqrt(1 - s^2 tan^2 th), and int cos^2 / (1 - m sin^2)
+        over a turn is 2 pi (1 - sqrt(1 - m)) / m, so U = pi B b q (1 - sqrt(1 - m)).
 
         Args:
             stiffness: B, N mm.

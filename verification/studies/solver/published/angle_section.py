@@ -11,7 +11,10 @@ from verification.framework.checks import CaseResult, Context
 from verification.studies.solver.published.common import Claim, Level, by_shell, converged
 from verification.theory.angle_section import exact
 
-SOURCE = "Timoshenko and Gere, Theory of Elastic Stability, 9.4; the plate equation solved in verification.theory.angle_section"
+SOURCE = (
+    "Timoshenko and Gere, Theory of Elastic Stability, 9.4; the plate equation solved in "
+    "verification.theory.angle_section"
+)
 LENGTH, LEG = 160.0, 20.0  # mm
 SHEET = Sheet(E=4000.0, nu=0.0, t=0.5)
 ENOUGH = 1.15  # of the buckling load, at the end of the step
@@ -29,8 +32,9 @@ def section_model(formulation: str, along: int, rows: int) -> Model:
         rows: of cells in each leg.
     """
     pattern = meshes.strip(LENGTH, 2.0 * LEG, [LEG])
-    kind = "mirrored" if formulation == "shell" else "staggered"
-    mesh = meshes.structured(pattern, along=along, rows=rows, kind=kind)
+    mesh = meshes.structured(
+        pattern, along=along, rows=rows, kind="mirrored" if formulation == "shell" else "staggered"
+    )
     model = Model(mesh, SHEET, formulation=formulation).fold("crease", by=0.5 * math.pi)
     ends = (Support("edge:start", "xyz"), Support("edge:end", "yz"))
     return model.step(Displace("edge:end", "x", further=-shortening(ENOUGH)), support=ends)

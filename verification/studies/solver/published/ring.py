@@ -1,9 +1,9 @@
-"""A closed ring folded along its circle: it buckles to a saddle of constant crease curvature (`verification.theory.folded_ring`).
+"""A closed ring folded along its circle: a saddle of constant crease curvature (`verification.theory.folded_ring`).
 
-A quarter of it, from a crest to a trough, between two mirror planes. Energies are reported only: rulings lean, so the
-isometric state would need a moment at the free edges, which a layer of width sqrt(t R) takes off slowly with t. On meshes that
-are solved in seconds both models come to 0.2 % of height and curvature, not to the 0.1 % that was set before the first run, and the consistent
-formulation shows no order yet: distances from the closed form are shown, and the two models are judged against each other.
+A quarter of it, from a crest to a trough, between two mirror planes. Energies are reported only: rulings
+lean, so the isometric state would need a moment at the free edges, which a layer of width sqrt(t R) takes off
+slowly with t. Height and curvature miss the 0.1 % that was set before the first run, and the checks say so;
+the note has the figures.
 """
 
 from __future__ import annotations
@@ -23,13 +23,17 @@ from verification.studies.solver.published.common import Claim, Level, by_shell,
 from verification.theory import folded_ring as theory
 
 Array = NDArray[np.float64]
-SOURCE = "Dias, Dudte, Mahadevan and Santangelo (2012), Dias and Audoly (2014); the rod solved in verification.theory.folded_ring"
+SOURCE = (
+    "Dias, Dudte, Mahadevan and Santangelo (2012), Dias and Audoly (2014); the rod solved in "
+    "verification.theory.folded_ring"
+)
 RADIUS, WIDTH = 100.0, 5.0  # mm
 SHEET = Sheet(E=4000.0, nu=0.0, t=0.02)
 ANGLES = (120.0, 90.0)  # dihedral, degrees
 LEVELS = ((24, 1), (48, 2), (96, 4))  # cells along a quarter, rows a panel
 SHELL = (48, 2)
-APART = 1e-3  # relative, of the heights by the two models; set before the first run, for each against the closed form
+HEIGHT = CURVATURE = 1e-3  # relative tolerances, set before the first run
+APART = 1e-3  # relative, of the heights by the two models; asked after first results
 
 
 def ring_model(angle: float, formulation: str, along: int, rows: int) -> Model:
@@ -42,9 +46,12 @@ def ring_model(angle: float, formulation: str, along: int, rows: int) -> Model:
         rows: of cells in each panel.
     """
     pattern = meshes.annulus_sector(RADIUS, WIDTH, 0.5 * math.pi)
-    kind = "mirrored" if formulation == "shell" else "staggered"
     model = Model(
-        meshes.structured(pattern, along=along, rows=rows, kind=kind), SHEET, formulation=formulation
+        meshes.structured(
+            pattern, along=along, rows=rows, kind="mirrored" if formulation == "shell" else "staggered"
+        ),
+        SHEET,
+        formulation=formulation,
     )
     model = model.support("edge:start", "y", clamp=True).support("edge:end", "x", clamp=True)
     return model.support("rigid-body").fold("crease", to=math.radians(angle))
@@ -63,15 +70,25 @@ def crease_curvature(state: State) -> Array:
     return np.asarray(2.0 * np.linalg.norm(np.cross(a, b), axis=1) / sides)
 
 
-def closed_ring(result: CaseResult, context: Context) -> None:
-    """Two dihedral angles; one in a quick run."""
-    for angle in ANGLES[1:] if context.quick else ANGLES:
+NOTE = (
+    "Closed ring: asked was 0.1 % of height and crease curvature. Heights are 0.4 % (120 degrees) and 0.2 % "
+    "(90 degrees) off by the consistent formulation, 0.3 % and 0.2 % by the shell; mean curvatures 0.1 % and "
+    "0.2 % by both. Heights of the consistent formulation show no order on three meshes. That both models are "
+    "on the same side and within 0.06 % of each other suggests the closed form's narrow isometric ring, not "
+    "the meshes (its energy is 0.67 to 0.85 of that ring's); a narrower or thinner ring was not tried. That "
+    "they are judged against each other as well was added after first results."
+)
+
+
+def closed_ring(result: CaseResult, _context: Context) -> None:
+    """Two dihedral angles."""
+    result.notes.append(NOTE)
+    for angle in ANGLES:
         exact = theory.folded_ring(math.radians(angle))
         params = {"sheet": "ring", "dihedral angle": angle}
-        high = Claim("height of the crease over R", exact.height, SOURCE, None, params)
-        bent = Claim("mean of kappa R sin(theta / 2) along the crease", 1.0, SOURCE, None, params)
-        levels = LEVELS[:2] if context.quick else LEVELS
-        found = [(n, rows, _solved(angle, "consistent", n, rows)) for n, rows in levels]
+        high = Claim("height of the crease over R", exact.height, SOURCE, HEIGHT, params)
+        bent = Claim("mean of kappa R sin(theta / 2) along the crease", 1.0, SOURCE, CURVATURE, params)
+        found = [(n, rows, _solved(angle, "consistent", n, rows)) for n, rows in LEVELS]
         sine = math.sin(0.5 * math.radians(angle))
         converged(result, high, [_level(n, rows, path, height) for n, rows, path in found])
         converged(result, bent, [_level(n, rows, path, _turn(sine)) for n, rows, path in found])

@@ -1,10 +1,10 @@
 """Sine creases with imposed angles: energy and length of an exact folded family (`verification.theory.sine`).
 
-Three panels between sines; creases and edges are brought to their heights, and both creases are folded edge by edge to the
-closed form. (Held at their angles alone the creases leave their planes, as torsion is free: all three panels have 0.83
-of the energy then by the shell, and the wave is 0.6 % too long.) The outer panels end in edges without moment, which the
-isometric state would need there: a layer of width sqrt(t R) takes it off and with it some energy, so the panel in the middle is
-judged, and all three are reported.
+Three panels between sines; creases and edges are brought to their heights, and both creases are folded edge
+by edge to the closed form. (Held at their angles alone the creases leave their planes, as torsion is free:
+all three panels have 0.83 of the energy then by the shell, and the wave is 0.6 % too long.) The outer panels
+end in edges without moment, which the isometric state would need there: a layer of width sqrt(t R) takes it
+off and with it some energy, so the panel in the middle is judged, and all three are reported.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ from verification.framework.checks import CaseResult, Context
 from verification.studies.solver.published.common import Claim, Level, by_shell, converged
 from verification.theory.sine import SineFold
 
-SOURCE = "Karami, Reddy and Nassar (2024): the folded family of sine creases, integrated in verification.theory.sine"
+SOURCE = (
+    "Karami, Reddy and Nassar (2024): the folded family of sine creases, integrated in "
+    "verification.theory.sine"
+)
 SHEET = Sheet(E=4000.0, nu=0.0, t=0.05)
 AMPLITUDE, WAVE, PITCH = 12.0, 100.0, 30.0  # mm
 SHARES = (0.3, 0.6, 0.85)  # of the steepest inclination
@@ -49,8 +52,9 @@ def sine_model(share: float, formulation: str, along: int, rows: int) -> Model:
         for i in range(4)
     ]
     pattern = meshes.library.between_rails(rails, ["mountain", "valley"])
-    kind = "mirrored" if formulation == "shell" else "staggered"
-    mesh = meshes.structured(pattern, along=along, rows=rows, kind=kind)
+    mesh = meshes.structured(
+        pattern, along=along, rows=rows, kind="mirrored" if formulation == "shell" else "staggered"
+    )
     family = SineFold(AMPLITUDE, WAVE, PITCH, share)
     up = PITCH * math.sin(family.incline)
     model = Model(mesh, SHEET, formulation=formulation).support("rigid-body")
@@ -79,6 +83,16 @@ def wave_length(state: State) -> float:
     """Distance of the ends of the wave, mean over both creases, mm."""
     ends = [state.crease_points(name)[[0, -1]] for name in ("crease-1", "crease-2")]
     return float(np.mean([np.linalg.norm(b - a) for a, b in ends]))
+
+
+NOTE = (
+    "Sine creases: first results changed the set-up (creases and edges are held at their heights, the "
+    "thickness is 0.05 mm in place of 0.02 mm, the finest mesh 64 x 4 in place of 128 x 8); the tolerances "
+    "are those of before. The finest mesh has 5 % too little energy in the middle panel, and its limit, "
+    "within 0.9 % of the closed form, is known to 6 % only: there the shell says more. It misses the 1 % at "
+    "the flattest inclination, by 1.24 %; why is not known (the layers at edges without moment are widest "
+    "there, which is a guess)."
+)
 
 
 def sine_creases(result: CaseResult, context: Context) -> None:
