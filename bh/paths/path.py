@@ -376,7 +376,7 @@ class Path:
             if any(each.until is not None for each in before) or self._looks_back(step):
                 self._load_steps = load_steps(self.model, self._ended(step))
             made = self._formulation.system(self.model, self._load_steps[step], self._start(step))
-            if self.model.contact is not False and not isinstance(made, Limited):
+            if self.model.stops_itself and not isinstance(made, Limited):
                 raise ModelError(
                     f"formulation '{self.model.formulation}' has no contact; take 'consistent', or contact = False"
                 )

@@ -28,6 +28,7 @@ from bh.solvers.neighbours import look_around
 from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import LOAD, Point, point
+from bh.solvers.system import pressing
 from bh.solvers.walk import Strategy, Walk, walk
 from bh.solving.coarser import Coarser
 from meshes.mesh import count
@@ -190,6 +191,8 @@ def _beside(path: Path, step: int, asked: bool) -> str:
     half, last = path.half(step), path.records[-1]
     system, record = (path.system(step), last) if half is None else (half.system, last.of_half(half))
     doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in path.records)
+    if not asked and pressing(system, record.q, record.lam):
+        return ""  # pushed states would have to find ways round all that presses, which takes longer than the path
     here = point(system, record.q, record.lam, negative=record.negative)
     return look_around(system, here, doubtful, Newton())
 
