@@ -321,6 +321,19 @@ class Path:
         with closing(PathFile.open(FilePath(file))) as target:
             target.note("accuracy", {"told": told, "reason": self._estimate_reason})
 
+    def save_steps(self, file: str | FilePath) -> None:
+        """Write how steps ended into the file of this path.
+
+        Args:
+            file: the path file.
+
+        Raises:
+            PathFileError: there is no such file, or it cannot be written.
+        """
+        with closing(PathFile.open(FilePath(file))) as target:
+            for step, end in enumerate(self.steps):
+                target.finish_step(step, *astuple(end))
+
     @classmethod
     def load(cls, file: str | FilePath) -> Path:
         """Read a saved path, also one of a run that was killed.

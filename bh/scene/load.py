@@ -17,7 +17,7 @@ from bh.loading.symmetry import Plane, check, mirror
 from bh.materials.table import material as material_of
 from bh.model.actuations import Displace, Force
 from bh.model.crease_law import CreaseLaw
-from bh.model.model import Contact, Model, Place
+from bh.model.model import Model, Place
 from bh.model.plugins import consent, made
 from bh.model.refinement import Goal
 from bh.model.serialise import ACTUATIONS as MAKERS
@@ -26,6 +26,7 @@ from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, select
 from bh.model.until import Until
 from bh.scene.changes import set_keys
+from bh.scene.contact import contact_of
 from bh.scene.meshing import Drawn, mesh_of
 from bh.scene.reading import (
     arguments,
@@ -45,7 +46,6 @@ from bh.scene.reading import (
 )
 from bh.scene.tables import (
     ACTUATIONS,
-    ContactTable,
     CreaseTable,
     ModelTable,
     OutputsTable,
@@ -228,7 +228,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
         hinge_lock=how.hinge_lock,
-        contact=_contact(data["contact"]) if "contact" in data else False,
+        contact=contact_of(data.get("contact", False)),
     )
     _check_names(model)
     _check_steps(model)
@@ -240,16 +240,6 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         strategy=Settling() if how.strategy == "settling" else None,
         drawn=drawn,
     )
-
-
-def _contact(data: object) -> Contact:
-    """Whether panels stop each other, and how far apart."""
-    if data is False:
-        return False
-    try:
-        return read_table(ContactTable, {"contact": data}, "").contact
-    except SceneError as error:
-        raise SceneError(str(error).removeprefix(".")) from error
 
 
 def _symmetry(model: Model, data: object) -> Plane:

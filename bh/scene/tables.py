@@ -155,14 +155,6 @@ class ModelTable(Table):
     strategy: Literal["automatic", "settling"] = Field("automatic", description='"automatic" or "settling"')
 
 
-class ContactTable(Table):
-    """Whether panels of the sheet stop each other."""
-
-    contact: Literal["thickness", "auto"] | Length = Field(
-        description='"thickness", "auto", false, or a gap in mm that is above 0'
-    )
-
-
 class OutputsTable(Table):
     """What a run writes beside the result."""
 

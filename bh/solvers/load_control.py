@@ -129,9 +129,7 @@ class LoadControl:
         held: Array | None = None  # the neutral mode, once the path has one
         while points[-1].lam < 1.0:
             here = points[-1]
-            wanted = lambda_after(here.lam, step)
-            lam = _up_to_contact(system, points, wanted, SMALLEST)
-            meets = lam < wanted or pressing(system, here.q, here.lam)
+            lam, meets = _up_to_contact(system, points, lambda_after(here.lam, step), SMALLEST)
             fold = fold_ahead(points, system.primal)
             if self.foresee and fold <= lam and len(cuts) > 2:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
@@ -141,8 +139,7 @@ class LoadControl:
                 return
             alone = len(points) == 1
             brisk = lam - here.lam > 0.5 * self.cautious(system) if alone else len(cuts) < self.brisk
-            # what slips off as it meets has no branch to be followed: it is let go downhill at once
-            brisk = brisk and not meets
+            brisk = brisk and not meets  # what slips off as it meets is let go downhill at once
             look = self.at_bifurcation == "stable" and len(cuts) >= LOOK and not looked
             if len(cuts) == 1 and held is None:  # a step may begin on a buckled ring
                 held = _neutral(system, here, known=False)
@@ -316,16 +313,19 @@ def jump(system: System, here: Point, there: Point, mismatch: float) -> str:
     return ""
 
 
-def _up_to_contact(system: System, points: Sequence[Point], lam: float, smallest: float) -> float:
-    """`lam`, or where before it the extrapolated path meets what it has not met yet (`bh.solvers.system.Limited`)."""
+def _up_to_contact(
+    system: System, points: Sequence[Point], lam: float, smallest: float
+) -> tuple[float, bool]:
+    """`lam`, or where before it the extrapolated path meets something; and whether anything presses there or here."""
     here = points[-1]
-    for _ in range(3):
+    meets = pressing(system, here.q, here.lam)
+    for _ in range(2):
         q, _ = extrapolate(points, lam)
         part = meeting(system, here.q, q - here.q, lam)
         if part >= 1.0 or part * (lam - here.lam) < smallest:
-            return lam
-        lam = here.lam + part * (lam - here.lam)
-    return lam
+            break
+        lam, meets = here.lam + part * (lam - here.lam), True
+    return lam, meets
 
 
 def _clear_guess(

@@ -50,7 +50,9 @@ def test_values_of_the_key(value: str, model: object) -> None:
 
 @pytest.mark.parametrize("value", ["true", "-1.0", "0", '"yes"', "[1.0]"])
 def test_values_that_cannot_be_say_what_can(value: str) -> None:
-    with pytest.raises(SceneError, match='contact = .* cannot be; give "thickness", "auto", false, or a gap'):
+    with pytest.raises(
+        SceneError, match=r'contact = .* cannot be; give "thickness", "auto", false, or a gap'
+    ):
         parse_scene(f"contact = {value}\n{SCENE}")
 
 
@@ -100,8 +102,8 @@ def test_states_are_linked_by_motions_not_by_straight_ways() -> None:
     top = np.arange(6) > 2
     below = x - 2.0 * np.array([0.0, 0.0, 1.0]) * top[:, None]
     assert barrier.passed(x, below)
-    aside = [x + np.array([15.0, 15.0, z]) * top[:, None] for z in (0.0, -2.0)]
-    for y in (*aside, below):
+    stops = ([6, 6, 0], [12, 12, 0], [12, 12, -2], [6, 6, -2])
+    for y in (*(x + np.array(stop) * top[:, None] for stop in stops), below):
         barrier.forces(y, np.zeros_like(y))
     assert not barrier.passed(x, below)
 
@@ -125,3 +127,38 @@ def test_pairs_that_are_kept_are_those_that_are_found_anew() -> None:
         x = x + 0.02 * rng.uniform(-1.0, 0.5, x.shape) * (np.arange(6) > 2)[:, None]
         anew = SheetBarrier(mesh, 0.0, 0.1, 2.0)
         assert kept.forces(x, np.zeros_like(x)) == pytest.approx(anew.forces(x, np.zeros_like(x)), rel=1e-12)
+
+
+def letter(contact: object, by: float) -> bh.Model:
+    """Three panels whose outer ones meet beyond 120 degrees."""
+    mesh = meshes.structured(meshes.strip(10.0, 60.0, creases=[20.0, 40.0]), along=3, rows=2)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.5), contact=contact)  # type: ignore[arg-type]
+    return model.step(*(bh.Fold(crease, by=by, Lstar=5.0) for crease in mesh.creases))
+
+
+def test_auto_is_the_path_without_contact_where_nothing_meets() -> None:
+    free, auto = (bh.trace(letter(contact, 1.0)) for contact in (False, "auto"))
+    assert np.array_equal(free[-1].points, auto[-1].points)
+    assert auto.iterations == free.iterations
+    assert not auto.model.stops_itself
+
+
+def test_auto_goes_on_with_contact_from_the_last_clear_state(tmp_path: object) -> None:
+    file = tmp_path / "path.bh"  # type: ignore[operator]
+    path = bh.trace(letter("auto", 2.4), file=file)
+    assert path.outcome == "reached"
+    assert path.model.contact == "thickness"
+    assert bh.contact.first_contact(path) is None
+    said = [line for line in path.remarks if "panels met without contact" in line]
+    assert len(said) == 1
+    assert "solved again from lambda" in said[0]
+    stored = bh.Path.load(file)
+    assert stored.remarks == path.remarks
+    assert len(stored) == len(path)
+    again = bh.trace(letter("auto", 2.4), file=file, resume=True)
+    assert np.array_equal(again[-1].points, path[-1].points)
+
+
+def test_auto_and_an_accuracy_do_not_go_together() -> None:
+    with pytest.raises(bh.ModelError, match="is for one mesh"):
+        bh.trace(letter("auto", 1.0), accuracy=0.1)

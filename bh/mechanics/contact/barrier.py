@@ -194,9 +194,9 @@ class SheetBarrier:
             moved: (nodes, 3) positions, mm.
         """
         within, part = self.offset + 0.5 * self.reach, 0.0
-        if self.distance(x) <= self.offset + 0.9*self.reach:
+        if self.distance(x) <= self.offset + 0.9 * self.reach:
             return 1.0
-        for _ in range(4):  # additive detection stops short of what it sees
+        for _ in range(3):  # additive detection stops short of what it sees
             at = x + part * (moved - x)
             if self.distance(at) <= self.offset + 0.9 * self.reach:
                 break

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 KEPT = 40  # positions that are known to be linked with the state that the step began with
 ROUNDING = 1e-13  # of coordinates
-STEPS = 1000  # of detection, for one pair; of a way that takes more, the part that is known to be free
+STEPS = 300  # of detection, for one pair; of a way that takes more, the part that is known to be free
 WAYS = 4  # straight ways that were looked at last
 TRIED = 2  # of these, from which a straight way is looked for, the last one first
-FAR = 100.0  # slacks; no way so long is looked at on the off-chance, since it crosses very many pairs
+FAR = 20.0  # slacks; no way so long is looked at on the off-chance, since it crosses very many pairs
 
 
 class Detection:
@@ -62,6 +62,11 @@ class Detection:
             least: mm, `most` at most; the one that no pair may be nearer than unless given.
         """
         within = self.least if least is None else least
+        if within == self.least and any(
+            part >= 1.0 and np.array_equal(x, begin) and np.array_equal(moved - x, way)
+            for begin, way, part in self._ways
+        ):
+            return 1.0
         part = self._free_part(x, moved, within)
         if within >= self.least and self._known(x):
             self._ways.append((x.copy(), moved - x, part))

@@ -86,7 +86,9 @@ class SupportedSheet:
 
     def _check_start(self, x: Array) -> None:
         """Raises `ModelError` where the step begins with a sheet that passes through itself."""
-        if self.barrier is not None and not self.barrier.begin(x + (self.displacements.home - self.displacements.reference)):
+        if self.barrier is not None and not self.barrier.begin(
+            x + (self.displacements.home - self.displacements.reference)
+        ):
             met = self.barrier.meetings(x)
             raise ModelError(f"contact: the first state meets itself ({met}); begin with panels apart")
 
@@ -116,14 +118,35 @@ class SupportedSheet:
             return 1.0
         return self.barrier.free_part(self.near(q, lam), self.near(q + dq, lam))
 
+    def meetings(self, x: Array) -> str:
+        """Which parts of the sheet meet or lie too near at positions x (n, 3), in words; empty where it is clear.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+        """
+        if self.barrier is None or self.barrier.clear(x):
+            return ""
+        return self.barrier.meetings(x) or "layers nearer than contact allows"
+
     def approach(self, q: Array, dq: Array, lam: float) -> float:
-        """How much of a step dq (size,) from q leads to where panels begin to press on each other, 0 to 1."""
+        """How much of a step dq (size,) from q leads to where panels begin to press on each other, 0 to 1.
+
+        Args:
+            q: (size,) unknowns.
+            dq: (size,) step.
+            lam: load parameter of the step, 0 to 1.
+        """
         if self.barrier is None:
             return 1.0
         return self.barrier.approach(self.near(q, lam), self.near(q + dq, lam))
 
     def pressing(self, q: Array, lam: float) -> bool:
-        """Do panels press on each other at q (size,)?"""
+        """Do panels press on each other at q (size,)?
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         return self.barrier is not None and self.barrier.presses(self.near(q, lam))
 
     @property
