@@ -119,13 +119,15 @@ def test_ways_end_where_pairs_begin_to_press() -> None:
 
 
 def test_pairs_that_are_kept_are_those_that_are_found_anew() -> None:
-    mesh, x = stacked(0.12)
+    mesh, x = stacked(2.0)
     kept = SheetBarrier(mesh, 0.0, 0.1, 2.0)
     kept.forces(x, np.zeros_like(x))
+    x[3:, 2] -= 1.92  # farther than pairs are kept for
     rng = np.random.default_rng(2)
     for _ in range(5):
         x = x + 0.02 * rng.uniform(-1.0, 0.5, x.shape) * (np.arange(6) > 2)[:, None]
         anew = SheetBarrier(mesh, 0.0, 0.1, 2.0)
+        assert anew.forces(x, np.zeros_like(x)) > 0.0
         assert kept.forces(x, np.zeros_like(x)) == pytest.approx(anew.forces(x, np.zeros_like(x)), rel=1e-12)
 
 
