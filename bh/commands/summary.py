@@ -50,6 +50,7 @@ def summary(
     say(
         f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
         f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
+        + (f"; contact {energy.contact:.3g} N mm" if path.model.stops_itself else "")
     )
     creases = model.mesh.creases
     for crease in creases[:6]:

@@ -58,7 +58,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         "format": FORMAT,
         "formulation": model.formulation,
         "hinge_lock": model.hinge_lock,
-        **({} if model.contact is False else {"contact": model.contact}),
+        **({"contact": model.contact} if model.stops_itself else {}),
         "green": model.stiffness is not None and model.stiffness.green,
         "sheet": {name: value for name, value in _plain(model.sheet).items() if value is not None},
         "mesh": {

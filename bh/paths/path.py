@@ -321,6 +321,19 @@ class Path:
         with closing(PathFile.open(FilePath(file))) as target:
             target.note("accuracy", {"told": told, "reason": self._estimate_reason})
 
+    def save_steps(self, file: str | FilePath) -> None:
+        """Write how steps ended into the file of this path.
+
+        Args:
+            file: the path file.
+
+        Raises:
+            PathFileError: there is no such file, or it cannot be written.
+        """
+        with closing(PathFile.open(FilePath(file))) as target:
+            for step, end in enumerate(self.steps):
+                target.finish_step(step, *astuple(end))
+
     @classmethod
     def load(cls, file: str | FilePath) -> Path:
         """Read a saved path, also one of a run that was killed.
@@ -376,7 +389,7 @@ class Path:
             if any(each.until is not None for each in before) or self._looks_back(step):
                 self._load_steps = load_steps(self.model, self._ended(step))
             made = self._formulation.system(self.model, self._load_steps[step], self._start(step))
-            if self.model.contact is not False and not isinstance(made, Limited):
+            if self.model.stops_itself and not isinstance(made, Limited):
                 raise ModelError(
                     f"formulation '{self.model.formulation}' has no contact; take 'consistent', or contact = False"
                 )

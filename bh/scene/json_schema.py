@@ -50,6 +50,9 @@ def schema() -> Schema:
         "mesh": {"anyOf": _tables(found, MESHES)},
         "supports": {"type": "array", "items": support},
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
+        "contact": {
+            "anyOf": [{"enum": ["thickness", "auto", False]}, {"type": "number", "exclusiveMinimum": 0}]
+        },
         "symmetry": {"anyOf": [{"enum": ["x", "y"]}, VECTOR]},
         "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},
         "steps": {

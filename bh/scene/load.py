@@ -26,6 +26,7 @@ from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, select
 from bh.model.until import Until
 from bh.scene.changes import set_keys
+from bh.scene.contact import contact_of
 from bh.scene.meshing import Drawn, mesh_of
 from bh.scene.reading import (
     arguments,
@@ -69,6 +70,7 @@ SECTIONS = (
     "outputs",
     "accuracy",
     "symmetry",
+    "contact",
 )
 CHANGES = ("support", "hold", "release")  # keys of a step beside its actuations
 LONGEST_FILE = 20_000_000  # bytes
@@ -226,6 +228,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
         hinge_lock=how.hinge_lock,
+        contact=contact_of(data.get("contact", False)),
     )
     _check_names(model)
     _check_steps(model)

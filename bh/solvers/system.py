@@ -240,12 +240,47 @@ def limited(system: System, q: Array, dq: Array, lam: float) -> Array:
         dq: (n,) step.
         lam: load parameter of the step, 0 to 1.
     """
+    part = clear_part(system, q, dq, lam)
+    return dq if part >= 1.0 else 0.9 * part * dq
+
+
+def clear_part(system: System, q: Array, dq: Array, lam: float) -> float:
+    """How much of the step dq (n,) from q nothing stands in, 0 to 1.
+
+    Args:
+        system: any; nothing stands in the way of those that are not `Limited`.
+        q: (n,) unknowns.
+        dq: (n,) step.
+        lam: load parameter of the step, 0 to 1.
+    """
     # asked in every iteration: looking for the method takes 0.1 microseconds, `isinstance` of a protocol 20
     free_part: Callable[[Array, Array, float], float] | None = getattr(system, "free_part", None)
-    if free_part is None:
-        return dq
-    part = free_part(q, dq, lam)
-    return dq if part >= 1.0 else 0.9 * part * dq
+    return 1.0 if free_part is None else free_part(q, dq, lam)
+
+
+def meeting(system: System, q: Array, dq: Array, lam: float) -> float:
+    """How much of the step dq (n,) from q leads to where something new begins to press, 0 to 1; 1 where nothing does.
+
+    Args:
+        system: any; only those that are `Limited` can meet something.
+        q: (n,) unknowns.
+        dq: (n,) step.
+        lam: load parameter of the step, 0 to 1.
+    """
+    approach: Callable[[Array, Array, float], float] | None = getattr(system, "approach", None)
+    return 1.0 if approach is None else approach(q, dq, lam)
+
+
+def pressing(system: System, q: Array, lam: float) -> bool:
+    """Does anything press at q (n,) that can stand in the way of a step?
+
+    Args:
+        system: any; nothing presses in those that are not `Limited`.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+    """
+    touches: Callable[[Array, float], bool] | None = getattr(system, "pressing", None)
+    return touches is not None and touches(q, lam)
 
 
 def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, float], float]) -> bool:

@@ -50,6 +50,7 @@ def follow(  # noqa: PLR0913 - the options of `bh.trace`, all by name
     after: Path | None = None,
     coarser: Path | None = None,
     neighbours: bool | None = None,
+    begun: Path | None = None,
 ) -> Path:
     """Follow the equilibrium of a model on its own mesh through all its steps; arguments as of `bh.trace`.
 
@@ -63,6 +64,7 @@ def follow(  # noqa: PLR0913 - the options of `bh.trace`, all by name
         after: path whose end this one begins at.
         coarser: path of the same sheet and formulation on a coarser mesh (`bh.solving.coarser`).
         neighbours: whether to look for other stable states at the end of steps; None where there is reason to.
+        begun: path of this model with states to go on from, also within a step.
 
     Returns:
         the path up to where it got.
@@ -74,7 +76,10 @@ def follow(  # noqa: PLR0913 - the options of `bh.trace`, all by name
     strategy = strategy or Automatic()
     report = meter(progress)
     with nullcontext() if file is None else only_writer(FilePath(file)):
-        path, target = _opened(model, symmetry, file, resume, after)
+        if begun is not None:
+            path, target = begun, None if file is None else _rewritten(begun, FilePath(file))
+        else:
+            path, target = _opened(model, symmetry, file, resume, after)
         _walk(path, target, strategy, report, None if coarser is None else Coarser(coarser), neighbours)
     return path
 
@@ -190,6 +195,8 @@ def _beside(path: Path, step: int, asked: bool) -> str:
     half, last = path.half(step), path.records[-1]
     system, record = (path.system(step), last) if half is None else (half.system, last.of_half(half))
     doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in path.records)
+    if not asked and path.model.stops_itself:
+        return ""  # pushed states would have to find ways round all that presses, which takes longer than the path
     here = point(system, record.q, record.lam, negative=record.negative)
     return look_around(system, here, doubtful, Newton())
 
@@ -295,12 +302,17 @@ def _resume_before(
     fresh = Path(model, symmetry=symmetry)
     fresh.records = [record for record in path.records if record.step < kept]
     fresh.steps = path.steps[:kept]
-    target = new_file(fresh, file)
-    for index in range(len(fresh)):
-        target.add(fresh.row(index))
-    for step, end in enumerate(fresh.steps):
+    return fresh, _rewritten(fresh, file)
+
+
+def _rewritten(path: Path, file: FilePath) -> PathFile:
+    """A new file that has all that a path has, in place of an older one."""
+    target = new_file(path, file)
+    for index in range(len(path)):
+        target.add(path.row(index))
+    for step, end in enumerate(path.steps):
         target.finish_step(step, *astuple(end))
-    return fresh, target
+    return target
 
 
 def _with_model(path: Path, model: Model, symmetry: Plane | None) -> Path:
