@@ -112,20 +112,20 @@ def softness(factor: Factor, primal: int) -> float:
         factor = factor.factor
     if primal < 2:
         return 1.0
-    modes, _ = _orthonormal(factor.solve(np.random.default_rng(20).normal(size=(primal, 2))))
-    solved = factor.solve(modes)
-    compliances, turns = np.linalg.eigh(modes.T @ solved)
+    start = np.random.default_rng(20).normal(size=(primal, 2))
+    modes, _ = _orthonormal(factor.solve(start[:, 0]), factor.solve(start[:, 1]))
+    solved = np.array([factor.solve(mode) for mode in modes])
+    compliances, turns = np.linalg.eigh(modes @ solved.T)
     # the softer one first: then the triangle R of Y = Q R is graded, and the stiff one is not lost beside the soft one
     order = np.argsort(-np.abs(compliances))
-    _, triangle = _orthonormal(solved @ turns[:, order])
+    _, triangle = _orthonormal(*(turns[:, order].T @ solved))
     inverse = np.linalg.inv(triangle)
     stiffnesses = np.abs(np.linalg.eigvalsh((inverse.T * compliances[order]) @ inverse))
     return float(stiffnesses.min() / stiffnesses.max())
 
 
-def _orthonormal(pair: Array) -> tuple[Array, Array]:
-    """Two columns (n, 2) made orthonormal (Gram-Schmidt, twice), and the triangle (2, 2) that was taken out."""
-    first, second = pair[:, 0], pair[:, 1]
+def _orthonormal(first: Array, second: Array) -> tuple[Array, Array]:
+    """Two vectors (n,) made orthonormal (Gram-Schmidt, twice), as rows, and the triangle (2, 2) that was taken out."""
     size = float(np.sqrt(first @ first))
     first = first / size
     share = 0.0
@@ -133,7 +133,7 @@ def _orthonormal(pair: Array) -> tuple[Array, Array]:
         more = float(first @ second)
         second, share = second - more * first, share + more
     rest = float(np.sqrt(second @ second))
-    return np.column_stack((first, second / rest)), np.array([[size, share], [0.0, rest]])
+    return np.array([first, second / rest]), np.array([[size, share], [0.0, rest]])
 
 
 def without(factor: Factor, x: Array, mode: Array) -> Array:
