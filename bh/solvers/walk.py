@@ -93,9 +93,13 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
                 return
             target, imbalance, spent = found
             yield replace(
-                item, point=target, iterations=item.iterations + spent, imbalance=imbalance, critical=(),
+                item,
+                point=target,
+                iterations=item.iterations + spent,
+                imbalance=imbalance,
+                critical=(),
                 factorised=None,
-            )  # fmt: skip
+            )
             return
         yield item
         if left * now < 0.0:
