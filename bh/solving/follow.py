@@ -27,7 +27,7 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.neighbours import look_around
 from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
-from bh.solvers.points import LOAD, Point, point
+from bh.solvers.points import LOAD, Increment, Point, point
 from bh.solvers.walk import Strategy, Walk, walk
 from bh.solving.coarser import Coarser
 from meshes.mesh import count
@@ -98,11 +98,12 @@ def _walk(
         for step in range(len(path.steps), len(model.steps)):
             with one_blas_thread():
                 way = strategy if coarser is None else coarser.guiding(strategy, model.mesh, step)
-                end = _run_step(path, step, way, report, target)
+                end, last = _run_step(path, step, way, report, target)
                 if end.reached and step == len(model.steps) - 1:
                     end = _stable_end(path, strategy)
                 if end.reached and neighbours is not False:
-                    end = StepOutcome(end.outcome, _beside(path, step, bool(neighbours)))
+                    end = StepOutcome(end.outcome, _beside(path, step, bool(neighbours), last))
+                del last  # its factor takes memory, which the next step may need
             path.steps.append(end)
             if target is not None:
                 target.finish_step(step, *astuple(end))
@@ -131,7 +132,8 @@ def _opened(
 
 def _run_step(
     path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
-) -> StepOutcome:
+) -> tuple[StepOutcome, Increment | None]:
+    """How a step ended, and its last increment; None where nothing was left to solve."""
     began = time.perf_counter()
     try:
         half = path.half(step)
@@ -139,7 +141,7 @@ def _run_step(
     except NotHeldError as error:  # in a state that nobody knew before
         if not path.records:
             raise
-        return StepOutcome(Outcome.MECHANISM, str(error))
+        return StepOutcome(Outcome.MECHANISM, str(error)), None
 
     def accept(record: Record) -> None:
         record = record if half is None else record.of_whole(half)
@@ -169,10 +171,11 @@ def _run_step(
         ):  # later steps do not store their start
             history.insert(0, origin)
     goal, tolerance = _goal(path, step, half)
+    item: Increment | None = None
     for item in walk(Walk(system, strategy, tuple(history), increment, origin, goal, tolerance)):
         now = time.perf_counter()
         if not item.reached:
-            return StepOutcome(item.outcome, item.note, item.iterations)
+            return StepOutcome(item.outcome, item.note, item.iterations), item
         at = item.point
         accept(
             Record(
@@ -183,20 +186,23 @@ def _run_step(
         )  # fmt: skip
         report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
         began = time.perf_counter()
-    return StepOutcome(Outcome.REACHED)
+    return StepOutcome(Outcome.REACHED), item
 
 
-def _beside(path: Path, step: int, asked: bool) -> str:
+def _beside(path: Path, step: int, asked: bool, item: Increment | None) -> str:
     """A clause on another stable state beside the end of a step, or an empty string.
 
     It is looked for where it is `asked`, where an increment of the path was cut or took many iterations, where it has
     jumped or passed a critical point, and where a mode hardly resists; the look's iterations are not the path's.
     """
-    half, last = path.half(step), path.records[-1]
-    system, record = (path.system(step), last) if half is None else (half.system, last.of_half(half))
+    half = path.half(step)
+    system = path.system(step) if half is None else half.system
     doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in path.records)
     if not asked and path.model.stops_itself:
         return ""  # pushed states would have to find ways round all that presses, which takes longer than the path
+    if item is not None:
+        return look_around(system, item.point, doubtful, Newton(), item.factorised)
+    record = path.records[-1] if half is None else path.records[-1].of_half(half)
     here = point(system, record.q, record.lam, negative=record.negative)
     return look_around(system, here, doubtful, Newton())
 
