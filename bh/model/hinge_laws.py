@@ -159,17 +159,32 @@ class MomentTable(HingeLaw):
         return turn - a[at], m[at], work[at], slope[piece]
 
     def energy(self, turn: Array, k: float) -> Array:  # noqa: ARG002 - the table has its own stiffness
-        """(k,) area below the curve."""
+        """(k,) area below the curve.
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         past, m, work, slope = self._piece(turn)
         return np.asarray(work + (m + 0.5 * slope * past) * past)
 
     def moment(self, turn: Array, k: float) -> Array:  # noqa: ARG002
-        """(k,) value of the curve."""
+        """(k,) value of the curve.
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         past, m, _, slope = self._piece(turn)
         return np.asarray(m + slope * past)
 
     def stiffness(self, turn: Array, k: float) -> Array:  # noqa: ARG002
-        """(k,) slope of the curve, at a point the one of larger turns."""
+        """(k,) slope of the curve, at a point the one of larger turns.
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         return self._piece(turn)[3]
 
 
@@ -207,15 +222,30 @@ class Bilinear(HingeLaw):
         return np.asarray(np.sign(turn) * np.maximum(np.abs(turn) - self.knee, 0.0))
 
     def energy(self, turn: Array, k: float) -> Array:
-        """(k,) k turn^2 / 2, less what the change of stiffness takes."""
+        """(k,) k turn^2 / 2, less what the change of stiffness takes.
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         return np.asarray(0.5 * k * turn**2 + 0.5 * (self.beyond - k) * self._past(turn) ** 2)
 
     def moment(self, turn: Array, k: float) -> Array:
-        """(k,) two straight lines."""
+        """(k,) two straight lines.
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         return np.asarray(k * turn + (self.beyond - k) * self._past(turn))
 
     def stiffness(self, turn: Array, k: float) -> Array:
-        """(k,) their slopes."""
+        """(k,) their slopes.
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         return np.where(np.abs(turn) > self.knee, self.beyond, k)
 
 
@@ -245,15 +275,30 @@ class Softening(HingeLaw):
             raise ModelError(f"softening: peak = {self.peak} cannot be; give a positive turn")
 
     def energy(self, turn: Array, k: float) -> Array:
-        """(k,) k peak^2 / 2 log(1 + (turn / peak)^2)."""
+        """(k,) k peak^2 / 2 log(1 + (turn / peak)^2).
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         return np.asarray(0.5 * k * self.peak**2 * np.log1p((turn / self.peak) ** 2))
 
     def moment(self, turn: Array, k: float) -> Array:
-        """(k,) k turn / (1 + (turn / peak)^2)."""
+        """(k,) k turn / (1 + (turn / peak)^2).
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         return np.asarray(k * turn / (1.0 + (turn / self.peak) ** 2))
 
     def stiffness(self, turn: Array, k: float) -> Array:
-        """(k,) k (1 - (turn / peak)^2) / (1 + (turn / peak)^2)^2, negative beyond the peak."""
+        """(k,) k (1 - (turn / peak)^2) / (1 + (turn / peak)^2)^2, negative beyond the peak.
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         s = (turn / self.peak) ** 2
         return np.asarray(k * (1.0 - s) / (1.0 + s) ** 2)
 
@@ -307,7 +352,13 @@ class ElasticPlastic(HingeLaw):
         return True
 
     def respond(self, turn: Array, history: Array, k: float) -> Response:
-        """The return mapping from what was accepted last."""
+        """The return mapping from what was accepted last.
+
+        Args:
+            turn: (k,) phi - rest, rad.
+            history: (k, 2) permanent turn and the sum of its changes, rad.
+            k: stiffness at rest, N mm / (mm rad).
+        """
         kinematic, H, My = self.hardens == "kinematic", self.hardening, self.yield_moment
         p, a = history.T
         trial = k * (turn - p)

@@ -284,6 +284,9 @@ class Remembering(Protocol):
         Args:
             q: (n,) unknowns.
             lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            an array of the shape of `history`.
         """
         ...
 

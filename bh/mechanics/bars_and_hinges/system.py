@@ -234,7 +234,12 @@ class BarsAndHingesSystem(SupportedSheet):
         return self._straight(x, lam, self.elements.couple.start).stiffness
 
     def history_at(self, q: Array, lam: float) -> Array:
-        """(m, 2) what creases remember where this state is accepted; see `bh.solvers.system.Remembering`."""
+        """(m, 2) what creases remember where this state is accepted; see `bh.solvers.system.Remembering`.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         assert self.curves is not None
         angles = dihedral_angles(self.near(q, lam), self.mesh.topology.hinges)
         return self.curves.accepted(angles - self.load_step.rest.at(lam))

@@ -152,7 +152,12 @@ class TurningEdges(SupportedSheet):
         return k if self.curves is None else self.spring_stiffness(self.turns(x, q[self.moving :], lam))
 
     def history_at(self, q: Array, lam: float) -> Array:
-        """(m, 2) what creases remember where this state is accepted; see `bh.solvers.system.Remembering`."""
+        """(m, 2) what creases remember where this state is accepted; see `bh.solvers.system.Remembering`.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         e = self.elements
         assert self.curves is not None
         x = self.near(q, lam)
