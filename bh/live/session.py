@@ -108,6 +108,8 @@ class Session:
         Raises:
             ModelError: the sheet cannot be solved as described.
         """
+        if any(crease.law is not None and crease.law.remembers for crease in model.creases.values()):
+            raise ModelError("creases that yield remember their way; fold them by bh.trace or bh run")
         self.model = replace(model if model.supports else held(model), steps=())
         self._settings = settings or LoadControl()
         self._formulation = formulation(self.model.formulation)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
@@ -27,7 +27,7 @@ from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.runtime import viewer
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import ARC, CriticalPoint
-from bh.solvers.system import Limited, Rounded
+from bh.solvers.system import Limited, Remembering, Rounded
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -256,11 +256,26 @@ class Path:
         index = range(len(self))[index]
         if index not in self._states:
             record = self.records[index]
-            self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
+            with self._remembering(record):
+                self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
         ended = str(self.outcome) if index == len(self) - 1 and self.ended_early else ""
         if self._states[index].ended != ended:
             self._states[index] = replace(self._states[index], ended=ended)
         return self._states[index]
+
+    @contextmanager
+    def _remembering(self, record: Record) -> Iterator[None]:
+        """The record's system as it was there; a run that is under way finds it afterwards as it has left it."""
+        system = self.system(record.step)
+        if record.history is None or not isinstance(system, Remembering):
+            yield
+            return
+        kept = system.history
+        system.remember(record.history)
+        try:
+            yield
+        finally:
+            system.remember(kept)
 
     def observe(self, step: int, q: Array, lam: float, stable: bool | None = None) -> State:
         """What is to be read from unknowns q (n,) of a step at `lam`; of the whole sheet where halves are solved.
@@ -289,7 +304,10 @@ class Path:
             the system and the record.
         """
         record = self.records[range(len(self))[index]]
-        return self.system(record.step), record
+        system = self.system(record.step)
+        if record.history is not None and isinstance(system, Remembering):
+            system.remember(record.history)
+        return system, record
 
     def plot(self, **options: Any) -> Any:
         """Show the last state as a picture; options of `bh.plotting.show`."""
@@ -369,7 +387,7 @@ class Path:
         return StateRow(
             record.step, record.lam, record.iterations, record.imbalance, record.negative, record.mode, record.jumped,
             record.wall_time_s, record.next_increment, (energy.stretching, energy.bending, energy.folding),
-            record.note, record.cuts, record.q, self[index].points, critical,
+            record.note, record.cuts, record.q, self[index].points, critical, record.history,
         )  # fmt: skip
 
     def system(self, step: int) -> SheetSystem:

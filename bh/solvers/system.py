@@ -305,6 +305,45 @@ def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, 
 
 
 @runtime_checkable
+class Remembering(Protocol):
+    """Ability of a system: what it answers may depend on states that were accepted before.
+
+    Between two accepted states it answers as an elastic one whose energy includes what is dissipated on the way from
+    the last of them. Who accepts a state says so: `system.remember(system.history_at(q, lam))`.
+    """
+
+    @property
+    def remembers(self) -> bool:
+        """Does it, in this model?"""
+        ...
+
+    @property
+    def history(self) -> Array:
+        """What was accepted last, in the system's own order."""
+        ...
+
+    def history_at(self, q: Array, lam: float) -> Array:
+        """What is to be remembered where a state is accepted.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            an array of the shape of `history`.
+        """
+        ...
+
+    def remember(self, history: Array) -> None:
+        """Go on from there.
+
+        Args:
+            history: as `history_at` gives it.
+        """
+        ...
+
+
+@runtime_checkable
 class Hinged(Protocol):
     """A system with hinges that close, and stiffen as they do."""
 

@@ -28,11 +28,13 @@ from bh.solvers.neighbours import look_around
 from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import LOAD, Increment, Point, point
+from bh.solvers.system import Remembering
 from bh.solvers.walk import Strategy, Walk, walk
 from bh.solving.coarser import Coarser
 from meshes.mesh import count
 
 if TYPE_CHECKING:
+    from bh.formulations.protocols import SheetSystem
     from bh.formulations.symmetry_reduction import Half
     from bh.loading.symmetry import Plane
 
@@ -143,7 +145,12 @@ def _run_step(
             raise
         return StepOutcome(Outcome.MECHANISM, str(error)), None
 
+    memory = system if isinstance(system, Remembering) and system.remembers else None
+
     def accept(record: Record) -> None:
+        if memory is not None:
+            memory.remember(memory.history_at(record.q, record.lam))
+            record = replace(record, history=memory.history)
         record = record if half is None else record.of_whole(half)
         path.records.append(record)
         if target is not None:
@@ -164,7 +171,7 @@ def _run_step(
             began = time.perf_counter()
     else:
         recent = [record if half is None else record.of_half(half) for record in _recent(done)]
-        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in recent]
+        history = _points(system, memory, done, recent)
         increment = done[-1].next_increment
         if (
             len(history) < 3 and step > 0 and not any(r.jumped for r in done)
@@ -186,7 +193,22 @@ def _run_step(
         )  # fmt: skip
         report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
         began = time.perf_counter()
-    return StepOutcome(Outcome.REACHED), item
+    # a tangent made before the end was remembered is not that of the end
+    return StepOutcome(Outcome.REACHED), item if memory is None else None
+
+
+def _points(
+    system: SheetSystem, memory: Remembering | None, done: list[Record], recent: list[Record]
+) -> list[Point]:
+    """The last records of a step as the run has seen them: each with what was remembered before it was accepted."""
+    found = []
+    for r, behind in zip(recent, [None, *done][len(done) - len(recent) :], strict=False):
+        if memory is not None and behind is not None and behind.history is not None:
+            memory.remember(behind.history)
+        found.append(point(system, r.q, r.lam, r.mode, negative=r.negative))
+    if memory is not None and done[-1].history is not None:
+        memory.remember(done[-1].history)
+    return found
 
 
 def _beside(path: Path, step: int, asked: bool, item: Increment | None) -> str:

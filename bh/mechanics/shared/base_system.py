@@ -11,6 +11,7 @@ from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
 from bh.mechanics.shared import penetration as hinge_penetration
+from bh.mechanics.shared.crease_curves import CreaseCurves
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.shared.rigid_contact import RigidContact
@@ -38,6 +39,7 @@ class SupportedSheet:
     """
 
     size: int
+    curves: CreaseCurves | None = None  # None where all creases are straight lines
 
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
@@ -111,6 +113,25 @@ class SupportedSheet:
         if not self.contact_blocks.known(found[0]):
             vars(self).pop("_pattern", None)
         return found
+
+    @property
+    def remembers(self) -> bool:
+        """Does what it answers depend on states before (`bh.solvers.system.Remembering`)?"""
+        return self.curves is not None and self.curves.remembers
+
+    @property
+    def history(self) -> Array:
+        """(m, 2) of creases as they were accepted last, rad; see `State.crease_history`."""
+        return np.zeros((0, 2)) if self.curves is None else self.curves.history
+
+    def remember(self, history: Array) -> None:
+        """Go on from a history (m, 2).
+
+        Args:
+            history: as `history_at` gives it.
+        """
+        if self.curves is not None:
+            self.curves.history = history
 
     def free_part(self, q: Array, dq: Array, lam: float) -> float:
         """How much of a step dq (size,) from q no panels stand in, 0 to 1; see `bh.solvers.system.Limited`."""
