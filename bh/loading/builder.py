@@ -12,6 +12,7 @@ from bh.errors import ModelError, NotHeldError
 from bh.loading.asked import Asked, StepInHand
 from bh.loading.load_step import LoadStep, StepEnd, edge_hinges, hinge_name
 from bh.loading.supports import Supports, isostatic
+from bh.model.actuations import Indenter
 from bh.model.constraints import Constraints, Prescribed, resolve
 from bh.model.crease_law import CreaseLaw
 from bh.model.hinge_laws import HingeLaw
@@ -192,7 +193,14 @@ class LoadStepBuilder:
             self._asked.displaced[node, (x, y, z)] = begin + by
 
     def attach(self, body: Body) -> None:
-        """Let a body act on the sheet in this step."""
+        """Let a body act on the sheet in this step.
+
+        Raises:
+            ModelError: another indenter of the step has its name, by which its force is told.
+        """
+        names = {other.name for other in self._step.bodies if isinstance(other, Indenter)}
+        if isinstance(body, Indenter) and body.name in names:
+            raise ModelError(f"two indenters of a step are named '{body.name}'; give each a name of its own")
         self._step.bodies.append(body)
 
     # ------------------------------------------------------------------------------- steps
