@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +14,7 @@ from bh.solvers.saddle import MultiplierMatrix
 
 Array = NDArray[np.float64]
 NEUTRAL = 1e-13  # shift, in parts of the diagonal, at which an eigenvalue is zero but for rounding
+FEW = 12  # shifts among which the smallest that helps is sought by halving
 ROUNDED = 1e-11  # one that takes off what rounding makes of neutral modes in a badly conditioned matrix
 GAP = 1e-6  # a mode whose stiffness is less than this part of the next one's is neutral
 KNOWN_GAP = 1e-3  # of a mode that was so before: what is left of the imbalance gives it some stiffness
@@ -116,17 +119,52 @@ def factorise_shifted(
         least: shift at least.
 
     Returns:
-        the factor and its shift; None for the factor where the shift would exceed `largest`.
+        the factor and its shift; None and infinity where the shift would exceed `largest`.
     """
-    if shift < 1e-9:
-        shift = least
-    while shift <= largest:
+    shift = least if shift < 1e-9 else shift
+    if shift > largest:
+        return None, math.inf
+    try:
+        return matrix.factorise(shift), shift
+    except IndefiniteError:
+        ladder = _ladder(shift, largest)
+    return _halving(matrix, ladder) if 0 < len(ladder) <= FEW else _in_turn(matrix, ladder)
+
+
+def _ladder(shift: float, largest: float) -> list[float]:
+    """Shifts to try behind one that was too small, up to `largest`."""
+    steps: list[float] = []
+    while True:
+        # a matrix that is indefinite at zero has been looked at closely; go past what it calls rounding
+        shift = ROUNDED if shift < ROUNDED else max(4.0 * shift, 1e-9)
+        if shift > largest:
+            return steps
+        steps.append(shift)
+
+
+def _in_turn(matrix: Matrix, ladder: Sequence[float]) -> tuple[Factor | None, float]:
+    """The first shift that helps."""
+    for shift in ladder:
         try:
             return matrix.factorise(shift), shift
         except IndefiniteError:
-            # a matrix that is indefinite at zero has been looked at closely; go past what it calls rounding
-            shift = ROUNDED if shift < ROUNDED else max(4.0 * shift, 1e-9)
-    return None, shift
+            continue
+    return None, math.inf
+
+
+def _halving(matrix: Matrix, ladder: Sequence[float]) -> tuple[Factor | None, float]:
+    """The same for few shifts: where the largest does not help none does, else the least is found by halving."""
+    try:
+        found, low, high = matrix.factorise(ladder[-1]), 0, len(ladder) - 1
+    except IndefiniteError:
+        return None, math.inf
+    while low < high:
+        middle = (low + high) // 2
+        try:
+            found, high = matrix.factorise(ladder[middle]), middle
+        except IndefiniteError:
+            low = middle + 1
+    return found, ladder[high]
 
 
 def lowest_mode(

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import base64
-import json
-import struct
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 import bh.studio.messages as asked
 from bh.errors import InputError
-from bh.live import Controls, Frame, Session
+from bh.live import Controls, Session
 from bh.live.session import held
 from bh.model.sheet import Sheet
-from bh.scene.folding import MATERIALS
 from bh.solving.trace import trace
-from bh.studio.exports import FORMATS, export
-from bh.studio.sheets import LIBRARY, LiveSheet, material_of, of_file, of_library
+from bh.studio.colours import offered, top_of
+from bh.studio.exports import export
+from bh.studio.frames import Json, described, head_of, line, packed
+from bh.studio.sheets import LiveSheet, material_of, of_file, of_library
 
-Array = NDArray[np.float64]
 BUDGET = 0.03  # s of an update
-Json = dict[str, object]
 
 
 class Desk:
@@ -38,6 +34,7 @@ class Desk:
         self.material = "card"
         self._colour = "bending"
         self._shown: tuple[object, ...] = ()
+        self._snapped = False  # since the last picture
         self.put(sheet or of_library("arc"))
 
     # ------------------------------------------------------------------------------- what is asked
@@ -55,6 +52,9 @@ class Desk:
         if controls is not None:
             self.session.ask(controls)
         self.frame = self.session.update(0.0)
+        self._colours = offered(self.frame.state)
+        if self._colour != "none" and self._colour not in self._colours:
+            self._colour = "bending"
         self._shown = ()
 
     def take(self, message: asked.Asked) -> list[Json]:
@@ -84,7 +84,7 @@ class Desk:
             case asked.Plain(do=what):
                 return self._plain(what)
             case asked.Colour(by=by):
-                self._colour, self._shown = by, ()
+                self._paint(by)
             case asked.Export(what=what):
                 name, data = export(what, self.sheet, self.session, self.session.rest(20.0))
                 return [{"kind": "file", "name": name, "data": base64.b64encode(data).decode()}]
@@ -112,8 +112,14 @@ class Desk:
             self.session.ask(Controls(dict.fromkeys(self.session.creases, 0.0)))
             self.session.let_go()
         elif not (self.session.undo() if what == "undo" else self.session.redo()):
-            return [_line(f"there is nothing to {what}")]
+            return [line(f"there is nothing to {what}")]
         return []
+
+    def _paint(self, by: str) -> None:
+        if by != "none" and by not in self._colours:
+            known = ", ".join((*self._colours, "none"))
+            raise InputError(f"this sheet cannot be coloured by '{by}'; choose one of {known}")
+        self._colour, self._shown = by, ()
 
     def _hold(self, node: int, on: bool) -> None:
         model, mesh = self.sheet.model, self.session.mesh
@@ -139,7 +145,7 @@ class Desk:
         """The same state by a run from flat, on this mesh and on a coarser one: how far it is off."""
         frame = self.session.rest(20.0)
         if not any(step.actuations for step in self.session.scene().steps):
-            return _line("there is nothing to check yet")
+            return line("there is nothing to check yet")
         path = trace(self.session.scene(), estimate=True, warn=False)
         off = float(np.abs(path[-1].points - frame.points).max())
         error = path.accuracy
@@ -148,7 +154,7 @@ class Desk:
             if error is not None and error.estimate is not None
             else f"its error on this mesh is not known: {path.estimate_reason}"
         )
-        return _line(f"a run from flat ends as {path.outcome}, at most {off:.2g} mm from here; {estimate}")
+        return line(f"a run from flat ends as {path.outcome}, at most {off:.2g} mm from here; {estimate}")
 
     # ------------------------------------------------------------------------------- what is shown
 
@@ -160,91 +166,41 @@ class Desk:
     def _now(self) -> tuple[object, ...]:
         return self.session.wanted, self.sheet
 
+    def work(self, budget: float = BUDGET) -> None:
+        """Work for a while at what is asked.
+
+        Args:
+            budget: s of wall time.
+        """
+        self._shown = self._now()
+        self.frame = self.session.update(budget)
+        self._snapped = self._snapped or self.frame.snapped
+
+    def picture(self) -> bytes:
+        """The newest frame as it travels.
+
+        Returns:
+            see `packed`; after the numbers (n, 3) positions, mm, and (n,) values of the colour.
+        """
+        frame = self.frame
+        chosen = self._colours.get(self._colour)
+        values = np.zeros(len(frame.points)) if chosen is None else chosen.values(frame.state)
+        head = {**head_of(frame), "snapped": self._snapped, "top": top_of(values)}
+        self._snapped = False
+        return packed(head, frame.points, values)
+
     def update(self, budget: float = BUDGET) -> bytes:
-        """Work for a while, and the frame that came of it: a length, JSON of numbers, positions, colours.
+        """Work for a while, and the frame that came of it.
 
         Args:
             budget: s of wall time.
 
         Returns:
-            4 bytes (little endian) length of the JSON text, the text, then float32: (n, 3) positions, mm, and (n,)
-            values of the colour.
+            see `picture`.
         """
-        self._shown = self._now()
-        self.frame = frame = self.session.update(budget)
-        values = self._values(frame)
-        top = float(np.percentile(values, 99.0)) if len(values) else 0.0
-        head = {
-            "kind": "frame",
-            "rest": frame.at_rest,
-            "note": frame.note,
-            "snapped": frame.snapped,
-            "stable": frame.state.stable,
-            "energy": frame.state.energy.as_dict(),
-            "asked": dict(frame.wanted.folds),
-            "folds": frame.fold_angles(),
-            "grips": {str(n): list(g.to) for n, g in frame.wanted.grips.items()},
-            "forces": {str(n): list(f) for n, f in frame.forces.items()},
-            "strain": float(np.abs(frame.state.strain).max()),
-            "top": top,
-            "ms": 1e3 * frame.seconds,
-            "iterations": frame.iterations,
-        }
-        text = json.dumps(head, allow_nan=False).encode()
-        text += b" " * (-len(text) % 4)
-        return struct.pack("<I", len(text)) + text + _floats(frame.points) + _floats(values)
-
-    def _values(self, frame: Frame) -> Array:
-        state = frame.state
-        if self._colour in ("bending", "stretching"):
-            return np.asarray(state.nodal_energy_density(self._colour))
-        values = np.zeros(len(state.points))
-        if self._colour == "strain":
-            np.maximum.at(values, state.mesh.topology.edges[:, 0], np.abs(state.strain))
-            np.maximum.at(values, state.mesh.topology.edges[:, 1], np.abs(state.strain))
-        return values
+        self.work(budget)
+        return self.picture()
 
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name."""
-        mesh, model = self.session.mesh, self.sheet.model
-        creases = [
-            {
-                "name": name,
-                "fold": mesh.folds.get(name, "flat"),
-                "edges": np.asarray(mesh.crease_edges(name)).ravel().tolist(),
-                "full": self.sheet.full.get(name, np.pi),
-                "handled": name in self.session.creases,
-            }
-            for name in mesh.creases
-        ]
-        held_nodes = sorted({int(n) for s in model.supports for n in _nodes(s)})
-        return {
-            "kind": "sheet",
-            "name": self.sheet.name,
-            "points": np.round(mesh.points, 6).ravel().tolist(),
-            "triangles": mesh.triangles.ravel().tolist(),
-            "boundary": mesh.topology.boundary.ravel().tolist(),
-            "creases": creases,
-            "held": held_nodes,
-            "material": {"name": self.material, "E": model.sheet.E, "nu": model.sheet.nu, "t": model.sheet.t},
-            "materials": {name: about for name, (_, _, _, about) in MATERIALS.items()},
-            "library": list(LIBRARY),
-            "formats": list(FORMATS),
-            "formulation": model.formulation,
-            "unknowns": self.session.size,
-            "percent": self.sheet.percent,
-            "remarks": list(self.sheet.remarks),
-        }
-
-
-def _nodes(support: object) -> list[int]:
-    at = getattr(support, "at", ())
-    return [] if isinstance(at, str) else [int(node) for node in at]
-
-
-def _line(text: str) -> Json:
-    return {"kind": "line", "text": text}
-
-
-def _floats(values: Array) -> bytes:
-    return np.ascontiguousarray(values, dtype="<f4").tobytes()
+        return described(self.sheet, self.session, self.material, self._colours, self._colour)

@@ -103,7 +103,7 @@ class Colour(Message):
     """What the colours of the sheet show."""
 
     do: Literal["colour"]
-    by: Literal["none", "bending", "stretching", "strain"]
+    by: str
 
 
 class Export(Message):

@@ -180,10 +180,13 @@ class Window(tornado.websocket.WebSocketHandler):
                     waiting.append(self.queue.get_nowait())
                 for message in newest(waiting):
                     await self._do(desk, message)
-            await self.drawn.wait()
             if desk.busy:
                 try:
-                    frame = await run(self.studio.pool, desk.update)
+                    await run(self.studio.pool, desk.work)
+                    if desk.busy and not self.drawn.is_set():
+                        continue  # it is solved as fast as it goes, and shown as fast as the browser draws
+                    await self.drawn.wait()
+                    frame = await run(self.studio.pool, desk.picture)
                 except Exception as error:  # a sheet that breaks takes its session down, not the server
                     await self._say(_fault(error))
                     desk.put(desk.sheet)

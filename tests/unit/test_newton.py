@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bh.solvers.factor import Descent
 from bh.solvers.linear import linear_response
 from bh.solvers.load_control import LoadControl, jump
-from bh.solvers.matrices import BandMatrix
+from bh.solvers.matrices import BandFactor, BandMatrix
 from bh.solvers.modes import (
     KNOWN_GAP,
     count_negative,
@@ -247,6 +247,30 @@ def test_shift_has_a_limit() -> None:
     factor, shift = factorise_shifted(band(np.diag([1.0, -1.0])), 0.0, largest=1e-5)
     assert factor is None
     assert shift > 1e-5
+
+
+@pytest.mark.parametrize("lowest", [-1e-10, -3e-9, -2e-7, -9e-7, -0.9e-5, -1e-4])
+def test_a_small_limit_costs_few_factorisations(lowest: float) -> None:
+    """The shift is the smallest of 0, 1e-11, 1e-9, 4e-9, ... that helps, found by halving, or none at two looks."""
+    looks: list[float] = []
+
+    class Counted(BandMatrix):
+        def factorise(self, shift: float = 0.0) -> BandFactor:
+            looks.append(shift)
+            return super().factorise(shift)
+
+    # mean of the diagonal 0.75: the last entry is shifted by 0.75e-3 of the shift
+    matrix = band(np.diag([1.0, 1.0, 1.0, lowest * 0.75e-3]))
+    tried = [0.0, 1e-11, *(1e-9 * 4.0**k for k in range(7))]
+    helps = [s for s in tried if 1.0 * s * 0.75e-3 + lowest * 0.75e-3 > 0.0]
+    factor, shift = factorise_shifted(Counted(matrix.ab, matrix.order), 0.0, largest=1e-5)
+    if not helps:
+        assert factor is None
+        assert len(looks) == 2
+    else:
+        assert factor is not None
+        assert shift == pytest.approx(helps[0], rel=1e-12)
+        assert len(looks) <= 5
 
 
 def test_neutral_mode_is_not_indefinite() -> None:

@@ -157,6 +157,18 @@ def test_a_crease_lights_up_and_a_dot_holds(window: Visit) -> None:
     page.wait_for_function(f"studio.sheet.held.length === {held + 1}")
 
 
+def test_colours_have_a_scale_with_a_unit(window: Visit) -> None:
+    page = window.page
+    page.locator("#percent").fill("30")
+    window.rests("Object.values(head.asked)[0] > 0.5")
+    for name, unit in (("stress", "MPa"), ("curvature", "1/mm"), ("bending", "N mm / mm²")):
+        page.locator("#colour").select_option(name)
+        page.wait_for_function(f"document.getElementById('unit').textContent.endsWith('{unit}')")
+        assert float(page.locator("#top").inner_text()) > 0.0
+    page.locator("#colour").select_option("none")
+    page.wait_for_function("document.getElementById('scale').hidden")
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(360, "dark"), (1400, "light"), (2560, "dark")])
 def test_nobody_is_shut_out(chromium: Any, address: str, width: int, scheme: str) -> None:
     """axe-core finds nothing, and nothing is wider than the window."""

@@ -296,6 +296,15 @@ def test_a_run_keeps_what_others_found(tmp_path: Path) -> None:
     assert len(of_case["shear_calibration"]) == len(again["checks"])
 
 
+def test_the_longest_cases_begin_first() -> None:
+    assert registry.longest_first(["strips", "three_point", "cone", "scan"]) == [
+        "three_point",
+        "scan",
+        "cone",
+        "strips",
+    ]
+
+
 def test_cases_at_a_time_find_the_same(tmp_path: Path) -> None:
     """By two processes: the same values in the same order, and what fails there is told here."""
     names = ["shear_calibration", "derivatives", "strips"]

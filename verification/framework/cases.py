@@ -24,12 +24,14 @@ class Study:
         chapter: key of `verification.framework.chapters.CHAPTERS`.
         long: minutes, not seconds: run only when named, and `records` keeps a run of it.
         part_of: the case with which `bh verify` runs it too.
+        seconds: rough time of a run; where cases run side by side the longest begin first.
     """
 
     name: str
     chapter: str
     long: bool = False
     part_of: str | None = None
+    seconds: float = 30.0
 
     @property
     def module(self) -> str:
@@ -38,36 +40,37 @@ class Study:
 
 
 STUDIES = (
-    Study("strips", "3"),
-    Study("shear_calibration", "3"),
+    Study("strips", "3", seconds=4),
+    Study("shear_calibration", "3", seconds=1),
     Study("cone", "3"),
-    Study("appendix_b", "B"),
+    Study("appendix_b", "B", seconds=7),
     Study("consistent", "solver"),
-    Study("convergence", "solver"),
+    Study("convergence", "solver", seconds=100),
     Study("one_row", "solver"),
     Study("fig3_6", "3"),
     Study("fig3_8", "3", long=True),
     Study("fig3_10", "3", long=True),
-    Study("derivatives", "solver"),
+    Study("derivatives", "solver", seconds=1),
     Study("fig3_9", "3"),
     Study("fig3_11", "3"),
     Study("sheets_3", "3"),
     Study("fig5_5", "5"),
-    Study("fig5_9", "5"),
+    Study("fig5_9", "5", seconds=110),
     Study("fig5_10", "5"),
     Study("fig5_11", "5"),
-    Study("fig5_3", "5"),
-    Study("appendix_a", "A"),
-    Study("pinch_shell", "5"),
-    Study("scan", "3"),
-    Study("hard_cases", "solver"),
-    Study("appendix_b_shell", "B", part_of="appendix_b"),
+    Study("fig5_3", "5", seconds=60),
+    Study("appendix_a", "A", seconds=4),
+    Study("pinch_shell", "5", seconds=60),
+    Study("scan", "3", seconds=120),
+    Study("hard_cases", "solver", seconds=140),
+    Study("appendix_b_shell", "B", part_of="appendix_b", seconds=250),
     Study("appendix_b_cross", "B", part_of="appendix_b"),
-    Study("appendix_b_fields", "B", part_of="appendix_b"),
-    Study("appendix_b_sheets", "B", part_of="appendix_b"),
+    Study("appendix_b_fields", "B", part_of="appendix_b", seconds=50),
+    Study("appendix_b_sheets", "B", part_of="appendix_b", seconds=6),
     Study("shell_benchmarks", "solver"),
+    Study("eigenvalues", "solver"),
     Study("published", "solver"),
-    Study("tables4", "4"),
+    Study("tables4", "4", seconds=1),
     Study("speed_error", "solver", long=True),
     Study("map", "solver", long=True),
     Study("defaults", "solver", long=True),
@@ -76,12 +79,12 @@ STUDIES = (
     Study("attack", "solver", long=True),
     Study("branches", "solver", long=True),
     Study("drawings", "solver", long=True),
-    Study("gradients", "solver"),
+    Study("gradients", "solver", seconds=50),
     Study("top_down", "4"),
-    Study("bottom_up", "4"),
-    Study("three_point", "4"),
+    Study("bottom_up", "4", seconds=1),
+    Study("three_point", "4", seconds=550),
     Study("forward", "6"),
-    Study("problem_a", "6"),
+    Study("problem_a", "6", seconds=60),
     Study("problem_b", "6"),
     Study("problem_c", "6", long=True),
     Study("landing", "6", long=True),
@@ -102,6 +105,11 @@ def case(name: str) -> Case:
         raise InputError(f"there is no verification case '{name}'; use one of {', '.join(ALL_CASES)}")
     found: Case = import_module(BY_NAME[name].module).run
     return found
+
+
+def longest_first(names: Sequence[str]) -> list[str]:
+    """The names in the order in which several processes are best given them: the longest is not begun last."""
+    return sorted(names, key=lambda name: -BY_NAME[name].seconds)
 
 
 def with_parts(names: Sequence[str]) -> list[str]:

@@ -19,7 +19,7 @@ from typing import Any
 from bh.errors import NotReachedWarning
 from bh.runtime.workers import Workers
 from meshes.errors import InputError
-from verification.framework.cases import BY_NAME, CASES, LONG_CASES, case
+from verification.framework.cases import BY_NAME, CASES, LONG_CASES, case, longest_first
 from verification.framework.checks import CaseResult, Context
 from verification.framework.environment import environment
 from verification.framework.folder import refuse_links
@@ -86,7 +86,9 @@ def _results(
         return
     report(f"{len(names)} cases, {jobs} at a time; each is told of when it has ended")
     with Workers(jobs) as pool:  # where one fails, or the user breaks off, all end
-        for future in as_completed([pool.submit(_silent, name, folder, quick) for name in names]):
+        for future in as_completed(
+            [pool.submit(_silent, name, folder, quick) for name in longest_first(names)]
+        ):
             yield future.result()
 
 

@@ -1,0 +1,46 @@
+// What all parts of the window share: the sheet, the newest frame, the connection, a line for the person.
+export const $ = (id) => document.getElementById(id);
+const SVG = "http://www.w3.org/2000/svg";
+export const make = (tag, attributes, parent) => {
+  const item = document.createElementNS(SVG, tag);
+  for (const [key, value] of Object.entries(attributes)) item.setAttribute(key, value);
+  parent?.append(item);
+  return item;
+};
+export const number = (v, digits = 3) => (v === 0 ? "0" : Math.abs(v) >= 1e-3 && Math.abs(v) < 1e5 ? Number(v.toPrecision(digits)).toString() : v.toExponential(2));
+export const degrees = (rad) => `${(rad * 180 / Math.PI).toFixed(1)}°`;
+
+// The sheet that lies in the window, the numbers of its newest frame, and its positions, mm.
+export const now = { sheet: null, head: null, points: null };
+
+// ---------------------------------------------------------------- the connection
+
+let socket = null;
+let wait = 500; // ms until it is tried again
+export function connect(answer, frame) {
+  const query = new URLSearchParams(location.search);
+  socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(query.get("token") ?? "")}`);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => { wait = 500; tell(""); };
+  socket.onmessage = ({ data }) => (typeof data === "string" ? answer(JSON.parse(data)) : frame(data));
+  socket.onclose = () => {
+    tell("The connection to bh is gone; what you see is the last state. It is tried again.", true);
+    setTimeout(() => connect(answer, frame), wait); wait = Math.min(2 * wait, 8000);
+  };
+}
+export const ask = (message) => { if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message)); };
+
+let quiet = 0;
+export function tell(text, stays = false) {
+  clearTimeout(quiet);
+  $("message").textContent = text; $("message").hidden = !text;
+  if (text && !stays) quiet = setTimeout(() => { $("message").hidden = true; }, 9000);
+}
+
+export function save(name, data) {
+  const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([bytes])); link.download = name; link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+export const drawn = () => { if (socket?.readyState === WebSocket.OPEN) socket.send("drawn"); };

@@ -1,0 +1,90 @@
+// Controls, numbers and curves at the side.
+import { $, ask, degrees, make, now, number } from "./common.js";
+import { light } from "./view.js";
+import { taken } from "./pull.js";
+
+const MOST = 200; // sliders of single creases
+export const history = { energy: [], force: [] };
+
+function options(select, names, chosen, first = "") {
+  select.replaceChildren();
+  if (first) select.append(new Option(first, ""));
+  for (const [value, text] of names) select.append(new Option(text, value, false, value === chosen));
+}
+
+export function panel() {
+  const { sheet } = now;
+  options($("library"), sheet.library.map((n) => [n, n]), "", "choose");
+  options($("export"), sheet.formats.map((n) => [n, n]), "", "choose");
+  options($("material"), Object.entries(sheet.materials), sheet.material.name);
+  options($("colour"), [...Object.entries(sheet.colours).map(([name, [label]]) => [name, label]), ["none", "none"]], sheet.colour);
+  $("E").value = sheet.material.E; $("t").value = sheet.material.t;
+  $("remarks").replaceChildren(...sheet.remarks.map((text) => { const li = document.createElement("li"); li.textContent = text; return li; }));
+  const box = $("sliders"); box.replaceChildren();
+  for (const crease of sheet.creases.filter((c) => c.handled).slice(0, MOST)) {
+    const label = document.createElement("label"), input = document.createElement("input"), out = document.createElement("output");
+    label.className = "wide"; label.append(`${crease.name} (${crease.fold})`, out);
+    Object.assign(input, { type: "range", min: -179, max: 179, step: 0.5, value: 0 });
+    input.setAttribute("aria-label", `fold angle of crease ${crease.name}, degrees`);
+    input.dataset.crease = crease.name;
+    input.oninput = () => ask({ do: "fold", crease: crease.name, angle: input.value * Math.PI / 180 });
+    input.onfocus = () => light(crease.name, true); input.onblur = () => light(crease.name, false);
+    box.append(label, input);
+  }
+  history.energy = []; history.force = [];
+  document.title = `${sheet.name}: bh studio`;
+}
+
+export const slider = (name) => [...$("sliders").querySelectorAll("input")].find((item) => item.dataset.crease === name);
+
+export function scale(top) {
+  const [label, unit] = now.sheet.colours[$("colour").value] ?? ["", ""];
+  $("scale").hidden = !(top > 0) || !unit;
+  $("middle").textContent = number(0.5 * top); $("top").textContent = number(top); $("unit").textContent = `${label}, ${unit}`;
+  $("scale").setAttribute("aria-label", `Colours: ${label}, from 0 to ${number(top)} ${unit}`);
+}
+
+export function numbers() {
+  const { head, sheet } = now, { energy } = head;
+  const rows = [["Energy", `${number(energy.total)} N mm`], ["of bending", `${number(energy.bending)} N mm`], ["of stretching", `${number(energy.stretching)} N mm`], ["of creases", `${number(energy.folding)} N mm`], ["Stable", head.stable === null ? "not known" : head.stable ? "yes" : "no"], ["Largest strain", `${number(100 * head.strain)} %`], ["Mesh", `${sheet.triangles.length / 3} triangles, ${sheet.formulation}`], ["Solved in", `${head.ms.toFixed(0)} ms`]];
+  const names = Object.keys(head.folds);
+  for (const name of names.slice(0, 8)) rows.push([`Fold of ${name}`, degrees(head.folds[name])]);
+  $("numbers").replaceChildren(...rows.flatMap(([a, b]) => { const dt = document.createElement("dt"), dd = document.createElement("dd"); dt.textContent = a; dd.textContent = b; return [dt, dd]; }));
+  for (const input of $("sliders").querySelectorAll("input")) {
+    const angle = head.asked[input.dataset.crease] ?? 0;
+    if (document.activeElement !== input) input.value = angle * 180 / Math.PI;
+    input.previousElementSibling.querySelector("output").textContent = degrees(head.folds[input.dataset.crease] ?? 0);
+  }
+  const full = Object.fromEntries(sheet.creases.map((c) => [c.name, c.full]));
+  const parts = names.map((name) => 100 * head.asked[name] / full[name]);
+  if (parts.length && Math.max(...parts) - Math.min(...parts) < 0.01) {
+    if (document.activeElement !== $("percent")) $("percent").value = parts[0];
+    $("percent-out").textContent = `${parts[0].toFixed(1)} %`;
+  } else $("percent-out").textContent = "each its own";
+  const badge = $("badge");
+  badge.textContent = head.note ? `cannot go on: ${head.note}` : head.snapped ? "snapped" : head.rest ? "in equilibrium" : "on its way";
+  badge.classList.toggle("away-from", Boolean(head.note) || head.snapped || !head.rest);
+  scale(head.top);
+  $("let-go").disabled = Object.keys(head.grips).length === 0;
+  if (head.rest) curves();
+}
+
+function curves() {
+  const { head, points } = now;
+  history.energy.push([history.energy.length, head.energy.total]);
+  for (const [node, force] of Object.entries(head.forces).slice(0, 1)) if (taken[node]) {
+    const d = Math.hypot(...[0, 1, 2].map((c) => points[3 * node + c] - taken[node][c]));
+    history.force.push([d, Math.hypot(...force)]);
+  }
+  curve($("energy-curve"), history.energy.slice(-400)); curve($("force-curve"), history.force.slice(-400));
+}
+
+function curve(svg, data) {
+  svg.replaceChildren(); if (data.length < 2) return;
+  const xs = data.map((d) => d[0]), ys = data.map((d) => d[1]), x0 = Math.min(...xs), x1 = Math.max(...xs), y1 = Math.max(...ys, 1e-12);
+  const w = svg.clientWidth || 280, h = svg.clientHeight || 84;
+  const at = (d) => `${6 + (w - 12) * (d[0] - x0) / (x1 - x0 || 1)} ${h - 6 - (h - 22) * d[1] / y1}`;
+  make("path", { d: "M" + data.map(at).join("L") }, svg);
+  make("text", { x: 6, y: 13 }, svg).textContent = number(y1);
+  make("text", { x: w - 6, y: h - 8, "text-anchor": "end" }, svg).textContent = number(x1);
+}
