@@ -36,6 +36,9 @@ def sheets_of(graph: Graph) -> list[Any]:
 
     Args:
         graph: healed, see `meshes.planar.heal`.
+
+    Returns:
+        the polygons, without the lines inside them.
     """
     import shapely
 

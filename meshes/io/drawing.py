@@ -266,8 +266,8 @@ def read_graph(
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
     check_crossings(np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in drawn]))
-    drawn, joined = join_dashes(drawn, gap)
     drawn, smoothed = smooth(drawn, gap, tolerance or fine * unit, diagonal)
+    drawn, joined = join_dashes(drawn, gap)
     if outline == "hull":
         drawn.append(_hull(drawn))
         remarks.append("the outline is the convex hull of what is drawn")
