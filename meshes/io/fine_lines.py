@@ -13,6 +13,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from meshes.curves import Array, Line
 from meshes.drawn_curves import Chain, lines_through
@@ -24,6 +25,7 @@ STRAIGHT = 0.05  # rad that it turns in all, at least
 MET = (
     1.0 / 3.0
 )  # of its vertices: where so many are ends of other lines these are rulings, and the facets are meant
+LONG = 8.0  # times the median segment: such a segment is straight, and no curve goes on through it
 WITHIN = 0.25  # of the gap: how far the vertices may be off the curve
 EXACT = 100.0  # weight of the ends of a run
 # of the tolerance: root mean squares that are tried, the closest first that needs few knots (more follow the noise)
@@ -77,10 +79,10 @@ def _fitted(
     if len(points) <= LEAST or (line.curve is not None and not _segments(line.curve)):
         return None
     closed = bool(np.array_equal(points[0], points[-1]))
-    sharp = np.flatnonzero(corners(points, closed))
-    if closed and len(sharp) and sharp[0] > 0:  # begin at a corner
+    sharp = np.flatnonzero(_breaks(points, closed))
+    if closed and len(sharp) and sharp[0] > 0:  # begin at a break
         points = np.vstack((points[sharp[0] :], points[1 : sharp[0] + 1]))
-        sharp = np.flatnonzero(corners(points, closed))
+        sharp = np.flatnonzero(_breaks(points, closed))
     inner = sharp[(sharp > 0) & (sharp < len(points) - 1)]
     parts, found = [], False
     for a, b in pairwise([0, *inner.tolist(), len(points) - 1]):
@@ -90,6 +92,18 @@ def _fitted(
         found = found or curve is not None
         parts.append(run if curve is None else curve)
     return np.vstack([parts[0], *(part[1:] for part in parts[1:])]) if found else None
+
+
+def _breaks(points: Array, closed: bool) -> NDArray[np.bool_]:
+    """Where no curve goes through a vertex (k,): at corners, and at both ends of long straight segments."""
+    found = corners(points, closed)
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    long = lengths > LONG * float(np.median(lengths))
+    found[:-1] |= long
+    found[1:] |= long
+    if closed:
+        found[0] = found[-1] = found[0] or found[-1]
+    return found
 
 
 def _curve(run: Array, closed: bool, within: float, tolerance: float) -> Array | None:

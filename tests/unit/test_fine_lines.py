@@ -81,6 +81,18 @@ def test_corners_stay(tmp_path: Path) -> None:
     assert away.min() < 1e-9
 
 
+def test_straight_sides_between_round_corners_stay(tmp_path: Path) -> None:
+    """A spline through both would swing out beside the straight segments."""
+    turn = np.linspace(0.0, 0.5 * np.pi, 25)
+    corner = 8.0 * np.column_stack((np.cos(turn), np.sin(turn)))
+    arcs = [corner @ np.array([(c, s), (-s, c)]) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+    middles = np.array([(90.0, 60.0), (30.0, 60.0), (30.0, 20.0), (90.0, 20.0)])
+    ring = np.vstack([arc + middle for arc, middle in zip(arcs, middles, strict=True)])
+    points = crease(read_pattern(svg(tmp_path, path(np.vstack((ring, ring[:1])), digits=6))))
+    assert points.min(axis=0) == pytest.approx([22.0, 12.0], abs=0.01)
+    assert points.max(axis=0) == pytest.approx([98.0, 68.0], abs=0.01)
+
+
 @pytest.mark.parametrize("sides", [24, 40])
 def test_polygons_stay(tmp_path: Path, sides: int) -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, sides + 1)
