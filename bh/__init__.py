@@ -89,6 +89,7 @@ _NAMES = {
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 _SUBMODULES = {
+    "buckling": "bh.analysis.buckling",
     "contact": "bh.analysis.contact",
     "corrugation": "bh.applications.corrugation",
     "creases": "bh.analysis.creases",

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import bh
+import meshes
 from reports.records import Case, CaseInfo, Check
 from reports.sheet_map import sheet_map
 from verification.framework.checks import CaseResult
 from verification.studies.solver import map as case
-from verification.studies.solver.map import MEMBERS, QUANTITIES, OutOfTime, within_time
+from verification.studies.solver.map import MEMBERS, QUANTITIES, OutOfTime, high_stress, within_time
 from verification.studies.solver.map_sheets import KINDS, UNMEASURED, sample
 
 
@@ -89,3 +93,13 @@ def test_a_sheet_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(case, "LIMIT_S", 0.05)
     assert within_time("twisted", 0)["why"] == "more than 0.05 s of processor time"
     assert not issubclass(OutOfTime, Exception)  # nothing on the way down takes it for an error of its own
+
+
+def test_the_stress_that_is_compared_is_what_five_percent_of_the_area_exceed() -> None:
+    """Of a strip pulled evenly it is the pull; bars and hinges have none."""
+    mesh = meshes.structured(meshes.strip(20.0, 5.0, [2.5], "flat"), along=8, rows=1)
+    model = bh.Model(mesh, bh.Sheet(E=1000.0, nu=0.0, t=0.5), formulation="consistent")
+    model = model.support("edge:start", "xyz").support("edge:end", "z").displace("edge:end", "x", 0.02)
+    strain = 0.001 * (1.0 + 0.0005)  # Green's
+    assert high_stress(bh.trace(model)[-1]) == pytest.approx(1000.0 * strain, rel=1e-6)
+    assert math.isnan(high_stress(bh.trace(replace(model, formulation="bars-and-hinges"))[-1]))

@@ -68,6 +68,7 @@ STUDIES = (
     Study("appendix_b_fields", "B", part_of="appendix_b", seconds=50),
     Study("appendix_b_sheets", "B", part_of="appendix_b", seconds=6),
     Study("shell_benchmarks", "solver"),
+    Study("eigenvalues", "solver"),
     Study("published", "solver"),
     Study("tables4", "4", seconds=1),
     Study("speed_error", "solver", long=True),
