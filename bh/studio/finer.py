@@ -79,8 +79,8 @@ def finer(model: Model, frame: Frame, going: Callable[[], bool], within: float =
             model, controls, guess = _moved(model, mesh, state, controls)
             with one_blas_thread():
                 there = _solve(model, controls, guess, going)
-        except InputError as error:
-            return replace(found, reason=str(error).split(";")[0])
+        except InputError as refused:
+            return replace(found, reason=str(refused).split(";")[0])
         if there is None:
             return None
         if isinstance(there, str):
