@@ -82,6 +82,9 @@ def creases_of(mesh: SheetMesh) -> list[Json]:
 
     Args:
         mesh: of a sheet.
+
+    Returns:
+        one each, with edges as pairs of nodes in one list.
     """
     return [
         {
