@@ -1,9 +1,10 @@
 """Random handling for as long as wanted: `python -m benchmarks.studio_dragging --seconds 3600 --seed 1`.
 
 A seeded hand drags sliders, pulls and lets go of points, holds nodes, undoes, changes the material and opens other
-patterns. Of every state that is shown as an equilibrium the forces are computed anew; now and then the controls are
-solved from flat as well. Seconds are of the processor. It ends with exit code 1 where a state is out of balance, the
-memory has grown by more than `LEAK`, or a state that never snapped is not that of the run from flat.
+patterns. Of every state that is shown the forces are computed anew, at rest by a system that knows the controls of
+the frame and nothing else; now and then the controls are solved from flat as well. Seconds are of the processor. It
+ends with exit code 1 where a state is out of balance, the memory has grown by more than `LEAK`, or a state that never
+snapped is not that of the run from flat.
 """
 
 from __future__ import annotations
@@ -11,12 +12,20 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from bh.errors import InputError
+from bh.formulations.protocols import PlacedSystem
+from bh.formulations.registry import formulation
+from bh.live import Frame
+from bh.live.controls import Way
+from bh.loading.builder import LoadStepBuilder
+from bh.model.actuations import Force
+from bh.model.model import Model
+from bh.model.step import Step
 from bh.runtime.terminal import say
 from bh.solving.trace import trace
 from bh.studio.desk import Desk
@@ -155,6 +164,7 @@ class Hand:
         if not frame.at_rest:
             return
         self.log.rests += 1
+        self.log.worst = max(self.log.worst, own_imbalance(session.model, frame))
         if self.log.rests % COMPARED or not any(frame.wanted.folds.values()):
             return
         path = trace(session.scene(), warn=False)
@@ -167,6 +177,20 @@ class Hand:
                 self.log.wrong.append(
                     f"{self.desk.sheet.name}: {off:.1e} of its size off, energies {energies}"
                 )
+
+
+def own_imbalance(model: Model, frame: Frame) -> float:
+    """Forces out of balance at rest under what the frame names and nothing else, by a system that is made anew.
+
+    Returns:
+        as of `Evaluation`; 0 where a formulation cannot begin at a shape.
+    """
+    start = replace(frame.controls, folds=dict.fromkeys(frame.controls.folds, 0.0))
+    items = Way(start, frame.controls).actuations(model.creases) or (Force([0], each=(0.0, 0.0, 0.0)),)
+    system = formulation(model.formulation).system(model, LoadStepBuilder(model).build(Step(items)), None)
+    if not isinstance(system, PlacedSystem):
+        return 0.0
+    return system.evaluate(system.unknowns_at(frame.points, 1.0), 1.0).imbalance
 
 
 def resident() -> float:

@@ -262,9 +262,9 @@ class Session:
         under = self._under
         if under.march.stuck:
             return
-        if self._fading():
+        if under.load.force.start.any():  # forces fade out on it: it leads to its end and no further
             if under.way.end == self._wanted:
-                return  # to its end, where nothing pulls any more
+                return
         elif (lam := under.way.find(self._wanted)) is not None:
             under.march.target = lam
             return
@@ -291,18 +291,23 @@ class Session:
         return bool(force.start.any()) and self._under.march.here.lam != 1.0
 
     def _release(self, now: Controls, state: State) -> None:
-        """Nodes that are let go of keep their force as a dead one, which the next way fades out."""
+        """Nodes that are let go of keep their force as a dead one, which the next way fades out.
+
+        A node that was caught again while it faded has both: the force of its grip and what is left of the dead one.
+        """
         forces = self._forces(now, state)
+        under = self._under
+        left = under.load.force.at(under.march.here.lam)
         gone = [node for node in now.grips if node not in self._wanted.grips]
         if gone:
-            keep = Step(tuple(Force([node], each=forces[node]) for node in gone))
+            each = {node: (left[node] + forces[node]).tolist() for node in gone}
+            keep = Step(tuple(Force([node], each=(x, y, z)) for node, (x, y, z) in each.items()))
             self._builder.build(keep)
         still = [node for node in self._gone if self._fading()]  # what has faded out is forgotten
         self._gone = tuple(dict.fromkeys([*still, *gone]))
 
     def _begin(self, way: Way, state: State | None) -> _Under:
-        gone = tuple(node for node in self._gone if node not in way.end.grips)
-        items = way.actuations(self.model.creases, gone) or (Force([0], each=(0.0, 0.0, 0.0)),)
+        items = way.actuations(self.model.creases, self._gone) or (Force([0], each=(0.0, 0.0, 0.0)),)
         load = self._builder.build(Step(items))
         system = self._formulation.system(self.model, load, state)
         q = system.start()
