@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import astuple, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
@@ -27,7 +27,7 @@ from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.runtime import viewer
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import ARC, CriticalPoint
-from bh.solvers.system import Limited, Remembering, Rounded
+from bh.solvers.system import Limited, Remembering, Rounded, remembering
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 LARGE_STRAIN = 0.05  # of an edge; what is beyond gets a remark
-# forces of rounding over the typical one, and energy of rounding over that of the state, which together hide it: of 56
-# sheets under tiny loads no other was off by more than 0.1 %; a sheet that folds as a mechanism moves farther
+# forces of rounding over the typical one and energy of rounding over that of the state, which together hide it (of 56
+# sheets); a sheet that folds as a mechanism moves farther than tiny loads would
 HIDDEN, NOISY, TINY = 0.3, 0.5, 1e-2
 
 
@@ -256,26 +256,12 @@ class Path:
         index = range(len(self))[index]
         if index not in self._states:
             record = self.records[index]
-            with self._remembering(record):
+            with remembering(self.system(record.step), record.history):
                 self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
         ended = str(self.outcome) if index == len(self) - 1 and self.ended_early else ""
         if self._states[index].ended != ended:
             self._states[index] = replace(self._states[index], ended=ended)
         return self._states[index]
-
-    @contextmanager
-    def _remembering(self, record: Record) -> Iterator[None]:
-        """The record's system as it was there; a run that is under way finds it afterwards as it has left it."""
-        system = self.system(record.step)
-        if record.history is None or not isinstance(system, Remembering):
-            yield
-            return
-        kept = system.history
-        system.remember(record.history)
-        try:
-            yield
-        finally:
-            system.remember(kept)
 
     def observe(self, step: int, q: Array, lam: float, stable: bool | None = None) -> State:
         """What is to be read from unknowns q (n,) of a step at `lam`; of the whole sheet where halves are solved.

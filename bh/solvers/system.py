@@ -5,7 +5,8 @@ All actuation enters through one scalar lambda, which runs from 0 to 1 in a step
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -229,6 +230,25 @@ class Limited(Protocol):
             lam: load parameter of the step, 0 to 1.
         """
         ...
+
+
+@contextmanager
+def remembering(system: System, history: Array | None) -> Iterator[None]:
+    """The system as it was with a `history`; a run that is under way finds it afterwards as it has left it.
+
+    Args:
+        system: any; only those that are `Remembering` change.
+        history: what it remembered; None for nothing.
+    """
+    if history is None or not isinstance(system, Remembering):
+        yield
+        return
+    kept = system.history
+    system.remember(history)
+    try:
+        yield
+    finally:
+        system.remember(kept)
 
 
 def limited(system: System, q: Array, dq: Array, lam: float) -> Array:

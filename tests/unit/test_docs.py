@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bh.scene import crease_tables
 from bh.scene import bodies as scene_bodies
+from bh.scene import crease_tables
 from bh.scene import patterns as scene_patterns
 from bh.scene import reading as scene_tables
 from bh.scene import tables as schema
