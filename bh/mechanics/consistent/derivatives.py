@@ -25,7 +25,8 @@ from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients, 
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
-    from bh.mechanics.consistent.system import ConsistentSystem
+    from bh.mechanics.consistent.rotations import Slopes
+from bh.mechanics.consistent.system import ConsistentSystem
 
 Array = NDArray[np.float64]
 Data = dict[str, Array]
@@ -118,7 +119,8 @@ class ConsistentDerivatives:
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the rotations, along v (n, 3) and w."""
         system, e, x = self.system, self.system.elements, self.x
-        rates, _ = system.force_rates(x, v, w, e.patches.B, closing=bool(self.L.any()), controlled=False)
+        slopes = Slopes(e.patches.B, e.spring_stiffness)
+        rates, _ = system.force_rates(x, v, w, slopes, closing=bool(self.L.any()), controlled=False)
         dN, dM, dS, _ = system.split(rates)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         e.stretching.force_rates(x, v, self.N, dN, f)
