@@ -73,7 +73,8 @@ def crease_curvature(state: State) -> Array:
 NOTE = (
     "Closed ring: asked was 0.1 % of height and crease curvature. Heights are 0.4 % (120 degrees) and 0.2 % "
     "(90 degrees) off by the consistent formulation, 0.3 % and 0.2 % by the shell; mean curvatures 0.1 % and "
-    "0.05 % (no order), 0.1 % and 0.2 % by the shell. Heights of the consistent formulation show no order on three meshes. That both models are "
+    "0.05 % (no order), 0.1 % and 0.2 % by the shell. Heights of the consistent formulation show no "
+    "order on three meshes. That both models are "
     "on the same side and within 0.06 % of each other suggests the closed form's narrow isometric ring, not "
     "the meshes (its energy is 0.67 to 0.85 of that ring's); a narrower or thinner ring was not tried. That "
     "they are judged against each other as well was added after first results."
