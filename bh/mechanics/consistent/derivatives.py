@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from bh.mechanics.consistent import kernels
 from bh.mechanics.consistent.membrane import Cells
 from bh.mechanics.consistent.membrane_kernels import bar_rates, cell_forces
+from bh.mechanics.consistent.rotations import Slopes
 from bh.mechanics.shared import penetration as closings
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients, dihedral_hessians
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
-    from bh.mechanics.consistent.rotations import Slopes
-from bh.mechanics.consistent.system import ConsistentSystem
+    from bh.mechanics.consistent.system import ConsistentSystem
 
 Array = NDArray[np.float64]
 Data = dict[str, Array]
