@@ -307,12 +307,7 @@ class Path:
         Raises:
             PathFileError: the file cannot be written.
         """
-        target = new_file(self, FilePath(file))
-        for index in range(len(self)):
-            target.add(self.row(index))
-        for step, end in enumerate(self.steps):
-            target.finish_step(step, *astuple(end))
-        target.close()
+        rewritten(self, FilePath(file)).close()
         self.save_accuracy(file)
 
     def save_accuracy(self, file: str | FilePath) -> None:
@@ -436,3 +431,18 @@ def new_file(path: Path, file: FilePath) -> PathFile:
     """
     data, arrays = describe(path.model)
     return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)
+
+
+def rewritten(path: Path, file: FilePath) -> PathFile:
+    """A new file, still open, that has all that a path has, in place of an older one.
+
+    Args:
+        path: whose states and ends of steps are written.
+        file: place of the path file.
+    """
+    target = new_file(path, file)
+    for index in range(len(path)):
+        target.add(path.row(index))
+    for step, end in enumerate(path.steps):
+        target.finish_step(step, *astuple(end))
+    return target

@@ -303,6 +303,17 @@ def pressing(system: System, q: Array, lam: float) -> bool:
     return touches is not None and touches(q, lam)
 
 
+def hessian(system: System, q: Array, lam: float) -> Matrix:
+    """Second derivative of the energy: the tangent with the element forces of the state itself.
+
+    Args:
+        system: that is asked.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+    """
+    return system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
+
+
 def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, float], float]) -> bool:
     """Does `measure`, zero in equilibrium, grow to first order along the path's own tangent from an accepted state?
 
@@ -316,7 +327,7 @@ def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, 
         True if it grows by more than a millionth a unit of lambda; False also where the tangent is indefinite.
     """
     try:
-        factor = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix.factorise(1e-9)
+        factor = hessian(system, q, lam).factorise(1e-9)
     except IndefiniteError:
         return False
     ahead = 1e-3 * max(lam, 0.01)

@@ -17,7 +17,7 @@ from bh.loading.load_step import same_until_here
 from bh.model.compare import differing_keys, first_differing_step, in_words
 from bh.model.model import Model
 from bh.model.serialise import describe, fingerprint
-from bh.paths.path import Path, new_file
+from bh.paths.path import Path, new_file, rewritten
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import PathFile
 from bh.runtime.lock import only_writer
@@ -79,7 +79,7 @@ def follow(  # noqa: PLR0913 - the options of `bh.trace`, all by name
     report = meter(progress)
     with nullcontext() if file is None else only_writer(FilePath(file)):
         if begun is not None:
-            path, target = begun, None if file is None else _rewritten(begun, FilePath(file))
+            path, target = begun, None if file is None else rewritten(begun, FilePath(file))
         else:
             path, target = _opened(model, symmetry, file, resume, after)
         _walk(path, target, strategy, report, None if coarser is None else Coarser(coarser), neighbours)
@@ -330,17 +330,7 @@ def _resume_before(
     fresh = Path(model, symmetry=symmetry)
     fresh.records = [record for record in path.records if record.step < kept]
     fresh.steps = path.steps[:kept]
-    return fresh, _rewritten(fresh, file)
-
-
-def _rewritten(path: Path, file: FilePath) -> PathFile:
-    """A new file that has all that a path has, in place of an older one."""
-    target = new_file(path, file)
-    for index in range(len(path)):
-        target.add(path.row(index))
-    for step, end in enumerate(path.steps):
-        target.finish_step(step, *astuple(end))
-    return target
+    return fresh, rewritten(fresh, file)
 
 
 def _with_model(path: Path, model: Model, symmetry: Plane | None) -> Path:
