@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bh.formulations.state import Energy, State
     from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
     from bh.model.crease_law import CreaseLaw
+    from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
     from bh.model.model import Model
     from bh.model.pinch import Pinch
     from bh.model.refinement import Goal, Refinement
@@ -59,6 +60,7 @@ _NAMES = {
     "bh.formulations.state": "Energy State",
     "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
     "bh.model.crease_law": "CreaseLaw",
+    "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
     "bh.model.refinement": "Goal Refinement",
@@ -106,18 +108,21 @@ __all__ = [
     "Actuation",
     "ArcLength",
     "Automatic",
+    "Bilinear",
     "Body",
     "Calibration",
     "Constraint",
     "CreaseLaw",
     "Displace",
     "DisplacementControl",
+    "ElasticPlastic",
     "ElementStiffness",
     "Energy",
     "Fold",
     "Force",
     "Formulation",
     "Goal",
+    "HingeLaw",
     "Hold",
     "Indenter",
     "InputError",
@@ -126,6 +131,7 @@ __all__ = [
     "Model",
     "ModelError",
     "Moment",
+    "MomentTable",
     "Newton",
     "NotReachedError",
     "NotReachedWarning",
@@ -142,6 +148,7 @@ __all__ = [
     "Settling",
     "Sheet",
     "SheetSystem",
+    "Softening",
     "State",
     "Step",
     "StepBuilder",

@@ -50,7 +50,11 @@ def summary(
     say(
         f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
         f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
+        + (f"; contact {energy.contact:.3g} N mm" if path.model.stops_itself else "")
     )
+    for name, force in last.contact_forces.items():
+        x, y, z = force
+        say(f"force of {name} on the sheet: {x:.4g}, {y:.4g}, {z:.4g} N")
     creases = model.mesh.creases
     for crease in creases[:6]:
         a = last.fold_angle(crease)

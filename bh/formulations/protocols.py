@@ -312,3 +312,16 @@ class Derivatives(Protocol):
             w: rates of the other unknowns, of their shape.
         """
         ...
+
+
+@runtime_checkable
+class Stopping(Protocol):
+    """Ability of a sheet's system: it knows which panels stop each other."""
+
+    def meetings(self, x: Array) -> str:
+        """Which parts of the sheet meet or lie too near at positions x (n, 3), in words; empty where it is clear.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+        """
+        ...

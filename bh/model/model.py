@@ -23,7 +23,7 @@ from meshes import SheetMesh
 from meshes.mesh import count
 from meshes.topology import Ints
 
-Contact = float | Literal["thickness", False]
+Contact = float | Literal["thickness", "auto", False]
 Place = str | Sequence[int]
 OF_GIVEN_STIFFNESS: str = "bars-and-hinges"  # no other formulation has elements to which it could be given
 
@@ -44,8 +44,8 @@ class Model:
         hinge_lock: bending hinges and spring creases stop before their panels pass through each other (bars and hinges
             only): stiffening without bound within the last 2 degrees before 0 and 2 pi, nothing elsewhere.
         contact: panels that share no node stop each other: "thickness" (their middle surfaces stay the sheet's
-            thickness apart), a gap in mm, or False (they pass through each other:
-            `bh.contact.first_contact` tells).
+            thickness apart), a gap in mm, "auto" (by their thickness, from where they meet in a path that is solved
+            without at first), or False (they pass through each other: `bh.contact.first_contact` tells).
     """
 
     mesh: SheetMesh
@@ -92,8 +92,13 @@ class Model:
             raise ModelError(f"hinge_lock = {self.hinge_lock!r} cannot be; give True or False")
         gap = self.contact
         number = isinstance(gap, int | float) and not isinstance(gap, bool) and 0.0 < gap < math.inf
-        if not (number or gap is False or gap == "thickness"):
-            raise ModelError(f"contact = {gap!r} cannot be; give 'thickness', a gap in mm, or False")
+        if not (number or gap is False or gap in ("thickness", "auto")):
+            raise ModelError(f"contact = {gap!r} cannot be; give 'thickness', 'auto', a gap in mm, or False")
+
+    @property
+    def stops_itself(self) -> bool:
+        """Do panels stop each other in every state? Not with "auto", which asks for another model once they meet."""
+        return self.contact is not False and self.contact != "auto"
 
     def __repr__(self) -> str:
         """One line: "Model(384 triangles, 1 crease, 4 supports, 1 step, consistent)"."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from bh.errors import ModelError
-from bh.model.actuations import Fold, Force
+from bh.model.actuations import Fold, Force, Indenter
 from bh.model.model import Model
 from bh.model.supports import Support, select
 from meshes import CreasePattern, SheetMesh
@@ -164,6 +164,10 @@ def _check_actuation(model: Model, item: Any, where: str) -> None:
                 raise ModelError(
                     f"{where}.{key} gives every edge of one mesh its angle; give one angle, or no accuracy"
                 )
+    elif isinstance(item, Indenter):
+        raise ModelError(
+            f"{where}: the surface of a bar is as stiff as the edges of one mesh are long; give a mesh, no accuracy"
+        )
     elif hasattr(item, "at") and not isinstance(
         item.at, float | int
     ):  # a pinch is at a part of its crease's length

@@ -27,7 +27,7 @@ from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.runtime import viewer
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import ARC, CriticalPoint
-from bh.solvers.system import Limited, Rounded
+from bh.solvers.system import Limited, Remembering, Rounded, remembering
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 LARGE_STRAIN = 0.05  # of an edge; what is beyond gets a remark
-# forces of rounding over the typical one, and energy of rounding over that of the state, which together hide it: of 56
-# sheets under tiny loads no other was off by more than 0.1 %; a sheet that folds as a mechanism moves farther
+# forces of rounding over the typical one and energy of rounding over that of the state, which together hide it (of 56
+# sheets); a sheet that folds as a mechanism moves farther than tiny loads would
 HIDDEN, NOISY, TINY = 0.3, 0.5, 1e-2
 
 
@@ -256,7 +256,8 @@ class Path:
         index = range(len(self))[index]
         if index not in self._states:
             record = self.records[index]
-            self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
+            with remembering(self.system(record.step), record.history):
+                self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
         ended = str(self.outcome) if index == len(self) - 1 and self.ended_early else ""
         if self._states[index].ended != ended:
             self._states[index] = replace(self._states[index], ended=ended)
@@ -289,7 +290,10 @@ class Path:
             the system and the record.
         """
         record = self.records[range(len(self))[index]]
-        return self.system(record.step), record
+        system = self.system(record.step)
+        if record.history is not None and isinstance(system, Remembering):
+            system.remember(record.history)
+        return system, record
 
     def plot(self, **options: Any) -> Any:
         """Show the last state as a picture; options of `bh.plotting.show`."""
@@ -303,12 +307,7 @@ class Path:
         Raises:
             PathFileError: the file cannot be written.
         """
-        target = new_file(self, FilePath(file))
-        for index in range(len(self)):
-            target.add(self.row(index))
-        for step, end in enumerate(self.steps):
-            target.finish_step(step, *astuple(end))
-        target.close()
+        rewritten(self, FilePath(file)).close()
         self.save_accuracy(file)
 
     def save_accuracy(self, file: str | FilePath) -> None:
@@ -320,6 +319,19 @@ class Path:
         told = None if self.accuracy is None else self.accuracy.as_dict()
         with closing(PathFile.open(FilePath(file))) as target:
             target.note("accuracy", {"told": told, "reason": self._estimate_reason})
+
+    def save_steps(self, file: str | FilePath) -> None:
+        """Write how steps ended into the file of this path.
+
+        Args:
+            file: the path file.
+
+        Raises:
+            PathFileError: there is no such file, or it cannot be written.
+        """
+        with closing(PathFile.open(FilePath(file))) as target:
+            for step, end in enumerate(self.steps):
+                target.finish_step(step, *astuple(end))
 
     @classmethod
     def load(cls, file: str | FilePath) -> Path:
@@ -356,7 +368,7 @@ class Path:
         return StateRow(
             record.step, record.lam, record.iterations, record.imbalance, record.negative, record.mode, record.jumped,
             record.wall_time_s, record.next_increment, (energy.stretching, energy.bending, energy.folding),
-            record.note, record.cuts, record.q, self[index].points, critical,
+            record.note, record.cuts, record.q, self[index].points, critical, record.history,
         )  # fmt: skip
 
     def system(self, step: int) -> SheetSystem:
@@ -376,7 +388,7 @@ class Path:
             if any(each.until is not None for each in before) or self._looks_back(step):
                 self._load_steps = load_steps(self.model, self._ended(step))
             made = self._formulation.system(self.model, self._load_steps[step], self._start(step))
-            if self.model.contact is not False and not isinstance(made, Limited):
+            if self.model.stops_itself and not isinstance(made, Limited):
                 raise ModelError(
                     f"formulation '{self.model.formulation}' has no contact; take 'consistent', or contact = False"
                 )
@@ -419,3 +431,18 @@ def new_file(path: Path, file: FilePath) -> PathFile:
     """
     data, arrays = describe(path.model)
     return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)
+
+
+def rewritten(path: Path, file: FilePath) -> PathFile:
+    """A new file, still open, that has all that a path has, in place of an older one.
+
+    Args:
+        path: whose states and ends of steps are written.
+        file: place of the path file.
+    """
+    target = new_file(path, file)
+    for index in range(len(path)):
+        target.add(path.row(index))
+    for step, end in enumerate(path.steps):
+        target.finish_step(step, *astuple(end))
+    return target

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bh.scene import tables
+from bh.scene.bodies import BODIES
 from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import Table
 
@@ -40,7 +41,8 @@ def schema() -> Schema:
     """
     found: Schema = {}
     patterns: list[type[Table]] = [*LIBRARY.values(), DrawingPattern]
-    steps = {key: _one_or_more(_table(found, kind)) for key, kind in tables.ACTUATIONS.items()}
+    acting = {**tables.ACTUATIONS, **BODIES}
+    steps = {key: _one_or_more(_table(found, kind)) for key, kind in acting.items()}
     steps["until"] = _table(found, tables.UntilTable)
     support: Schema = {"anyOf": [_table(found, tables.SupportTable), OWN]}
     steps |= {"support": _one_or_more(support), "hold": PLACES, "release": PLACES}
@@ -50,6 +52,9 @@ def schema() -> Schema:
         "mesh": {"anyOf": _tables(found, MESHES)},
         "supports": {"type": "array", "items": support},
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
+        "contact": {
+            "anyOf": [{"enum": ["thickness", "auto", False]}, {"type": "number", "exclusiveMinimum": 0}]
+        },
         "symmetry": {"anyOf": [{"enum": ["x", "y"]}, VECTOR]},
         "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},
         "steps": {

@@ -15,7 +15,7 @@ from bh.formulations.registry import formulation, names
 from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
 from bh.materials.table import material as material_of
-from bh.model.actuations import Displace, Force
+from bh.model.actuations import Displace, Force, Tether
 from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model, Place
 from bh.model.plugins import consent, made
@@ -25,7 +25,10 @@ from bh.model.sheet import Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, select
 from bh.model.until import Until
+from bh.scene.bodies import BODIES, body
 from bh.scene.changes import set_keys
+from bh.scene.contact import contact_of
+from bh.scene.crease_tables import crease_law
 from bh.scene.meshing import Drawn, mesh_of
 from bh.scene.reading import (
     arguments,
@@ -70,7 +73,9 @@ SECTIONS = (
     "outputs",
     "accuracy",
     "symmetry",
+    "contact",
 )
+ACTING = {**ACTUATIONS, **BODIES}
 CHANGES = ("support", "hold", "release")  # keys of a step beside its actuations
 
 
@@ -223,6 +228,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
         hinge_lock=how.hinge_lock,
+        contact=contact_of(data.get("contact", False)),
     )
     _check_names(model)
     _check_steps(model)
@@ -313,14 +319,15 @@ def _vectors(fix: list[float] | list[list[float]], at: str) -> tuple[tuple[float
 def _crease(item: object, at: str) -> CreaseLaw:
     table = read_table(CreaseTable, item, at)
     with within(at):
-        return CreaseLaw(table.Lstar, table.stiffness, table.rest)
+        law = None if table.law is None else crease_law(table.law, f"{at}.law")
+        return CreaseLaw(table.Lstar, table.stiffness, table.rest, law)
 
 
 def _step(item: object, at: str) -> Step:
     step = as_table(item, at)
-    check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTUATIONS, "until", *CHANGES))
+    check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTING, "until", *CHANGES))
     if not set(step) - {"until"}:
-        raise SceneError(f"{at} is empty; add one of {', '.join((*ACTUATIONS, *CHANGES))}")
+        raise SceneError(f"{at} is empty; add one of {', '.join((*ACTING, *CHANGES))}")
     found: list[Actuation] = []
     until = None
     support, release = _changes(step, at)
@@ -363,7 +370,11 @@ def _actuation(key: str, item: object, at: str) -> Actuation:
         with within(at):
             own: Actuation = made(key, as_table(item, at), Actuation)
             return own
-    given = arguments(read_table(ACTUATIONS[key], item, at))
+    table = read_table(ACTING[key], item, at)
+    if key in BODIES:
+        with within(at):
+            return body(key, table)
+    given = arguments(table)
     if isinstance(given.get("direction"), tuple):
         given["direction"] = _direction(given["direction"], f"{at}.direction")
     with within(at):
@@ -403,7 +414,7 @@ def _check_names(model: Model) -> None:
             if crease != "all":
                 with within(f"steps[{i}].{key}.crease"):
                     mesh.crease_edges(crease)
-            if isinstance(item, Force | Displace):
+            if isinstance(item, Force | Displace | Tether):
                 with within(f"steps[{i}].{key}.at"):
                     select(mesh, item.at)
 

@@ -27,10 +27,11 @@ from bh.solvers.points import (
     power_rate,
 )
 from bh.solvers.stability import leave_saddle, locate
-from bh.solvers.system import System, limited
+from bh.solvers.system import System, clear_part, meeting, pressing
 
 Array = NDArray[np.float64]
 LOOK = 2  # cuts of an increment before a bifurcation is looked for
+SMALLEST = 1e-5  # part of a step that an increment up to a contact may be
 AtBifurcation = Literal["stable", "primary", "stop"]
 
 
@@ -128,7 +129,7 @@ class LoadControl:
         held: Array | None = None  # the neutral mode, once the path has one
         while points[-1].lam < 1.0:
             here = points[-1]
-            lam = lambda_after(here.lam, step)
+            lam, meets = _up_to_contact(system, points, lambda_after(here.lam, step), SMALLEST)
             fold = fold_ahead(points, system.primal)
             if self.foresee and fold <= lam and len(cuts) > 2:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
@@ -138,6 +139,7 @@ class LoadControl:
                 return
             alone = len(points) == 1
             brisk = lam - here.lam > 0.5 * self.cautious(system) if alone else len(cuts) < self.brisk
+            brisk = brisk and not meets  # what slips off as it meets is let go downhill at once
             look = self.at_bifurcation == "stable" and len(cuts) >= LOOK and not looked
             if len(cuts) == 1 and held is None:  # a step may begin on a buckled ring
                 held = _neutral(system, here, known=False)
@@ -184,7 +186,7 @@ class LoadControl:
             step = min(largest, self._next(lam - here.lam, tried.solution.iterations, bool(cuts), imposed))
             yield Increment(
                 tried.point, Outcome.REACHED, iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note),
-                critical,
+                critical, tried.solution.factorised,
             )  # fmt: skip
             cuts, iterations, looked = [], 0, False
 
@@ -198,11 +200,13 @@ class LoadControl:
         mode that is left alone.
         """
         here = points[-1]
-        newton = replace(self.newton, unstable=self.at_bifurcation != "stable", held=held)
+        newton = replace(
+            self.newton, unstable=self.at_bifurcation != "stable", held=held, keep=lam >= 1.0
+        )  # where a step ends more is asked of the state
         method = replace(newton, globalised=0, hasty=True) if brisk or look else newton
-        q, forces = extrapolate(points, lam)
-        q, forces = _as_far_as_clear(system, here, lam, q, forces)
-        found = method.solve(system, q, lam, forces, self._tangent_guess(system, points, lam))
+        tangent = self._tangent_guess(system, points, lam)
+        q, forces = _clear_guess(system, here, lam, extrapolate(points, lam), tangent)
+        found = method.solve(system, q, lam, forces, tangent)
         primary = found = found if held is None else settle(system, found, lam, newton)
         iterations, note, branch = found.iterations, "", NO_BRANCH
         downhill = look and not brisk and not found.converged
@@ -311,14 +315,40 @@ def jump(system: System, here: Point, there: Point, mismatch: float) -> str:
     return ""
 
 
-def _as_far_as_clear(system: System, here: Point, lam: float, q: Array, forces: Array) -> tuple[Array, Array]:
-    """A guess and its element forces, or as much of the way there from the last state as nothing stands in."""
-    change = q - here.q
-    step = limited(system, here.q, change, lam)
-    if step is change:
-        return q, forces
-    part = float(np.linalg.norm(step)) / max(float(np.linalg.norm(change)), 1e-300)
-    return here.q + step, here.forces + part * (forces - here.forces)
+def _up_to_contact(
+    system: System, points: Sequence[Point], lam: float, smallest: float
+) -> tuple[float, bool]:
+    """`lam`, or where before it the extrapolated path meets something; and whether anything presses there or here."""
+    here = points[-1]
+    meets = pressing(system, here.q, here.lam)
+    for _ in range(2):
+        q, _ = extrapolate(points, lam)
+        part = meeting(system, here.q, q - here.q, lam)
+        if part >= 1.0 or part * (lam - here.lam) < smallest:
+            break
+        lam, meets = here.lam + part * (lam - here.lam), True
+    return lam, meets
+
+
+def _clear_guess(
+    system: System,
+    here: Point,
+    lam: float,
+    guess: tuple[Array, Array],
+    other: Callable[[], tuple[Array, Array]] | None,
+) -> tuple[Array, Array]:
+    """A guess and its element forces, another one if something stands in its way, or as much of it as is clear."""
+    part = clear_part(system, here.q, guess[0] - here.q, lam)
+    if part >= 1.0:
+        return guess
+    if other is not None:
+        tangent = other()
+        along = clear_part(system, here.q, tangent[0] - here.q, lam)
+        if along > part:
+            part, guess = along, tangent
+
+    part = 1.0 if part >= 1.0 else 0.9 * part
+    return here.q + part * (guess[0] - here.q), here.forces + part * (guess[1] - here.forces)
 
 
 def _lost(found: Solution) -> bool:

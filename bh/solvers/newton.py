@@ -17,11 +17,12 @@ from bh.solvers.modes import (
     KNOWN_GAP,
     NEUTRAL,
     ROUNDED,
-    count_negative,
+    count_and_factor,
     factorise_shifted,
     lowest_mode,
     without,
 )
+from bh.solvers.points import Factorised
 from bh.solvers.pseudo_transient import PseudoTransient
 from bh.solvers.system import Evaluation, Rounded, System, limited
 
@@ -41,7 +42,8 @@ class Solution:
     """What came of one solve; `q` is only an equilibrium where `converged`.
 
     `iterations` counts factorisations that moved the state; `negative` the negative eigenvalues of the Hessian there
-    (on the null space of the constraints; 0: stable), None where that was not looked at.
+    (on the null space of the constraints; 0: stable), None where that was not looked at. `factorised` is what they
+    were counted from, if it was to be kept.
     """
 
     q: Array
@@ -51,6 +53,7 @@ class Solution:
     reason: str = ""
     negative: int | None = None
     globalised: bool = False
+    factorised: Factorised | None = field(default=None, compare=False)
 
     @property
     def stable(self) -> bool | None:
@@ -75,6 +78,7 @@ class Newton:
         hasty: give full Newton up where its steps contract too slowly; for increments that are cheaper cut than saved.
         held: (primal,) a neutral mode that full steps leave alone (`bh.solvers.modes.neutral_mode`), None without one.
         unstable: take indefinite tangents as they are and take full steps only, to stay on a branch that is not stable.
+        keep: hand on the tangent and the factor of the state that is found (`Solution.factorised`); they take memory.
     """
 
     tolerance: float = 1e-8
@@ -85,6 +89,7 @@ class Newton:
     hasty: bool = False
     held: Array | None = None
     unstable: bool = False
+    keep: bool = False
 
     def solve(
         self,
@@ -280,9 +285,10 @@ class Newton:
     ) -> Solution:
         if iterations == 0 and not self.unstable:
             q, now, iterations = self._past_rounding(system, q, lam, now)
-        matrix = system.tangent(q, lam, now.forces).matrix
-        negative = count_negative(matrix, GAP if self.held is None else KNOWN_GAP)
-        return Solution(q, now, iterations, True, "", negative, globalised)
+        tangent = system.tangent(q, lam, now.forces)
+        negative, factor = count_and_factor(tangent.matrix, GAP if self.held is None else KNOWN_GAP)
+        kept = Factorised(tangent, factor) if self.keep else None
+        return Solution(q, now, iterations, True, "", negative, globalised, kept)
 
     def _past_rounding(
         self, system: System, q: Array, lam: float, now: Evaluation

@@ -5,7 +5,8 @@ All actuation enters through one scalar lambda, which runs from 0 to 1 in a step
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -231,6 +232,25 @@ class Limited(Protocol):
         ...
 
 
+@contextmanager
+def remembering(system: System, history: Array | None) -> Iterator[None]:
+    """The system as it was with a `history`; a run that is under way finds it afterwards as it has left it.
+
+    Args:
+        system: any; only those that are `Remembering` change.
+        history: what it remembered; None for nothing.
+    """
+    if history is None or not isinstance(system, Remembering):
+        yield
+        return
+    kept = system.history
+    system.remember(history)
+    try:
+        yield
+    finally:
+        system.remember(kept)
+
+
 def limited(system: System, q: Array, dq: Array, lam: float) -> Array:
     """The step dq (n,) from q, or as much of it as leaves a tenth of the way to what stands in it.
 
@@ -240,12 +260,58 @@ def limited(system: System, q: Array, dq: Array, lam: float) -> Array:
         dq: (n,) step.
         lam: load parameter of the step, 0 to 1.
     """
+    part = clear_part(system, q, dq, lam)
+    return dq if part >= 1.0 else 0.9 * part * dq
+
+
+def clear_part(system: System, q: Array, dq: Array, lam: float) -> float:
+    """How much of the step dq (n,) from q nothing stands in, 0 to 1.
+
+    Args:
+        system: any; nothing stands in the way of those that are not `Limited`.
+        q: (n,) unknowns.
+        dq: (n,) step.
+        lam: load parameter of the step, 0 to 1.
+    """
     # asked in every iteration: looking for the method takes 0.1 microseconds, `isinstance` of a protocol 20
     free_part: Callable[[Array, Array, float], float] | None = getattr(system, "free_part", None)
-    if free_part is None:
-        return dq
-    part = free_part(q, dq, lam)
-    return dq if part >= 1.0 else 0.9 * part * dq
+    return 1.0 if free_part is None else free_part(q, dq, lam)
+
+
+def meeting(system: System, q: Array, dq: Array, lam: float) -> float:
+    """How much of the step dq (n,) from q leads to where something new begins to press, 0 to 1; 1 where nothing does.
+
+    Args:
+        system: any; only those that are `Limited` can meet something.
+        q: (n,) unknowns.
+        dq: (n,) step.
+        lam: load parameter of the step, 0 to 1.
+    """
+    approach: Callable[[Array, Array, float], float] | None = getattr(system, "approach", None)
+    return 1.0 if approach is None else approach(q, dq, lam)
+
+
+def pressing(system: System, q: Array, lam: float) -> bool:
+    """Does anything press at q (n,) that can stand in the way of a step?
+
+    Args:
+        system: any; nothing presses in those that are not `Limited`.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+    """
+    touches: Callable[[Array, float], bool] | None = getattr(system, "pressing", None)
+    return touches is not None and touches(q, lam)
+
+
+def hessian(system: System, q: Array, lam: float) -> Matrix:
+    """Second derivative of the energy: the tangent with the element forces of the state itself.
+
+    Args:
+        system: that is asked.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+    """
+    return system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
 
 
 def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, float], float]) -> bool:
@@ -261,12 +327,51 @@ def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, 
         True if it grows by more than a millionth a unit of lambda; False also where the tangent is indefinite.
     """
     try:
-        factor = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix.factorise(1e-9)
+        factor = hessian(system, q, lam).factorise(1e-9)
     except IndefiniteError:
         return False
     ahead = 1e-3 * max(lam, 0.01)
     moved = q - ahead * factor.solve(system.control_rate(q, lam))
     return measure(moved, lam + ahead) - measure(q, lam) > 1e-6 * ahead
+
+
+@runtime_checkable
+class Remembering(Protocol):
+    """Ability of a system: what it answers may depend on states that were accepted before.
+
+    Between two accepted states it answers as an elastic one whose energy includes what is dissipated on the way from
+    the last of them. Who accepts a state says so: `system.remember(system.history_at(q, lam))`.
+    """
+
+    @property
+    def remembers(self) -> bool:
+        """Does it, in this model?"""
+        ...
+
+    @property
+    def history(self) -> Array:
+        """What was accepted last, in the system's own order."""
+        ...
+
+    def history_at(self, q: Array, lam: float) -> Array:
+        """What is to be remembered where a state is accepted.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            an array of the shape of `history`.
+        """
+        ...
+
+    def remember(self, history: Array) -> None:
+        """Go on from there.
+
+        Args:
+            history: as `history_at` gives it.
+        """
+        ...
 
 
 @runtime_checkable

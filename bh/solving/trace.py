@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
@@ -73,21 +74,17 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
         raise ModelError(
             "a run to a wanted accuracy begins anew on every mesh; leave out after, and resume it with its file"
         )
+    if accuracy is not None and model.contact == "auto":
+        raise ModelError(
+            "contact = 'auto' is for one mesh; give the mesh (and no accuracy), or contact = 'thickness'"
+        )
     report = meter(progress)
     with compilation_told(report):
         if accuracy is not None:
             path = _to_accuracy(model, accuracy, symmetry, report, strategy, file, resume)
         else:
-            path = follow(
-                model,
-                symmetry=symmetry,
-                progress=report,
-                strategy=strategy,
-                file=file,
-                resume=resume,
-                after=after,
-                neighbours=neighbours,
-            )
+            options = _Options(symmetry, report, strategy, file, resume, after, neighbours)
+            path = _as_needed(model, options) if model.contact == "auto" else options.follow(model)
         if estimate and path.accuracy is None:
             from bh.solving.given_mesh import add_estimate
 
@@ -96,6 +93,46 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
                 path.save_accuracy(file)
     if warn and not path.reached:
         warnings.warn(path.early_end, NotReachedWarning, stacklevel=2)
+    return path
+
+
+@dataclass(frozen=True)
+class _Options:
+    """How a model is followed on its own mesh; as of `trace`."""
+
+    symmetry: Plane | None
+    report: ProgressMeter
+    strategy: Strategy | None
+    file: str | FilePath | None
+    resume: bool
+    after: Path | None
+    neighbours: bool | None
+
+    def follow(self, model: Model, begun: Path | None = None) -> Path:
+        return follow(
+            model,
+            symmetry=None if model.stops_itself and begun is not None else self.symmetry,
+            progress=self.report,
+            strategy=self.strategy,
+            file=self.file,
+            resume=self.resume and begun is None,
+            after=self.after if begun is None else None,
+            neighbours=self.neighbours,
+            begun=begun,
+        )
+
+
+def _as_needed(model: Model, options: _Options) -> Path:
+    """A path of a model with contact = "auto"."""
+    from bh.solving.contact import solve_as_needed, stored_model
+
+    if options.resume and options.file is not None:
+        stored = stored_model(FilePath(options.file), model)
+        if stored.stops_itself:
+            return options.follow(stored)
+    path = solve_as_needed(model, options.follow)
+    if options.file is not None and path.model.stops_itself:
+        path.save_steps(options.file)
     return path
 
 

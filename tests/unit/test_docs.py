@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from bh.scene import bodies as scene_bodies
+from bh.scene import crease_tables
 from bh.scene import patterns as scene_patterns
 from bh.scene import reading as scene_tables
 from bh.scene import tables as schema
@@ -39,6 +41,8 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: displace": schema.DisplaceTable,
     "steps: pull": schema.PullTable,
     "steps: weight": schema.WeightTable,
+    "steps: press": scene_bodies.PressTable,
+    "steps: tether": scene_bodies.TetherTable,
     "steps: until": schema.UntilTable,
     "outputs": schema.OutputsTable,
     "accuracy": schema.AccuracyTable,
@@ -73,13 +77,17 @@ def test_tables_are_those_of_the_schema(title: str) -> None:
 def test_nothing_is_left_out() -> None:
     every = {
         kind
-        for kind in (vars(schema) | vars(scene_patterns)).values()
+        for kind in (vars(schema) | vars(scene_patterns) | vars(scene_bodies)).values()
         if isinstance(kind, type) and issubclass(kind, scene_tables.Table)
     }
     assert set(TABLES.values()) == every - {scene_tables.Table, scene_patterns.PatternTable}
     named = {title.split(",")[0].split(":")[0].split(".")[0] for title in TABLES}
-    assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS) - {"symmetry"}
+    assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS) - {
+        "symmetry",
+        "contact",
+    }
     assert "`symmetry = " in PAGE
+    assert "`contact = " in PAGE
     assert PAGE.count("\n### ") == len(TABLES)
 
 
@@ -96,3 +104,9 @@ def test_places_of_the_page_are_places() -> None:
             len(mesh.nodes(place.replace("NAME", "crease").replace(":N", ":3").replace("X,Y", "100,1"))) >= 1
         )
     assert set(mesh.corners) <= set(places)
+
+
+@pytest.mark.parametrize("kind", crease_tables.TABLES)
+def test_laws_of_creases(kind: str) -> None:
+    section = PAGE.split(f'\n#### law, kind = "{kind}"\n')[1].split("\n#")[0]
+    assert [line for line in section.splitlines() if line.startswith("|")] == rows(crease_tables.TABLES[kind])

@@ -19,6 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.mechanics.contact.detection import Detection
 from bh.mechanics.shared.assembly import add_lower, rotate
 from bh.mechanics.shared.kinematics import OPTIONS
 from bh.mechanics.shared.sparsity import Slots
@@ -34,6 +35,7 @@ OFFSET, REACH = (
 LOCAL = (
     4.0  # thicknesses along the flat sheet within which it does not meet itself: a hinge has no room for them
 )
+SLACK = 0.05  # of an edge that nodes move by while pairs are kept
 NAMED = 3  # pairs in a message
 ipctk.set_num_threads(1)  # sums in one order, so that the same input gives the same numbers
 
@@ -60,8 +62,8 @@ class SheetBarrier:
             near = _neighbours(mesh.points, LOCAL * (offset + reach))
             self._mesh.can_collide = ipctk.make_sparse_filter(dict.fromkeys(near, False), True)
         self._potential = ipctk.BarrierPotential(reach, pressure, True)
-        # additive detection (Li, Kaufman and Jiang 2021): root finders take seconds where edges move in one plane
-        self._detection = ipctk.AdditiveCCD()
+        slack = max(reach, SLACK * float(np.median(mesh_edges(mesh))))
+        self._detection = Detection(self._mesh, offset, offset + reach, slack)
         self._last: tuple[Array, ipctk.NormalCollisions] | None = None
 
     def clear(self, x: Array) -> bool:
@@ -77,6 +79,10 @@ class SheetBarrier:
             return self.offset + self.reach
         return float(np.sqrt(pairs.compute_minimum_distance(self._mesh, x)))
 
+    def presses(self, x: Array) -> bool:
+        """Are any parts within the reach of each other at positions x?"""
+        return len(self._pairs(x)) > 0
+
     def forces(self, x: Array, f: Array) -> float:
         """Adds the gradient to f (n, 3), N, and returns the energy, N mm; inf where the sheet passes through itself.
 
@@ -84,7 +90,9 @@ class SheetBarrier:
             x: (nodes, 3) positions, mm.
             f: (nodes, 3) N; the gradient is added where the energy is finite.
         """
-        if not np.isfinite(x).all() or ipctk.has_intersections(self._mesh, x):
+        if not np.isfinite(x).all():
+            return np.inf
+        if not self._detection.linked(x) and ipctk.has_intersections(self._mesh, x):
             return np.inf
         pairs = self._pairs(x)
         if len(pairs) == 0:
@@ -118,6 +126,22 @@ class SheetBarrier:
             out[k // 2, at : at + 3, at : at + 3] = block
         return nodes, out
 
+    def pair_forces(self, x: Array) -> list[tuple[Ints, Array]]:
+        """What each pair in contact does: its nodes (k,) and the forces (k, 3), N, that it puts on them; k is 2 to 4.
+
+        The forces of a pair are in balance, and so are their moments.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+        """
+        pairs, found = self._pairs(x), []
+        edges, faces = self._mesh.edges, self._mesh.faces
+        for k in range(len(pairs)):
+            nodes = np.array([n for n in pairs[k].vertex_ids(edges, faces) if n >= 0], dtype=np.int64)
+            gradient = np.asarray(self._potential.gradient(pairs[k], pairs[k].dof(x, edges, faces)))
+            found.append((nodes, -gradient.reshape(-1, 3)[: len(nodes)]))
+        return found
+
     def times(self, x: Array, v: Array) -> Array:
         """(n, 3) Hessian at x times v (n, 3).
 
@@ -138,11 +162,49 @@ class SheetBarrier:
             x: (nodes, 3) positions, mm, with nothing passing through anything.
             moved: (nodes, 3) positions, mm.
         """
-        return float(
-            ipctk.compute_collision_free_stepsize(
-                self._mesh, x, moved, self.offset, narrow_phase_ccd=self._detection
-            )
-        )
+        return self._detection.free_part(x, moved)
+
+    def begin(self, x: Array) -> bool:
+        """Whether the sheet is clear at x (`clear`), from where motions are looked for from now on.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+        """
+        if not self.clear(x):
+            return False
+        self._detection.begin(x)
+        return True
+
+    def passed(self, x: Array, moved: Array) -> bool:
+        """Whether no motion is known between two states of a path in which nothing passes through anything.
+
+        Args:
+            x: (nodes, 3) positions of an accepted state, mm.
+            moved: (nodes, 3) positions of the next one, mm.
+        """
+        if self._detection.linked(moved):
+            return False
+        return not (self.clear(moved) and self.free_part(x, moved) >= 1.0)
+
+    def approach(self, x: Array, moved: Array) -> float:
+        """How much of the straight way from x to `moved` leads to where the first pair is half within the reach.
+
+        Args:
+            x: (nodes, 3) positions, mm, with nothing passing through anything.
+            moved: (nodes, 3) positions, mm.
+        """
+        within, part = self.offset + 0.5 * self.reach, 0.0
+        if self.distance(x) <= self.offset + 0.9 * self.reach:
+            return 1.0
+        for _ in range(3):  # additive detection stops short of what it sees
+            at = x + part * (moved - x)
+            if self.distance(at) <= self.offset + 0.9 * self.reach:
+                break
+            free = self._detection.free_part(at, moved, within)
+            part += free * (1.0 - part)
+            if free >= 1.0:
+                return 1.0
+        return part
 
     def meetings(self, x: Array, most: int = NAMED) -> str:
         """What intersects or lies within the offset at x, in words: the first `most` pairs, by their nodes.
@@ -188,9 +250,15 @@ class SheetBarrier:
             return self._last[1]
         found = ipctk.NormalCollisions()
         found.use_area_weighting = True
-        found.build(self._mesh, x, self.reach, self.offset)
+        found.build(self._detection.candidates(x), self._mesh, x, self.reach, self.offset)
         self._last = (x.copy(), found)
         return found
+
+
+def mesh_edges(mesh: SheetMesh) -> Array:
+    """(e,) lengths of the edges, mm."""
+    ends = mesh.points[mesh.topology.edges]
+    return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
 
 def _neighbours(points: Array, within: float) -> list[tuple[int, int]]:
@@ -210,8 +278,7 @@ def sheet_barrier(model: Model) -> SheetBarrier:
         ModelError: the thickness does not fit its mesh.
     """
     mesh, sheet = model.mesh, model.sheet
-    ends = mesh.points[mesh.topology.edges]
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    lengths = mesh_edges(mesh)
     heights = 2.0 * mesh.areas / lengths[mesh.topology.triangle_edges].max(axis=1)
     thick = model.contact == "thickness"
     offset = OFFSET * sheet.t if thick else 0.0

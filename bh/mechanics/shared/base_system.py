@@ -11,6 +11,7 @@ from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
 from bh.mechanics.shared import penetration as hinge_penetration
+from bh.mechanics.shared.crease_curves import CreaseCurves
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.shared.rigid_contact import RigidContact
@@ -38,6 +39,7 @@ class SupportedSheet:
     """
 
     size: int
+    curves: CreaseCurves | None = None  # None where all creases are straight lines
 
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
@@ -73,7 +75,7 @@ class SupportedSheet:
         if self.constraints.rigid_body and (start is None or not load_step.releases):
             self.displacements.check_balance(self.force)
         self.barrier: SheetBarrier | None = None
-        if model.contact is not False:
+        if model.stops_itself:
             if plane is not None:
                 raise ModelError("contact is solved on the whole sheet; leave out symmetry, or contact")
             from bh.mechanics.contact.barrier import ContactBlocks, sheet_barrier
@@ -86,7 +88,9 @@ class SupportedSheet:
 
     def _check_start(self, x: Array) -> None:
         """Raises `ModelError` where the step begins with a sheet that passes through itself."""
-        if self.barrier is not None and not self.barrier.clear(x):
+        if self.barrier is not None and not self.barrier.begin(
+            x + (self.displacements.home - self.displacements.reference)
+        ):
             met = self.barrier.meetings(x)
             raise ModelError(f"contact: the first state meets itself ({met}); begin with panels apart")
 
@@ -94,10 +98,9 @@ class SupportedSheet:
         """Whether panels in contact would pass through each other on the straight way between two states."""
         if self.barrier is None:
             return ""
-        x, x_new = self.positions(q, lam), self.positions(q_new, lam_new)
-        if self.barrier.clear(x_new) and self.barrier.free_part(x, x_new) >= 1.0:
+        if not self.barrier.passed(self.near(q, lam), self.near(q_new, lam_new)):
             return ""
-        return "panels would pass through each other on the straight way there"
+        return "panels would pass through each other on the way there"
 
     def _touching(self, x: Array) -> tuple[Ints, Array] | None:
         """What panels in contact add to the tangent at positions x (`SheetBarrier.blocks`); None without contact.
@@ -111,11 +114,61 @@ class SupportedSheet:
             vars(self).pop("_pattern", None)
         return found
 
+    @property
+    def remembers(self) -> bool:
+        """Does what it answers depend on states before (`bh.solvers.system.Remembering`)?"""
+        return self.curves is not None and self.curves.remembers
+
+    @property
+    def history(self) -> Array:
+        """(m, 2) of creases as they were accepted last, rad; see `State.crease_history`."""
+        return np.zeros((0, 2)) if self.curves is None else self.curves.history
+
+    def remember(self, history: Array) -> None:
+        """Go on from a history (m, 2).
+
+        Args:
+            history: as `history_at` gives it.
+        """
+        if self.curves is not None:
+            self.curves.history = history
+
     def free_part(self, q: Array, dq: Array, lam: float) -> float:
         """How much of a step dq (size,) from q no panels stand in, 0 to 1; see `bh.solvers.system.Limited`."""
         if self.barrier is None:
             return 1.0
-        return self.barrier.free_part(self.positions(q, lam), self.positions(q + dq, lam))
+        return self.barrier.free_part(self.near(q, lam), self.near(q + dq, lam))
+
+    def meetings(self, x: Array) -> str:
+        """Which parts of the sheet meet or lie too near at positions x (n, 3), in words; empty where it is clear.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+        """
+        if self.barrier is None or self.barrier.clear(x):
+            return ""
+        return self.barrier.meetings(x) or "layers nearer than contact allows"
+
+    def approach(self, q: Array, dq: Array, lam: float) -> float:
+        """How much of a step dq (size,) from q leads to where panels begin to press on each other, 0 to 1.
+
+        Args:
+            q: (size,) unknowns.
+            dq: (size,) step.
+            lam: load parameter of the step, 0 to 1.
+        """
+        if self.barrier is None:
+            return 1.0
+        return self.barrier.approach(self.near(q, lam), self.near(q + dq, lam))
+
+    def pressing(self, q: Array, lam: float) -> bool:
+        """Do panels press on each other at q (size,)?
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        return self.barrier is not None and self.barrier.presses(self.near(q, lam))
 
     @property
     def rotation(self) -> float:
