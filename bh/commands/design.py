@@ -38,9 +38,8 @@ from bh.scene.reading import (
     inside,
     one_line,
     read_table,
-    read_toml,
-    toml_bytes,
 )
+from bh.scene.toml_text import read_toml, toml_bytes
 from meshes import parallel_creases
 from meshes.curves import arc_lengths, interpolated
 from meshes.io import write_pattern

@@ -40,10 +40,7 @@ from bh.scene.reading import (
     one_or_more,
     places,
     read_table,
-    read_toml,
     shown,
-    toml_bytes,
-    waits,
     within,
     without,
 )
@@ -56,6 +53,7 @@ from bh.scene.tables import (
     SupportTable,
     UntilTable,
 )
+from bh.scene.toml_text import read_toml, toml_bytes, waits
 from bh.scene.wanted_accuracy import wanted_accuracy
 from bh.solvers.settling import Settling
 from bh.solvers.walk import Strategy

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import re
-import stat
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,17 +14,13 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from bh.errors import InputError, SceneError
 from bh.runtime.consent import outside_allowed
-from meshes.limits import check_limit
+from bh.scene.toml_text import waits
 from meshes.pattern import FoldKind
 from meshes.quantities import PATTERN, Kind, QuantityError, degrees_meant, number
 
 LONGEST, SHORTEST = 1e6, 1e-6  # mm; beyond, sampling a curve to a thousandth of a millimetre loses its sense
 LARGEST = 1e9  # of any number
 TURN = 2.0 * math.pi
-LONGEST_FILE = 10_000_000  # bytes of a TOML file
-MOST_PARTS = 16  # of a dotted key: the time of tomllib grows with their square
-# a part of a key and the dot behind it, over and over; possessive, and not from within a word: linear in the text
-_DOTTED = re.compile(r"""(?:(?:(?<![\w-])[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)++""", re.ASCII)
 
 
 def spelled(kind: Kind, limits: Interval) -> BeforeValidator:
@@ -110,61 +103,6 @@ class Table(BaseModel):
 
 
 T = TypeVar("T", bound=Table)
-
-
-def toml_bytes(path: Path) -> bytes:
-    """The bytes of a TOML file, once it is sure that they are few and come.
-
-    Args:
-        path: of the file.
-
-    Raises:
-        SceneError: it is a pipe, or longer than `LONGEST_FILE`.
-        OSError: it cannot be read.
-    """
-    if waits(path):
-        raise SceneError("this is a pipe, which may never end; give a file")
-    with path.open("rb") as file:
-        content = file.read(LONGEST_FILE + 1)
-    if len(content) > LONGEST_FILE:
-        raise SceneError(f"the file is longer than {LONGEST_FILE // 10**6} MB; give a scene file (TOML)")
-    return content
-
-
-def read_toml(text: str) -> dict[str, object]:
-    """The tables of a TOML text.
-
-    Returns:
-        the tables by name.
-
-    Raises:
-        SceneError: the text is empty, no TOML, or holds too much (counted before it is parsed).
-    """
-    if not text.strip():
-        raise SceneError("the file is empty; give a scene (see examples/)")
-    _check_entries(text)
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"this is not TOML: {error}") from error
-    except RecursionError as error:
-        raise SceneError("this is not a scene: brackets are nested too deeply") from error
-    except ValueError as error:  # such as an integer of thousands of digits
-        raise SceneError(f"this is not TOML: {str(error).split(';')[0]}") from error
-
-
-def _check_entries(text: str) -> None:
-    """Refuse what a parser written in Python would take long for; strings and comments are counted, too."""
-    count, longest = sum(map(text.count, "\n,=[{\\")), 0
-    for found in _DOTTED.finditer(text):
-        parts = found.group().count(".")
-        count += parts - 1  # a number, or a key of two parts, has one dot
-        longest = max(longest, parts + 1)
-    check_limit("entries", count, "this file (lines, keys and values of lists)", SceneError)
-    if longest > MOST_PARTS:
-        raise SceneError(
-            f"this file has a key of {longest:,} parts with dots, more than {MOST_PARTS}; write tables of fewer"
-        )
 
 
 def read_table(kind: type[T], data: object, at: str) -> T:
@@ -374,15 +312,6 @@ def is_inside(folder: Path, place: Path) -> bool:
         return place.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):  # a loop of links, a null character: told where it is opened
         return True
-
-
-def waits(place: Path) -> bool:
-    """Whether it is a pipe or socket: opening one waits until somebody writes, which may be for ever."""
-    try:
-        mode = place.stat().st_mode
-    except (OSError, ValueError):  # told where it is opened
-        return False
-    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
 
 
 def inside(folder: Path, name: str, at: str) -> Path:

@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from bh.errors import InputError
-from bh.scene.reading import Table, as_table, check_keys, inside, one_line, read_table, read_toml, toml_bytes
+from bh.scene.reading import Table, as_table, check_keys, inside, one_line, read_table
+from bh.scene.toml_text import read_toml, toml_bytes
 from bh.sweep import SceneTask, scene
 from bh.sweep.dataset import Label
 from bh.sweep.measures import Measure

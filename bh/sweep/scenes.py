@@ -15,7 +15,7 @@ from bh.model.supports import select
 from bh.paths.path import Path as Trace
 from bh.scene.changes import setter
 from bh.scene.load import Scene, scene_from_tables
-from bh.scene.reading import read_toml
+from bh.scene.toml_text import read_toml
 from bh.solvers.arc_length import ArcLength
 from bh.solvers.automatic import Automatic
 from bh.solvers.load_control import LoadControl

@@ -22,8 +22,8 @@ from bh.formulations.registry import remarks
 from bh.scene.example import example
 from bh.scene.json_schema import schema
 from bh.scene.load import SECTIONS, load_scene, parse_scene
-from bh.scene.reading import read_toml
 from bh.scene.report import report
+from bh.scene.toml_text import read_toml
 from meshes.io.strokes import Rules, Stroke, parse_colour
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -206,6 +206,8 @@ def test_a_thousand_sines_are_meshed_in_seconds() -> None:
         ("".join(f"k{i} = 1\n" for i in range(60)), "120 entries, more than 100.*BH_LIMIT_ENTRIES"),
         ("a." * 40 + "a = 1", "a key of 41 parts with dots, more than 16; write tables of fewer"),
         ("['a' . " + '"b".' * 40 + "a]", "a key of 42 parts with dots, more than 16"),
+        ('a = "' + "x" * 4000 + '"', "longer than 0.004 MB.*BH_LIMIT_ENTRIES"),
+        (r'"\"\\".' * 20 + "a = 1", "a key of 21 parts with dots, more than 16"),
     ],
 )
 def test_toml_is_counted_before_it_is_parsed(
@@ -213,7 +215,7 @@ def test_toml_is_counted_before_it_is_parsed(
 ) -> None:
     """Of scenes and sweeps; tomllib is not called."""
     monkeypatch.setenv("BH_LIMIT_ENTRIES", "100")
-    monkeypatch.setattr("bh.scene.reading.tomllib.loads", Mock(side_effect=AssertionError("it was parsed")))
+    monkeypatch.setattr("bh.scene.toml_text.tomllib.loads", Mock(side_effect=AssertionError("it was parsed")))
     file = tmp_path / "bomb.toml"
     file.write_text(text, encoding="utf-8")
     for read in (bh.load_scene, load_sweep):

@@ -19,7 +19,7 @@ from bh.commands.cli import main
 from bh.errors import InputError, SceneError
 from bh.scene.json_schema import schema
 from bh.scene.load import parse_scene
-from bh.scene.reading import read_toml
+from bh.scene.toml_text import read_toml
 from meshes.quantities import UNITS, Kind, QuantityError, number, numbers, of_any_kind, spoken
 
 ROOT = Path(__file__).resolve().parents[2]
