@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import signal
 import sys
+import time
 from pathlib import Path
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -105,3 +107,30 @@ def test_attempts_are_kept_and_counted(tmp_path: Path, monkeypatch: pytest.Monke
     )
     assert result.notes == ["a kind: it broke"]
     assert "| a kind | a promise | 15 | 1 | 0.5 s |" in (tmp_path / "reliability.md").read_text()
+
+
+@linux
+def test_attempts_are_played_beside_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two at once, each kept under its own number; a kind that does not say so is played one by one."""
+    together, playing = Barrier(2, timeout=10.0), []
+
+    def beside(folder: Path, random: np.random.Generator) -> Found:
+        del folder
+        together.wait()
+        return Found(int(random.integers(1000)))
+
+    def alone(folder: Path, random: np.random.Generator) -> Found:
+        del folder, random
+        playing.append(1)
+        assert len(playing) == 1
+        time.sleep(0.05)
+        playing.pop()
+        return Found(1)
+
+    kinds = (Kind("beside", "", beside, 4, 4, at_once=True), Kind("alone", "", alone, 3, 3))
+    monkeypatch.setattr(attack, "KINDS", kinds)
+    monkeypatch.setattr(attack, "_count", lambda _result, _kind, found: counts.extend(f.tried for f in found))
+    counts: list[int] = []
+    attack.run(Context(tmp_path, True, lambda _text: None))
+    drawn = [int(np.random.default_rng([attack.SEED, 0, number]).integers(1000)) for number in range(4)]
+    assert counts == [*drawn, 1, 1, 1]

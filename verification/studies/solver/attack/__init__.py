@@ -2,7 +2,8 @@
 
 Every attempt is drawn from a seed and stored as it is done, so a run that was stopped goes on. A run stops taking new
 attempts of a kind when its share of time is over (half an hour, or BH_ATTACK_SECONDS), and says how many there were;
-running it again adds the rest.
+running it again adds the rest. Programs are started, 1.4 s of processor time each whatever they do, and waited for:
+BH_ATTACK_AT_ONCE attempts of a kind (two where it is not set) are played beside each other.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import math
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -24,28 +26,37 @@ from verification.studies.solver.attack.page import table
 
 CASE, RUNS, SEED = "attack", "attack_runs.json", 17
 SECONDS, SHARE = 1800.0, "BH_ATTACK_SECONDS"  # of a kind, and the variable that says otherwise
+AT_ONCE, BESIDE = 2, "BH_ATTACK_AT_ONCE"  # attempts of a kind, and the variable that says otherwise
 KEPT = "what is finished is kept, nothing is half-written, the end has the same bits, no process is left"
 ENDED = "one line and exit code 130 within 1 s (times the processes that share a core); and as above"
 CASES = "finished cases are stored with the same figures, the file is whole, no process is left"
 KINDS = (
     Kind("a file names code", "refused in one line, nothing of it is run", strangers.proofs, 1, 1),
     Kind("bombs", "one line within 5 s of processor time and 1 GB", bombs.bomb, 1, 1, "s"),
-    Kind("kills of bh run", KEPT, kills.killed_run, 4, 1),
-    Kind("Ctrl-C in bh run", ENDED, kills.interrupted_run, 4, 1, "s"),
-    Kind("kills of bh sweep, two workers", KEPT, kills.killed_sweep, 4, 1),
-    Kind("Ctrl-C in bh sweep, two workers", ENDED, kills.interrupted_sweep, 4, 1, "s"),
-    Kind("kills of bh verify, two workers", CASES, kills.killed_verify, 4, 0),
-    Kind("Ctrl-C in bh verify, two workers", ENDED, kills.interrupted_verify, 4, 0, "s"),
-    Kind("kills of bh report", CASES, kills.killed_report, 4, 0),
-    Kind("Ctrl-C in bh report", ENDED, kills.interrupted_report, 4, 0, "s"),
+    Kind("kills of bh run", KEPT, kills.killed_run, 4, 1, at_once=True),
+    Kind("Ctrl-C in bh run", ENDED, kills.interrupted_run, 4, 1, "s", at_once=True),
+    Kind("kills of bh sweep, two workers", KEPT, kills.killed_sweep, 4, 1, at_once=True),
+    Kind("Ctrl-C in bh sweep, two workers", ENDED, kills.interrupted_sweep, 4, 1, "s", at_once=True),
+    Kind("kills of bh verify, two workers", CASES, kills.killed_verify, 4, 0, at_once=True),
+    Kind("Ctrl-C in bh verify, two workers", ENDED, kills.interrupted_verify, 4, 0, "s", at_once=True),
+    Kind("kills of bh report", CASES, kills.killed_report, 4, 0, at_once=True),
+    Kind("Ctrl-C in bh report", ENDED, kills.interrupted_report, 4, 0, "s", at_once=True),
     Kind(
         "two writers of one folder",
         "one is refused, or they take turns; same states",
         places.two_writers,
         5,
         1,
+        at_once=True,
     ),
-    Kind("a full disk", "one line; with room it goes on to the same bits", places.full_disk, 10, 2),
+    Kind(
+        "a full disk",
+        "one line; with room it goes on to the same bits",
+        places.full_disk,
+        10,
+        2,
+        at_once=True,
+    ),
     Kind("a home that cannot be written", "works, and says nothing of it", places.no_home, 1, 1),
     Kind("four threads, fork, spawn", "the bits of one alone", places.threads_and_processes, 3, 1),
     Kind("two first imports at once", "both end, with the same bits", places.two_first_imports, 1, 0),
@@ -90,26 +101,46 @@ def run(context: Context) -> CaseResult:
         source="what docs/reliability.md promises",
     )
     store = Store.open(context.folder, RUNS, context.quick)
-    whole, share = True, float(os.environ.get(SHARE) or SECONDS)
+    whole = True
     for kind in KINDS:
         asked = kind.quick if context.quick else kind.attempts
-        began = time.monotonic()
-        found: list[Found] = []
-        for number in range(asked):
-            key = f"{kind.name}/{number}"
-            if key not in store.runs:
-                if time.monotonic() - began > share:
-                    whole = False
-                    break
-                context.tell(f"{CASE}: {kind.name}, {number + 1} of {asked}")
-                store.keep(key, attempt(kind, number).plain())
-            found.append(Found(**store.runs[key]))
+        _play(kind, asked, store, context)
+        keys = [f"{kind.name}/{number}" for number in range(asked)]
+        found = [Found(**store.runs[key]) for key in keys if key in store.runs]
+        whole = whole and len(found) == asked
         if found:
             _count(result, kind, found)
     if whole:
         store.file.unlink(missing_ok=True)
     (context.folder / "reliability.md").write_text(table(result.checks), encoding="utf-8")
     return result
+
+
+def _play(kind: Kind, asked: int, store: Store, context: Context) -> None:
+    """Play the attempts of a kind that are not stored, until its share of time is over; each is stored as it ends."""
+    share, began = float(os.environ.get(SHARE) or SECONDS), time.monotonic()
+    beside = int(os.environ.get(BESIDE) or AT_ONCE) if kind.at_once else 1
+
+    def one(number: int) -> tuple[int, Found | None]:
+        if time.monotonic() - began > share:
+            return number, None
+        context.tell(f"{CASE}: {kind.name}, {number + 1} of {asked}")
+        return number, attempt(kind, number)
+
+    missing = [number for number in range(asked) if f"{kind.name}/{number}" not in store.runs]
+    if beside == 1:
+        for number, found in map(one, missing):
+            if found is not None:
+                store.keep(f"{kind.name}/{number}", found.plain())
+        return
+    pool = ThreadPoolExecutor(beside)
+    try:
+        for done in as_completed([pool.submit(one, number) for number in missing]):
+            number, found = done.result()
+            if found is not None:
+                store.keep(f"{kind.name}/{number}", found.plain())
+    finally:  # an interrupt does not wait for the attempts that are being played
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _count(result: CaseResult, kind: Kind, found: list[Found]) -> None:

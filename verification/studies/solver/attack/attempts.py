@@ -44,6 +44,7 @@ class Kind:
         attempts: how many are asked for.
         quick: how many of them in a quick run.
         unit: of `Found.worst`; empty without one.
+        at_once: whether attempts may be played beside each other: they start programs, and nothing in this process.
     """
 
     name: str
@@ -52,3 +53,4 @@ class Kind:
     attempts: int
     quick: int
     unit: str = ""
+    at_once: bool = False

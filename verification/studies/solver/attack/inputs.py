@@ -27,8 +27,9 @@ fold = { crease = "crease", by = 0.3 }
 [[steps]]
 fold = { crease = "crease", by = 0.2 }
 """
+POINT = SCENE[: SCENE.index("[[steps]]")] + '[[steps]]\nfold = { crease = "crease", by = 0.3 }\n'
 SWEEP = """
-scene = "scene.toml"
+scene = "point.toml"
 [axes.t]
 key = "sheet.t"
 values = [0.1, 0.12, 0.14, 0.16]
@@ -36,6 +37,7 @@ values = [0.1, 0.12, 0.14, 0.16]
 
 
 def write(folder: Path) -> None:
-    """Put the scene and the sweep into a folder."""
+    """Put the scene, the sweep and the scene of its points into a folder."""
     (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
+    (folder / "point.toml").write_text(POINT, encoding="utf-8")
     (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8")

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,7 +26,19 @@ from verification.studies.solver.attack.programs import BH, Ended, play
 CHAIN = 10  # signals that hit, then the program may end
 SOON_S = 1.0  # within which an interrupted program has ended
 MOST_S = 25.0  # of a program's time in which it is killed
+T = TypeVar("T")
 CASES = ("shear_calibration", "strips")
+
+
+def one_at_a_time(make: Callable[..., T]) -> Callable[..., T]:
+    """What is made once and kept, also where attempts beside each other ask for it at the same time."""
+    kept, guard = cache(make), Lock()
+
+    def ask(*of: object) -> T:
+        with guard:
+            return kept(*of)
+
+    return ask
 
 
 def digest(*parts: bytes) -> str:
@@ -113,9 +127,9 @@ SWEEP = Target(
 )
 
 
-@cache
-def _reference(target: Target) -> tuple[str, float]:
-    """Bits and time, s, of a run that nobody disturbs."""
+@one_at_a_time
+def undisturbed(target: Target) -> tuple[str, float]:
+    """Bits and time, s, of a run that nobody disturbs; played once."""
     with TemporaryDirectory() as place:
         folder = Path(place)
         write(folder)
@@ -128,7 +142,7 @@ def _reference(target: Target) -> tuple[str, float]:
 
 def _disturbed(target: Target, send: signal.Signals, folder: Path, random: np.random.Generator) -> Found:
     """A chain of signals at random moments, each to a program that goes on; where one was done, it begins anew."""
-    bits, seconds = _reference(target)
+    bits, seconds = undisturbed(target)
     failures: list[str] = []
     worst, tried, before = 0.0, 0, 0
     write(folder)
@@ -212,7 +226,7 @@ def interrupted_sweep(folder: Path, random: np.random.Generator) -> Found:
 # ------------------------------------------------------------------------------------------ verify, report
 
 
-@cache
+@one_at_a_time
 def _figures() -> dict[str, str]:
     """Bits of the cases that `verify` is killed in, undisturbed."""
     with TemporaryDirectory() as place:
@@ -222,7 +236,7 @@ def _figures() -> dict[str, str]:
         return case_bits(Path(place) / "results" / "checks.json")
 
 
-@cache
+@one_at_a_time
 def _cases_s() -> float:
     """Time, s, in which verify and report are disturbed: until workers, which start as long, have ended a case."""
     with TemporaryDirectory() as place:

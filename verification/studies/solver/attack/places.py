@@ -14,8 +14,8 @@ import numpy as np
 
 import bh
 from verification.studies.solver.attack.attempts import Found
-from verification.studies.solver.attack.inputs import write
-from verification.studies.solver.attack.kills import RUN, digest, path_bits
+from verification.studies.solver.attack.inputs import SCENE, write
+from verification.studies.solver.attack.kills import RUN, digest, path_bits, undisturbed
 from verification.studies.solver.attack.programs import BH, play
 
 FOUR = 4
@@ -48,9 +48,7 @@ def two_writers(folder: Path, random: np.random.Generator) -> Found:
     """Two runs that go on in one folder at once: one of them, or both in turn, never both together."""
     del random
     write(folder)
-    play((*BH, *RUN.first), folder)
-    alone = path_bits(folder)
-    shutil.rmtree(folder / "out")
+    alone, _ = undisturbed(RUN)
     words = [*BH, *RUN.first]
     both = [
         subprocess.Popen(words, cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
@@ -129,14 +127,11 @@ def full_disk(folder: Path, random: np.random.Generator) -> Found:
     unshare = shutil.which("unshare")
     if unshare is None or subprocess.run([unshare, "-rm", "true"], capture_output=True).returncode != 0:
         return Found(0, skipped="no namespaces here, so no disk of one's own can be filled")
-    (folder / "alone").mkdir()
-    write(folder / "alone")
-    play((*BH, *RUN.first), folder / "alone")
-    texts = {"scene.toml": (folder / "alone" / "scene.toml").read_text(encoding="utf-8")}
+    alone, _ = undisturbed(RUN)
     (folder / "disk").mkdir()
     size = str(int(random.integers(4, 120)))
     words = [unshare, "-rm", sys.executable, "-c", FULL, str(folder / "disk"), size, json.dumps(BH)]
-    words += [json.dumps(texts), str(folder / "out")]
+    words += [json.dumps({"scene.toml": SCENE}), str(folder / "out")]
     done = subprocess.run(words, capture_output=True, text=True, cwd=folder)
     if done.returncode != 0:
         return Found(1, [f"{size} kB: {done.stderr.strip()[-300:]}"])
@@ -146,6 +141,6 @@ def full_disk(folder: Path, random: np.random.Generator) -> Found:
         failures.append(f"{size} kB, {kept}: exit code {code}: {said.strip()[-300:]}")
     if code_after != 0:
         failures.append(f"{size} kB, then room: exit code {code_after}: {said_after.strip()[-300:]}")
-    elif path_bits(folder) != path_bits(folder / "alone"):
+    elif path_bits(folder) != alone:
         failures.append(f"{size} kB, then room: other bits")
     return Found(1, failures)
