@@ -16,7 +16,7 @@ from verification.theory.wrapped import wrapped_by
 
 CASE = "contact"
 E, T, WIDE, HALF, RADIUS = 4000.0, 0.3, 5.0, 40.0, 60.0  # MPa, mm
-TRAVEL = 14.0  # mm
+TRAVEL = 12.0  # mm
 GAPS = (0.2, 0.1, 0.05)  # mm
 ALONG = (32, 64, 128)
 TOLERANCE = 0.02
