@@ -5,19 +5,11 @@ Everything below is loaded when it is first used, so that `import bh` is quick.
 
 from __future__ import annotations
 
-import sys as _sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-try:
-    from importlib import import_module
-    from typing import TYPE_CHECKING, Any
-
-    from bh.runtime import viewer as _viewer
-    from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
-except KeyboardInterrupt:  # of the command `bh` alone; of a user's own program it is the user's
-    if _sys.argv[0].rpartition("/")[2] != "bh":
-        raise
-    _sys.stderr.write("bh: interrupted\n")
-    raise SystemExit(130) from None
+from bh.runtime import viewer as _viewer
+from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
     from bh.applications.calibration import Calibration, Measured, calibrate
@@ -36,6 +28,7 @@ if TYPE_CHECKING:
     from bh.formulations.state import Energy, State
     from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
     from bh.model.crease_law import CreaseLaw
+    from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
     from bh.model.model import Model
     from bh.model.pinch import Pinch
     from bh.model.refinement import Goal, Refinement
@@ -67,6 +60,7 @@ _NAMES = {
     "bh.formulations.state": "Energy State",
     "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
     "bh.model.crease_law": "CreaseLaw",
+    "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
     "bh.model.refinement": "Goal Refinement",
@@ -114,18 +108,21 @@ __all__ = [
     "Actuation",
     "ArcLength",
     "Automatic",
+    "Bilinear",
     "Body",
     "Calibration",
     "Constraint",
     "CreaseLaw",
     "Displace",
     "DisplacementControl",
+    "ElasticPlastic",
     "ElementStiffness",
     "Energy",
     "Fold",
     "Force",
     "Formulation",
     "Goal",
+    "HingeLaw",
     "Hold",
     "Indenter",
     "InputError",
@@ -134,6 +131,7 @@ __all__ = [
     "Model",
     "ModelError",
     "Moment",
+    "MomentTable",
     "Newton",
     "NotReachedError",
     "NotReachedWarning",
@@ -150,6 +148,7 @@ __all__ = [
     "Settling",
     "Sheet",
     "SheetSystem",
+    "Softening",
     "State",
     "Step",
     "StepBuilder",

@@ -98,6 +98,11 @@ class ShellSystem:
             raise ModelError(
                 "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
             )
+        if load_step.curve is not None:
+            raise ModelError(
+                "the shell's creases are springs of one stiffness; take consistent or bars-and-hinges for a "
+                "crease with a law of its own"
+            )
         if load_step.bodies:
             raise ModelError(
                 "the shell knows no bars and tethers; take formulation consistent or bars-and-hinges"

@@ -168,8 +168,8 @@ class Chain:
     @property
     def closed(self) -> bool:
         """True where the last piece ends where the first one begins."""
-        ends = self.pieces[0].point(np.zeros(1))[0], self.pieces[-1].point(np.ones(1))[0]
-        return bool(np.allclose(*ends, rtol=0.0, atol=1e-9 * self.length))
+        (x, y), (u, v) = _end(self.pieces[0], 0.0), _end(self.pieces[-1], 1.0)
+        return max(abs(x - u), abs(y - v)) <= 1e-9 * self.length
 
     def point(self, u: Array) -> Array:
         """(k, 2) points, mm, at (k,) parts of the length in [0, 1]."""
@@ -190,6 +190,10 @@ class Chain:
     @np.errstate(invalid="ignore", over="ignore")  # what is not finite is refused by who reads it
     def sampled(self, tolerance: float) -> Array:
         """(k, 2) ends of chords that stay within `tolerance` (mm) of the curve, the ends of its pieces among them."""
+        if len(self.pieces) == 1 and isinstance(
+            line := self.pieces[0], Line
+        ):  # drawings have thousands of these
+            return np.array([line.start, line.end], dtype=np.float64)
         points = [self.pieces[0].point(np.zeros(1))]
         for piece in self.pieces:
             part = np.linspace(0.0, 1.0, _piece_chords(piece, tolerance) + 1)[1:]
@@ -272,6 +276,13 @@ def _pieces_of_arcs(curve: ArcChain) -> list[Piece]:
             found.append(Arc(_pair(centre), abs(radius), math.atan2(out[1], out[0]), turn))
         heading += turn
     return found
+
+
+def _end(piece: Piece, part: float) -> Pair:
+    """A piece's beginning (0) or end (1)."""
+    if isinstance(piece, Line):
+        return piece.end if part else piece.start
+    return _pair(piece.point(np.array([part]))[0])
 
 
 def _piece_chords(piece: Piece, tolerance: float) -> int:

@@ -31,6 +31,21 @@ def in_reading_order(sheets: Sequence[Any]) -> list[Any]:
     return [sheet for row in rows for sheet in sorted(row, key=lambda each: each.bounds[0])]
 
 
+def sheets_of(graph: Graph) -> list[Any]:
+    """What the lines of a graph enclose, each a polygon of shapely, in the order they are read in.
+
+    Args:
+        graph: healed, see `meshes.planar.heal`.
+
+    Returns:
+        the polygons, without the lines inside them.
+    """
+    import shapely
+
+    faces = shapely.get_parts(shapely.polygonize_full(shapely.linestrings(graph.points[graph.edges]))[0])
+    return in_reading_order(list(shapely.get_parts(shapely.union_all(faces))))
+
+
 def one_sheet(graph: Graph, number: int, fit: float | None, move: bool) -> Graph:
     """The part of a graph that belongs to one of its sheets.
 
@@ -45,8 +60,7 @@ def one_sheet(graph: Graph, number: int, fit: float | None, move: bool) -> Graph
     """
     import shapely
 
-    faces = shapely.get_parts(shapely.polygonize_full(shapely.linestrings(graph.points[graph.edges]))[0])
-    sheets = in_reading_order(list(shapely.get_parts(shapely.union_all(faces))))
+    sheets = sheets_of(graph)
     if not 1 <= number <= len(sheets):
         raise PatternError(f"sheet = {number} cannot be; the drawing holds {_counted(len(sheets))}")
     middles = shapely.points(graph.points[graph.edges].mean(axis=1))

@@ -23,6 +23,7 @@ from bh.runtime.threads import one_blas_thread
 from bh.solvers.factor import Factor, Matrix
 from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError
 from bh.solvers.saddle import MultiplierMatrix
+from bh.solvers.system import hessian
 
 Array = NDArray[np.float64]
 SMALL = 1e-5  # response at which the tangent is differenced, in parts of the sheet's extent
@@ -69,13 +70,13 @@ def buckling_modes(path: Path, *load: Actuation, count: int = 3) -> list[Bucklin
     system = loaded.system(len(path.model.steps))
     with one_blas_thread():
         q = system.start()
-        found = _modes(system, q, count)
+        found = _modes(system, q, count, loaded.model.mesh.size)
         return [BucklingMode(factor, _shape(system, u)) for factor, u in found]
 
 
-def _modes(system: SheetSystem, q: Array, count: int) -> list[tuple[float, Array]]:
-    """Factors and motions (n,), found in the metric of the tangent."""
-    matrix = _tangent(system, q, 0.0)
+def _modes(system: SheetSystem, q: Array, count: int, extent: float) -> list[tuple[float, Array]]:
+    """Factors and motions (n,) of a sheet of some extent (mm), found in the metric of the tangent."""
+    matrix = hessian(system, q, 0.0)
     if isinstance(matrix, FreeBodyMatrix):
         raise ModelError("a sheet that hangs free has no buckling load; add supports that carry the load")
     if isinstance(matrix, MultiplierMatrix):
@@ -95,8 +96,8 @@ def _modes(system: SheetSystem, q: Array, count: int) -> list[tuple[float, Array
         raise ModelError(
             "the load does nothing to this sheet; give one that its supports do not carry at once"
         )
-    s = SMALL * _extent(system.positions(q, 0.0)) / size
-    near, far = (_tangent(system, q + part * dq, part) for part in (0.5 * s, s))
+    s = SMALL * extent / size
+    near, far = (hessian(system, q + part * dq, part) for part in (0.5 * s, s))
 
     def softens(u: Array) -> Array:
         # minus K' u, by one-sided differences of second order: a step has no load before it
@@ -144,14 +145,6 @@ def _size(factor: Factor, softens: Callable[[Array], Array], size: int) -> float
         if growth == 0.0:
             break
     return growth
-
-
-def _tangent(system: SheetSystem, q: Array, lam: float) -> Matrix:
-    return system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
-
-
-def _extent(points: Array) -> float:
-    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def _shape(system: SheetSystem, u: Array) -> Array:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations.observables import OBSERVABLES
-from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model
 from bh.model.sheet import Sheet
 from bh.solving.trace import trace
@@ -259,10 +258,22 @@ def _replaced(model: Model, name: str, value: float) -> Model:
     if kind == "sheet" and key in {f.name for f in fields(Sheet)} and getattr(model.sheet, key) is not None:
         return replace(model, sheet=replace(model.sheet, **{key: value}))
     crease, _, what = key.rpartition(".")
-    if kind == "creases" and crease in model.creases and what in {f.name for f in fields(CreaseLaw)}:
-        law = model.creases[crease]
-        if getattr(law, what) is not None:
-            return replace(model, creases={**model.creases, crease: replace(law, **{what: value})})
+    if kind == "creases" and crease.endswith(".law") and crease.removesuffix(".law") in model.creases:
+        crease = crease.removesuffix(".law")
+        law = model.creases[crease].law
+        if law is not None and isinstance(getattr(law, what, None), float):
+            changed = replace(model.creases[crease], law=replace(law, **{what: value}))
+            return replace(model, creases={**model.creases, crease: changed})
+    elif kind == "creases" and crease in model.creases and what in {"Lstar", "stiffness", "rest"}:
+        spring = model.creases[crease]
+        if getattr(spring, what) is not None:
+            other = {
+                "Lstar": lambda: replace(spring, Lstar=value),
+                "stiffness": lambda: replace(spring, stiffness=value),
+                "rest": lambda: replace(spring, rest=value),
+            }[what]()
+            return replace(model, creases={**model.creases, crease: other})
     raise ModelError(
-        f"free '{name}' is no value of the model; give sheet.KEY or creases.NAME.KEY that it has, such as sheet.E"
+        f"free '{name}' is no value of the model; give sheet.KEY, creases.NAME.KEY or "
+        "creases.NAME.law.KEY that it has, such as sheet.E"
     )

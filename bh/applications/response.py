@@ -20,6 +20,7 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.load_control import LoadControl
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.outcome import Critical, Outcome
+from bh.solvers.system import hessian
 from bh.solving.trace import trace
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ def _points(
 
 def _stiffness(system: SheetSystem, q: Array, lam: float) -> float:
     """Second derivative of the energy along the path by lambda, N mm; nan where the tangent is singular."""
-    tangent = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
+    tangent = hessian(system, q, lam)
     rate = system.control_rate(q, lam)
     try:
         follows = tangent.factorise_any()[0].solve(rate)

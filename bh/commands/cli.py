@@ -6,28 +6,25 @@ Exit codes: 0 reached, or done; 1 a path that ended early, or a check that faile
 
 from __future__ import annotations
 
+import os
+import shlex
+import signal
 import sys
+import traceback
+from collections.abc import Callable, Sequence
+from importlib.metadata import EntryPoint, entry_points, version
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
 
-try:
-    import os
-    import shlex
-    import traceback
-    from collections.abc import Callable, Sequence
-    from importlib.metadata import EntryPoint, entry_points, version
-    from pathlib import Path
-    from typing import Annotated
+import typer
 
-    import typer
-
-    from bh.commands.compare import compare
-    from bh.commands.flat import export
-    from bh.commands.fold_options import fold
-    from bh.commands.response import response
-    from bh.runtime.consent import take_options
-    from bh.runtime.terminal import say
-except KeyboardInterrupt:  # `main` tells of it from here on
-    sys.stderr.write("bh: interrupted\n")
-    raise SystemExit(130) from None
+from bh.commands.compare import compare
+from bh.commands.flat import export
+from bh.commands.fold_options import fold
+from bh.commands.response import response
+from bh.runtime.consent import take_options
+from bh.runtime.terminal import say
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
@@ -55,13 +52,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in (words[: words.index("--")] if "--" in words else words)
     if debug:  # it may stand anywhere, also behind a command
         words.remove("--debug")
+    alone = arguments is None
     try:
+        if alone:  # until here an interrupt ended the process without more ado; see bh_command.py
+            _heed_interrupts(signal.default_int_handler)
         code = _run(words, debug)
+        if alone:  # all is told: Python need not be disturbed while it takes everything down
+            _heed_interrupts(signal.SIG_IGN)
     except KeyboardInterrupt:  # in the moment in which another end is told of
         code = _fail("interrupted", 130, debug)
-    if code == 130 and arguments is None:
+    if code == 130 and alone:
         _end_at_once(code)
     return code
+
+
+def _heed_interrupts(how: Callable[[int, FrameType | None], object] | signal.Handlers) -> None:
+    """Take interrupts in another way, unless they are ignored already, as behind `nohup` and `&`."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, how)
 
 
 def _end_at_once(code: int) -> None:
@@ -90,9 +98,18 @@ def _run(words: list[str], debug: bool) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
+        if _was_interrupted(error):
+            return _fail("interrupted", 130, debug)
         return _explain(error, debug)
     finally:
         take_back()
+
+
+def _was_interrupted(error: BaseException | None) -> bool:
+    """Whether an interrupt is behind an error; Python 3.11 makes a RuntimeError of one while a class is made."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__
+    return error is not None
 
 
 class _InterruptedError(Exception):

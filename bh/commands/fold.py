@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
@@ -35,6 +35,9 @@ from meshes.io.export import replacing
 
 Array = NDArray[np.float64]
 SHARE = 0.6  # of the time that is left goes to each of the scenes but the last
+# s that an evaluation of a system with its factors takes, and an unknown of it: time is counted by work, so that the
+# scene that is kept does not hang on the machine, or on what else runs on it
+EVALUATION, UNKNOWN = 3e-4, 1e-5
 LONG = 60.0  # s, after which a run that is not watched says what it does all the same
 
 
@@ -64,20 +67,20 @@ class Folded:
 
 
 class _Clock:
-    """A meter that hands on to another one and ends a run whose time is over.
+    """A meter that hands on to another one and ends a run whose time, counted by its work, is over.
 
     A run that would end in time at the pace of the last third of what it took goes on beyond its share.
 
     Args:
         inner: the meter.
-        seconds: processor time that is the run's share.
-        most: processor time that is left for everything.
+        seconds: the run's share of the time.
+        most: time that is left for everything, s.
     """
 
     def __init__(self, inner: ProgressMeter, seconds: float, most: float) -> None:
         self._inner = inner
         self._share, self._most = seconds, most
-        self._start = time.process_time()
+        self.spent = 0.0
         self._begin()
 
     def stage(self, words: str) -> None:
@@ -86,31 +89,33 @@ class _Clock:
 
     def _begin(self) -> None:
         """The way begins: time and way of states, 0 to 1."""
-        self._states = [(time.process_time(), 0.0)]
+        self._states = [(self.spent, 0.0)]
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
         self._inner.update(step, steps, lam, iterations, energy)
         way = (step + lam) / steps
         if way < self._states[-1][1]:  # on another mesh
             self._begin()
-        self._states.append((time.process_time(), way))
+        self._states.append((self.spent, way))
         self.check(lam)
+
+    def count(self, unknowns: int) -> None:
+        """Another evaluation of a system of this size."""
+        self.spent += EVALUATION + UNKNOWN * unknowns
 
     def check(self, lam: float) -> None:
         """Raise `TimeUpError` if the time is over."""
-        now = time.process_time()
-        spent = now - self._start
-        if spent <= self._share:
+        if self.spent <= self._share:
             return
-        third = (now - self._states[0][0]) / 3.0
+        third = (self.spent - self._states[0][0]) / 3.0
         way = self._states[-1][1]
-        lately = way - next(before for at, before in reversed(self._states) if at <= now - third)
-        if spent >= self._most or third * (1.0 - way) >= (self._most - spent) * lately:
-            raise TimeUpError(f"its {spent:.0f} s were over at lambda = {lam:.2f}")
+        lately = way - next(before for at, before in reversed(self._states) if at <= self.spent - third)
+        if self.spent >= self._most or third * (1.0 - way) >= (self._most - self.spent) * lately:
+            raise TimeUpError(f"its {self.spent:.0f} s were over at lambda = {lam:.2f}")
 
     def timed(self, strategy: Strategy) -> Strategy:
-        """The strategy, which ends where the time is over in the middle of an increment, too."""
-        return _Timed(strategy, self.check)
+        """The strategy, which counts its work and ends where the time is over in the middle of an increment, too."""
+        return _Timed(strategy, self)
 
     def close(self, outcome: str) -> None:
         self._inner.close(outcome)
@@ -118,10 +123,10 @@ class _Clock:
 
 @dataclass(frozen=True)
 class _Timed:
-    """A strategy whose systems look at the clock whenever they are evaluated."""
+    """A strategy whose systems tell the clock whenever they are evaluated."""
 
     inner: Strategy
-    check: Callable[[float], None]
+    clock: _Clock
 
     def __getattr__(self, name: str) -> object:
         return getattr(self.inner, name)  # what else drivers ask of a strategy
@@ -136,20 +141,21 @@ class _Timed:
         increment: float | None = None,
         origin: Point | None = None,
     ) -> Iterator[Increment]:
-        return self.inner.follow(cast(System, _TimedSystem(system, self.check)), history, increment, origin)
+        return self.inner.follow(cast(System, _TimedSystem(system, self.clock)), history, increment, origin)
 
 
 class _TimedSystem:
-    """A system that looks at the clock whenever it is evaluated."""
+    """A system that tells the clock whenever it is evaluated."""
 
-    def __init__(self, system: System, check: Callable[[float], None]) -> None:
-        self._system, self._check = system, check
+    def __init__(self, system: System, clock: _Clock) -> None:
+        self._system, self._clock = system, clock
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._system, name)
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
-        self._check(lam)
+        self._clock.count(len(q))
+        self._clock.check(lam)
         return self._system.evaluate(q, lam)
 
 
@@ -168,7 +174,8 @@ def fold_file(
         file: .svg, .dxf, .fold, .cp or .opx.
         folder: for the results; made if need be.
         wish: how to fold.
-        seconds: processor time; a scene that takes more than its share of it makes room for the next.
+        seconds: time for solving, counted by work (`UNKNOWN`); a scene that takes more than its share of it makes
+            room for the next.
         progress: as for `bh.trace`.
         force: write over a scene that is there.
 
@@ -189,8 +196,8 @@ def fold_file(
     tried: list[tuple[Proposal, Scene, Trace, Path]] = []
     notes: list[str] = []
     failed: InputError | None = None
+    left = seconds
     for number, offer in enumerate(offers):
-        left = seconds - (time.process_time() - began)
         if left <= 0.0 and tried:
             break
         share = left if number == len(offers) - 1 else SHARE * left
@@ -200,12 +207,14 @@ def fold_file(
             scene = replace(parse_scene(offer.text, folder, file.stem), source=target)
             report = meter(progress)
             stage(report, offer.mesh)
-            path, why = _solved(scene, place, _Clock(report, max(share, 1.0), max(left, 1.0)))
+            clock = _Clock(report, max(share, 1.0), max(left, 1.0))
+            path, why = _solved(scene, place, clock)
         except InputError as error:
             failed = failed or error
             notes.append(f"{offer.mesh}: {error}")
             shutil.rmtree(place, ignore_errors=True)
             continue
+        left -= clock.spent
         tried.append((offer, scene, path, place))
         if (
             path.reached

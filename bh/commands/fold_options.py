@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bh.runtime.terminal import say
-from bh.scene.options import a_length, a_time, an_angle
+from bh.scene.options import a_length, a_sheet, a_time, an_angle
+
+if TYPE_CHECKING:
+    from bh.commands.fold import Folded
 
 
 def fold(  # noqa: PLR0913 - the options of a command line
@@ -42,8 +45,13 @@ def fold(  # noqa: PLR0913 - the options of a command line
         str | None, typer.Option("--frame", help="Of a FOLD file: number (0 is the key frame) or title.")
     ] = None,
     sheet: Annotated[
-        int | None,
-        typer.Option("--sheet", min=1, help="Which of several sheets, in rows from the top left."),
+        str | None,
+        typer.Option(
+            "--sheet",
+            metavar="N|all",
+            parser=a_sheet,
+            help="Which of several sheets, in rows from the top left.",
+        ),
     ] = None,
     write: Annotated[
         list[str] | None,
@@ -51,29 +59,40 @@ def fold(  # noqa: PLR0913 - the options of a command line
     ] = None,
     seconds: Annotated[
         float,
-        typer.Option("--seconds", metavar="60s", parser=a_time, help="Processor time to spend on it."),
+        typer.Option(
+            "--seconds", metavar="60s", parser=a_time, help="For solving; counted by work, not by the clock."
+        ),
     ] = 60.0,
     force: Annotated[bool, typer.Option("--force", help="Write over a scene that is there.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Fold a drawing: picture, result and the scene that did it."""
     from bh.commands.fold import fold_file
-    from bh.commands.summary import summary
+    from bh.commands.fold_all import fold_sheets
     from bh.scene.folding import Wish
 
     number = int(frame) if frame is not None and frame.isdigit() else frame
-    wish = Wish(
-        angle,
-        percent,
-        material,
-        fit,
-        scale,
-        number,
-        sheet,
-        tuple(write or ()),
-    )
+    one = sheet if isinstance(sheet, int) else None
+    wish = Wish(angle, percent, material, fit, scale, number, one, tuple(write or ()))
     folder = Path(f"{file.stem}-folded") if output is None else output
-    done = fold_file(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
+    if sheet == "all":
+        together = fold_sheets(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
+        ended = [_told(done, f"{file}, sheet {at}", quiet) for at, done in together.sheets.items()]
+        for at, why in together.left.items():
+            say(f"bh: sheet {at} is left out: {why}", err=True)
+        if not quiet:
+            say(f"all sheets: {together.picture}")
+    else:
+        done = fold_file(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
+        ended = [_told(done, str(file), quiet)]
+    if not all(ended):
+        raise typer.Exit(1)
+
+
+def _told(done: Folded, name: str, quiet: bool) -> bool:
+    """Print what has come of a sheet; True if it folded all the way."""
+    from bh.commands.summary import summary
+
     if not quiet:
         for line in done.proposal.assumed:
             say(f"assumed: {line}")
@@ -83,8 +102,8 @@ def fold(  # noqa: PLR0913 - the options of a command line
         summary(done.path, done.scene, done.written, None)
     if not done.path.reached:
         say(
-            f"bh: {file}: folded to {100 * done.path[-1].lam:.0f} % of what was wanted ({done.notes[-1]}); "
+            f"bh: {name}: folded to {100 * done.path[-1].lam:.0f} % of what was wanted ({done.notes[-1]}); "
             f"more time: --seconds; what was reached is in '{done.written[2]}'",
             err=True,
         )
-        raise typer.Exit(1)
+    return done.path.reached

@@ -24,6 +24,8 @@ class Energy:
         lock: what the locks of hinges hold that are about to close (`Model.hinge_lock`), zero otherwise. It is no part
             of the theory and of none of the others, but of what the actuation has done as work:
             work = change of (total + lock + contact).
+        dissipated: what creases that yield have used up, as `lock` no part of the others; work = change of
+            (total + lock + contact + dissipated) where their angles are not imposed.
         contact: what panels hold that press on each other (`Model.contact`), zero otherwise; apart like the locks.
     """
 
@@ -32,6 +34,7 @@ class Energy:
     folding: float
     lock: float = 0.0
     contact: float = 0.0
+    dissipated: float = 0.0
 
     @property
     def total(self) -> float:
@@ -73,6 +76,8 @@ class State:
             keeps them otherwise.
         ended: the outcome where the path ended early at this state, such as "stalled": it is not what was asked for.
         stable: True if the tangent is positive definite there (False: not, None: not known).
+        crease_history: (m, 2) permanent turn of creases that yield and the sum of its changes, rad, zero elsewhere;
+            None where no crease of the sheet can yield.
         recover: what makes the resultants that `stress` is made of, when they are asked for; None where a formulation
             has none.
     """
@@ -92,6 +97,7 @@ class State:
     clamp_couples: Array | None = None
     ended: str = ""
     recover: Callable[[], Resultants] | None = None
+    crease_history: Array | None = None
 
     def __repr__(self) -> str:
         """One line: "State(step 0, lambda 1, energy 0.0534 N mm, stable)", or "..., ENDED EARLY: stalled)"."""
@@ -122,6 +128,17 @@ class State:
             (edges,) in order along the crease.
         """
         return self.crease_moments[crease_hinges(self.mesh, crease)]
+
+    def permanent_fold(self, crease: str) -> Array:
+        """Fold that a crease keeps when it is let go, one an edge in order, rad; mountain positive.
+
+        It is what its rest angle has moved by since the sheet was made; zero where the crease has not yielded.
+
+        Returns:
+            (edges,) in order along the crease.
+        """
+        hinges = crease_hinges(self.mesh, crease)
+        return np.zeros(len(hinges)) if self.crease_history is None else -self.crease_history[hinges, 0]
 
     def crease_points(self, crease: str) -> Array:
         """(k, 3) deformed nodes along a crease, in order, mm."""

@@ -17,6 +17,7 @@ from bh.loading.load_step import LoadStep, StepEnd
 from bh.loading.symmetry import Mirror, Plane, check, halved, mirror
 from bh.model.model import Model
 from bh.solvers.modes import count_negative
+from bh.solvers.system import hessian
 
 Array = NDArray[np.float64]
 
@@ -116,4 +117,4 @@ class Halves:
             q: (sheet.size,) unknowns of the whole.
             lam: load parameter of the step, 0 to 1.
         """
-        return count_negative(sheet.tangent(q, lam, sheet.evaluate(q, lam).forces).matrix)
+        return count_negative(hessian(sheet, q, lam))

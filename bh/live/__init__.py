@@ -4,6 +4,8 @@
 """
 
 from bh.live.controls import Controls, Grip
-from bh.live.session import Frame, Session
+from bh.live.frame import Frame
+from bh.live.holding import held
+from bh.live.session import Session
 
-__all__ = ["Controls", "Frame", "Grip", "Session"]
+__all__ = ["Controls", "Frame", "Grip", "Session", "held"]

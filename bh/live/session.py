@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +14,8 @@ from bh.formulations.protocols import SheetSystem
 from bh.formulations.registry import formulation
 from bh.formulations.state import State
 from bh.live.controls import CLOSED, Controls, Grip, Vector, Way, fold_of
+from bh.live.frame import Frame
+from bh.live.holding import chains, held
 from bh.live.march import March
 from bh.loading.builder import LoadStepBuilder
 from bh.loading.load_step import LoadStep, StepEnd
@@ -29,55 +30,6 @@ from meshes.mesh import count
 
 Array = NDArray[np.float64]
 GRIP = 200.0  # stiffness of a grip in parts of D / L^2, of a panel as large as the sheet: it gives way, yet leads
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """What is to be shown of a sheet under a hand: always a state in equilibrium.
-
-    Attributes:
-        state: the newest equilibrium.
-        controls: what it is in equilibrium with, and `wanted` what was asked for.
-        forces: (3,) of every grip on the sheet, N, by its node.
-        snapped: the sheet has left its branch since the frame before.
-        note: why it cannot go on to what is wanted, or an empty string.
-        iterations: of Newton's method in all so far.
-        seconds: that the update took.
-        fading: what has pulled until now still does, a part of it.
-    """
-
-    state: State
-    controls: Controls
-    wanted: Controls
-    forces: Mapping[int, Vector]
-    snapped: bool
-    note: str
-    iterations: int
-    seconds: float
-    fading: bool = False
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether this is the equilibrium of what is wanted."""
-        return self.controls == self.wanted and not self.fading
-
-    @property
-    def points(self) -> Array:
-        """(n, 3) node positions, mm."""
-        return self.state.points
-
-    def fold_angles(self) -> dict[str, float]:
-        """Mean fold angle of every crease that is handled.
-
-        Returns:
-            rad by name, positive the way that the crease is drawn.
-        """
-        mesh = self.state.mesh
-        return {
-            name: float(self.state.fold_angle(name).mean())
-            * (-1.0 if mesh.folds.get(name) == "valley" else 1.0)
-            for name in self.controls.folds
-        }
 
 
 @dataclass(eq=False)
@@ -108,11 +60,13 @@ class Session:
         Raises:
             ModelError: the sheet cannot be solved as described.
         """
+        if any(crease.law is not None and crease.law.remembers for crease in model.creases.values()):
+            raise ModelError("creases that yield remember their way; fold them by bh.trace or bh run")
         self.model = replace(model if model.supports else held(model), steps=())
         self._settings = settings or LoadControl()
         self._formulation = formulation(self.model.formulation)
         names = [name for name in self.mesh.creases if self.mesh.folds.get(name) != "flat"]
-        self._wanted = Controls(dict.fromkeys(_chains(self.mesh, names), 0.0))
+        self._wanted = Controls(dict.fromkeys(chains(self.mesh, names), 0.0))
         self._builder = LoadStepBuilder(self.model)
         self._gone: tuple[int, ...] = ()
         self._past: list[Controls] = []
@@ -260,6 +214,15 @@ class Session:
             frame = self.update(ends - time.perf_counter())
         return frame
 
+    def imbalance(self) -> float:
+        """Forces of the newest state that are out of balance, computed anew.
+
+        Returns:
+            the largest over the typical force of an element, as of `bh.solvers.system.Evaluation`.
+        """
+        here = self._under.march.here
+        return self._under.system.evaluate(here.q, here.lam).imbalance
+
     def scene(self) -> Model:
         """The model whose steps lead straight to what is wanted: one that folds, one that pulls.
 
@@ -301,9 +264,9 @@ class Session:
         under = self._under
         if under.march.stuck:
             return
-        if self._fading():
+        if under.load.force.start.any():  # forces fade out on it: it leads to its end and no further
             if under.way.end == self._wanted:
-                return  # to its end, where nothing pulls any more
+                return
         elif (lam := under.way.find(self._wanted)) is not None:
             under.march.target = lam
             return
@@ -330,18 +293,23 @@ class Session:
         return bool(force.start.any()) and self._under.march.here.lam != 1.0
 
     def _release(self, now: Controls, state: State) -> None:
-        """Nodes that are let go of keep their force as a dead one, which the next way fades out."""
+        """Nodes that are let go of keep their force as a dead one, which the next way fades out.
+
+        A node that was caught again while it faded has both: the force of its grip and what is left of the dead one.
+        """
         forces = self._forces(now, state)
+        under = self._under
+        left = under.load.force.at(under.march.here.lam)
         gone = [node for node in now.grips if node not in self._wanted.grips]
         if gone:
-            keep = Step(tuple(Force([node], each=forces[node]) for node in gone))
+            each = {node: (left[node] + forces[node]).tolist() for node in gone}
+            keep = Step(tuple(Force([node], each=(x, y, z)) for node, (x, y, z) in each.items()))
             self._builder.build(keep)
         still = [node for node in self._gone if self._fading()]  # what has faded out is forgotten
         self._gone = tuple(dict.fromkeys([*still, *gone]))
 
     def _begin(self, way: Way, state: State | None) -> _Under:
-        gone = tuple(node for node in self._gone if node not in way.end.grips)
-        items = way.actuations(self.model.creases, gone) or (Force([0], each=(0.0, 0.0, 0.0)),)
+        items = way.actuations(self.model.creases, self._gone) or (Force([0], each=(0.0, 0.0, 0.0)),)
         load = self._builder.build(Step(items))
         system = self._formulation.system(self.model, load, state)
         q = system.start()
@@ -391,38 +359,3 @@ class Session:
         """One line: "Session(1 crease, 1 grip, 722 unknowns)"."""
         grips, creases = count(len(self._wanted.grips), "grip"), count(len(self.creases), "crease")
         return f"Session({creases}, {grips}, {self._under.system.size:,} unknowns)"
-
-
-def held(model: Model) -> Model:
-    """The model held at three nodes of the triangle nearest to the middle of the sheet: six rigid motions, no more.
-
-    Args:
-        model: of a sheet without supports.
-
-    Returns:
-        the same with three supports.
-    """
-    mesh = model.mesh
-    corners = mesh.points[mesh.triangles]
-    middle = mesh.points.mean(axis=0)
-    nearest = int(np.argmin(np.linalg.norm(corners.mean(axis=1) - middle, axis=1)))
-    a, b, c = mesh.triangles[nearest].tolist()
-    along = mesh.points[b] - mesh.points[a]
-    along /= np.linalg.norm(along)
-    normal = np.cross(along, mesh.points[c] - mesh.points[a])
-    normal /= np.linalg.norm(normal)
-    across = np.cross(normal, along)
-    model = model.support([a], "xyz").support([b], [across.tolist(), normal.tolist()])
-    return model.support([c], [normal.tolist()])
-
-
-def _chains(mesh: SheetMesh, names: list[str]) -> list[str]:
-    """Names of creases that cover every creased edge once, shortest names of chains first: FOLD files have several."""
-    found: list[str] = []
-    seen: set[tuple[int, int]] = set()
-    for name in sorted(names, key=lambda each: len(mesh.crease_edges(each))):
-        edges = {(min(a, b), max(a, b)) for a, b in np.asarray(mesh.crease_edges(name)).tolist()}
-        if not edges & seen:
-            found.append(name)
-            seen |= edges
-    return [name for name in names if name in found]

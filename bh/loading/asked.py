@@ -35,6 +35,7 @@ class Asked:
     force: Array
     borne: Array
     pinched: NDArray[np.bool_]
+    curve: NDArray[np.int64]  # row of the builder's `laws` of creases that are no straight line, else -1
     displaced: dict[tuple[int, Direction], float]  # nan where it is not known yet
 
     @classmethod
@@ -51,6 +52,7 @@ class Asked:
             force=np.zeros((nodes, 3)),
             borne=np.zeros((nodes, 3)),
             pinched=np.zeros(hinges, dtype=bool),
+            curve=np.full(hinges, -1, dtype=np.int64),
             displaced={},
         )
 

@@ -15,6 +15,7 @@ from bh.loading.supports import Supports, isostatic
 from bh.model.actuations import Indenter
 from bh.model.constraints import Constraints, Prescribed, resolve
 from bh.model.crease_law import CreaseLaw
+from bh.model.hinge_laws import HingeLaw
 from bh.model.laws import PRESCRIBED, SPRING
 from bh.model.model import Model
 from bh.model.ramp import Ramp
@@ -44,9 +45,19 @@ class LoadStepBuilder:
         self._rest_of_laws = self._asked.rest.copy()  # they come in during the first step
         self._step = StepInHand.after(self._asked)
         self._begun = self._asked  # the beginning of the last step
+        self._laws: list[HingeLaw] = []
         for name, crease in model.creases.items():
-            self.spring(self._hinges(name), crease.Lstar, crease.stiffness)
-            self._rest_of_laws[self._hinges(name)] = crease.rest
+            found = self._hinges(name)
+            self._spring(found, crease)
+            self._rest_of_laws[found] = crease.rest
+            known = {self._laws[i] if i >= 0 else crease.law for i in self._asked.curve[found].tolist()}
+            if known != {crease.law}:
+                raise ModelError(
+                    f"crease '{name}' shares an edge with one of another law; give both the same"
+                )
+            if crease.law is not None:
+                self._asked.curve[found] = len(self._laws)
+                self._laws.append(crease.law)
         for step in model.steps:  # a spring that a later step names is there from the start, at rest flat
             for item in step.actuations:
                 item.prepare(self)
@@ -93,7 +104,10 @@ class LoadStepBuilder:
         Raises:
             ModelError: the crease has another stiffness already.
         """
-        value = CreaseLaw(Lstar, stiffness).per_length(self.sheet)
+        self._spring(hinges, CreaseLaw(Lstar, stiffness))
+
+    def _spring(self, hinges: Ints, crease: CreaseLaw) -> None:
+        value = crease.per_length(self.sheet)
         known = self._asked.stiffness[hinges]
         other = (self._asked.law[hinges] == SPRING) & ~np.isclose(known, value, rtol=1e-12)
         if other.any():
@@ -127,6 +141,7 @@ class LoadStepBuilder:
         asked = self._asked
         if zone is None:
             self._turn(hinges, angle)
+        release = release or bool((asked.curve[hinges] >= 0).all())  # its law is known; it is let go of
         if release:
             self._step.released[hinges] = asked.law[hinges] == PRESCRIBED
             asked.law[hinges], asked.prescribed[hinges] = SPRING, np.nan
@@ -209,7 +224,8 @@ class LoadStepBuilder:
         for item in step.actuations:
             if item.late:
                 item.apply(self)
-        start.rest[now.released] = start.rest_ends[now.released] = np.nan
+        freed = now.released & (asked.curve >= 0)  # they go on from where their own law is
+        start.rest[now.released & ~freed] = start.rest_ends[now.released & ~freed] = np.nan
         end = asked.copy()
         return LoadStep(
             law=end.law,
@@ -223,6 +239,9 @@ class LoadStepBuilder:
             constraints=self._constraints(start, bool(now.bodies), bool(step.release)),
             bodies=tuple(now.bodies),
             releases=bool(step.release),
+            curve=end.curve if self._laws else None,
+            laws=tuple(self._laws),
+            freed=freed if freed.any() else None,
         )
 
     def ended(self, points: Array) -> None:
@@ -249,7 +268,7 @@ class LoadStepBuilder:
         )
         asked.borne = Ramp(self._begun.borne, asked.borne).at(end.lam)
         asked.force = force - asked.borne
-        if np.isnan(asked.rest).any():
+        if np.isnan(asked.rest).any() or step.freed is not None:
             raise ModelError(
                 "a prescribed crease is released in a step that ends early (until); release it in a step before"
             )

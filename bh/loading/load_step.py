@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.model.constraints import Constraints
+from bh.model.hinge_laws import HingeLaw
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.ramp import Ramp
 from bh.model.step import Body
@@ -60,6 +61,9 @@ class LoadStep:
         constraints: supports and prescribed displacements.
         bodies: indenters and tethers that act in this step.
         releases: supports are let go of, whose forces on the sheet go to zero during the step.
+        curve: (m,) row of `laws` of creases whose moment is no straight line, else -1; None where there is none.
+        laws: those laws.
+        freed: (m,) such creases whose angle was imposed up to here; what imposed it fades out during the step.
     """
 
     law: NDArray[np.int64]
@@ -73,6 +77,9 @@ class LoadStep:
     constraints: Constraints
     bodies: tuple[Body, ...] = ()
     releases: bool = False
+    curve: Ints | None = None
+    laws: tuple[HingeLaw, ...] = ()
+    freed: NDArray[np.bool_] | None = None
 
     def prescribed_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""
@@ -128,6 +135,8 @@ def same_until_here(one: LoadStep, other: LoadStep) -> bool:
     """
 
     def alike(a: object, b: object) -> bool:
+        if isinstance(a, np.ndarray) is not isinstance(b, np.ndarray):
+            return False
         if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
             return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
         if isinstance(a, Ramp | Pinched | Constraints) and type(a) is type(b):

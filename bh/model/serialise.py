@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bh.errors import PathFileError
 from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
 from bh.model.crease_law import CreaseLaw
+from bh.model.hinge_laws import LAWS, HingeLaw
 from bh.model.model import Model
 from bh.model.pinch import Pinch
 from bh.model.plugins import consent, from_file
@@ -70,7 +71,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
             **({"remarks": list(mesh.remarks)} if mesh.remarks else {}),
         },
         "supports": [_support(s) for s in model.supports],
-        "creases": {name: _plain(law) for name, law in model.creases.items()},
+        "creases": {name: _crease(law) for name, law in model.creases.items()},
         "steps": [_step(step) for step in model.steps],
     }
     return data, arrays
@@ -108,7 +109,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             sheet=Sheet(**data["sheet"]),
             supports=tuple(_constraint(s) for s in data["supports"]),
             steps=tuple(_stored_step(step) for step in data["steps"]),
-            creases={name: CreaseLaw(**law) for name, law in data["creases"].items()},
+            creases={name: _stored_crease(law) for name, law in data["creases"].items()},
             formulation=_agreed(data["formulation"]),
             stiffness=ElementStiffness(arrays["stiffness/bars"], arrays["stiffness/hinges"], data["green"])
             if "stiffness/bars" in arrays
@@ -133,6 +134,31 @@ def fingerprint(model: Model) -> str:
 
 def _plain(item: Any) -> dict[str, Any]:
     return {f.name: _jsonable(getattr(item, f.name)) for f in fields(item)}
+
+
+def _crease(crease: CreaseLaw) -> dict[str, object]:
+    found = {
+        key: value for key, value in vars(crease).items() if key != "law"
+    }  # fingerprints as ever without one
+    return found if crease.law is None else {**found, "law": _tagged(crease.law, LAWS)}
+
+
+def _stored_crease(data: Mapping[str, Any]) -> CreaseLaw:
+    law = data.get("law")
+    return CreaseLaw(**{**data, "law": None if law is None else stored_law(law)})
+
+
+def stored_law(data: Mapping[str, object]) -> HingeLaw:
+    """The law that keys and a `kind` describe; "module:Class" is one of the user's own.
+
+    Args:
+        data: plain data.
+
+    Raises:
+        ModelError: it names code that nobody has allowed to run.
+    """
+    law: HingeLaw = _untagged(data, LAWS, HingeLaw)
+    return law
 
 
 def _tagged(item: Any, kinds: Mapping[str, type]) -> dict[str, Any]:

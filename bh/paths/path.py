@@ -27,7 +27,7 @@ from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.runtime import viewer
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import ARC, CriticalPoint
-from bh.solvers.system import Limited, Rounded
+from bh.solvers.system import Limited, Remembering, Rounded, remembering
 from meshes.mesh import count
 
 if TYPE_CHECKING:
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 LARGE_STRAIN = 0.05  # of an edge; what is beyond gets a remark
-# a force of rounding that is this part of a typical one hides it: of 56 sheets under tiny loads all that were off by
-# more than 0.1 % had 0.45 or more, and all to 0.22 were right; a sheet that folds as a mechanism moves farther
-HIDDEN, TINY = 0.3, 1e-2
+# forces of rounding over the typical one and energy of rounding over that of the state, which together hide it (of 56
+# sheets); a sheet that folds as a mechanism moves farther than tiny loads would
+HIDDEN, NOISY, TINY = 0.3, 0.5, 1e-2
 
 
 class Path:
@@ -204,11 +204,11 @@ class Path:
         system = self.system(last.step)
         if not isinstance(system, Rounded):
             return []
-        part = system.rounding(last.q, last.lam)
-        if part < HIDDEN:
+        noise, energy = system.noise(last.q, last.lam), self[-1].energy.total
+        if system.rounding(last.q, last.lam) < HIDDEN or noise < NOISY * energy:
             return []
         return [
-            f"loads so small that rounding hides them (forces of rounding are {part:.1g} times the typical one): "
+            f"loads so small that rounding hides them (it makes an energy of {noise:.1g} N mm of {energy:.1g}): "
             "energy and shape of the last state may be wrong; solve it for larger loads and scale it down"
         ]
 
@@ -256,7 +256,8 @@ class Path:
         index = range(len(self))[index]
         if index not in self._states:
             record = self.records[index]
-            self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
+            with remembering(self.system(record.step), record.history):
+                self._states[index] = self.observe(record.step, record.q, record.lam, record.stable)
         ended = str(self.outcome) if index == len(self) - 1 and self.ended_early else ""
         if self._states[index].ended != ended:
             self._states[index] = replace(self._states[index], ended=ended)
@@ -289,7 +290,10 @@ class Path:
             the system and the record.
         """
         record = self.records[range(len(self))[index]]
-        return self.system(record.step), record
+        system = self.system(record.step)
+        if record.history is not None and isinstance(system, Remembering):
+            system.remember(record.history)
+        return system, record
 
     def plot(self, **options: Any) -> Any:
         """Show the last state as a picture; options of `bh.plotting.show`."""
@@ -303,12 +307,7 @@ class Path:
         Raises:
             PathFileError: the file cannot be written.
         """
-        target = new_file(self, FilePath(file))
-        for index in range(len(self)):
-            target.add(self.row(index))
-        for step, end in enumerate(self.steps):
-            target.finish_step(step, *astuple(end))
-        target.close()
+        rewritten(self, FilePath(file)).close()
         self.save_accuracy(file)
 
     def save_accuracy(self, file: str | FilePath) -> None:
@@ -369,7 +368,7 @@ class Path:
         return StateRow(
             record.step, record.lam, record.iterations, record.imbalance, record.negative, record.mode, record.jumped,
             record.wall_time_s, record.next_increment, (energy.stretching, energy.bending, energy.folding),
-            record.note, record.cuts, record.q, self[index].points, critical,
+            record.note, record.cuts, record.q, self[index].points, critical, record.history,
         )  # fmt: skip
 
     def system(self, step: int) -> SheetSystem:
@@ -432,3 +431,18 @@ def new_file(path: Path, file: FilePath) -> PathFile:
     """
     data, arrays = describe(path.model)
     return PathFile.create(file, {"model": data, "provenance": path.provenance}, arrays)
+
+
+def rewritten(path: Path, file: FilePath) -> PathFile:
+    """A new file, still open, that has all that a path has, in place of an older one.
+
+    Args:
+        path: whose states and ends of steps are written.
+        file: place of the path file.
+    """
+    target = new_file(path, file)
+    for index in range(len(path)):
+        target.add(path.row(index))
+    for step, end in enumerate(path.steps):
+        target.finish_step(step, *astuple(end))
+    return target

@@ -38,6 +38,8 @@ class Record:
 
     `negative` counts the negative modes of the tangent, `mode` says how to go on from here, `jumped` that the state
     lies on another branch than the one before, `critical` holds the limit and bifurcation points passed before it.
+    `history` is what the system is to remember from here on, None where it remembers nothing
+    (`bh.solvers.system.Remembering`).
     """
 
     step: int
@@ -53,6 +55,7 @@ class Record:
     cuts: tuple[str, ...] = ()
     jumped: bool = False
     critical: tuple[CriticalPoint, ...] = ()
+    history: Array | None = None
 
     @classmethod
     def of_row(cls, row: StateRow) -> Record:
@@ -63,6 +66,7 @@ class Record:
             critical=tuple(
                 CriticalPoint(Critical(c.kind), c.lam, c.q, c.mode, c.negative, c.error) for c in row.critical
             ),
+            history=row.history,
         )  # fmt: skip
 
     def of_whole(self, half: Half) -> Record:

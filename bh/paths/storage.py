@@ -2,8 +2,10 @@
 
 Tables: `meta` (key, JSON value), `arrays` (name, dtype, shape, data) with the model, `states` with one row for each
 accepted state (step, lambda, energies in N mm, unknowns and node positions as little-endian float64), `critical` with
-the limit and bifurcation points that were passed, `steps` with the outcome of every finished step. Any SQLite reader
-opens it; a killed run leaves a file that is complete up to its last state.
+the limit and bifurcation points that were passed, `history` with what creases that yield have been through (permanent
+turn of every hinge and the sum of its changes, rad; one row for each state of a sheet that has some), `steps` with the
+outcome of every finished step. Any SQLite reader opens it; a killed run leaves a file that is complete up to its last
+state.
 """
 
 from __future__ import annotations
@@ -38,6 +40,7 @@ CREATE TABLE critical (
     id INTEGER PRIMARY KEY, state INTEGER NOT NULL REFERENCES states (id), step INTEGER NOT NULL, kind TEXT NOT NULL,
     lambda REAL NOT NULL, error REAL NOT NULL, negative_before INTEGER NOT NULL, negative_behind INTEGER NOT NULL,
     unknowns BLOB NOT NULL, mode BLOB NOT NULL);
+CREATE TABLE history (state INTEGER PRIMARY KEY REFERENCES states (id), turns BLOB NOT NULL);
 CREATE TABLE steps (
     step INTEGER PRIMARY KEY, outcome TEXT NOT NULL, reason TEXT NOT NULL, iterations INTEGER NOT NULL);
 """
@@ -73,6 +76,7 @@ class StateRow(NamedTuple):
     q: Array
     points: Array
     critical: tuple[CriticalRow, ...] = ()
+    history: Array | None = None
 
 
 class PathFile:
@@ -166,6 +170,8 @@ class PathFile:
                 " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 values,
             ).lastrowid
+            if row.history is not None:
+                self._db.execute("INSERT INTO history VALUES (?, ?)", (state, _little(row.history).tobytes()))
             self._db.executemany(
                 "INSERT INTO critical (state, step, kind, lambda, error, negative_before, negative_behind, unknowns,"
                 " mode) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -240,7 +246,7 @@ class PathFile:
 
     def states(self) -> Iterator[StateRow]:
         """All accepted states, in order."""
-        critical = self._critical()
+        critical, history = self._critical(), self._history()
         rows = self._db.execute(
             "SELECT id, step, lambda, iterations, imbalance, negative, mode, jumped, wall_time_s, next_increment,"
             " stretching, bending, folding, note, cuts, unknowns, points FROM states ORDER BY id"
@@ -267,7 +273,14 @@ class PathFile:
             yield StateRow(
                 step, lam, its, imbalance, negative, mode, bool(jumped), wall, nxt, (s, b, f), note,
                 tuple(json.loads(cuts)), _floats(q), _floats(points).reshape(-1, 3), tuple(critical.get(row, ())),
+                history.get(row),
             )  # fmt: skip
+
+    def _history(self) -> dict[int, Array]:
+        """What creases remember, by the row of the state; files of versions without creases that yield have none."""
+        known = self._db.execute("SELECT count(*) FROM sqlite_master WHERE name = 'history'").fetchone()[0]
+        rows = self._db.execute("SELECT state, turns FROM history") if known else ()
+        return {state: _floats(turns).reshape(-1, 2) for state, turns in rows}
 
     def _critical(self) -> dict[int, list[CriticalRow]]:
         """Critical points by the row of the state that they were passed before."""

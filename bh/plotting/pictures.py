@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import tempfile
@@ -86,6 +87,43 @@ def picture(
     with replacing(target) as temporary:
         figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
     return target.resolve()
+
+
+def side_by_side(
+    states: Sequence[State], file: str | os.PathLike[str], size: tuple[int, int] = (600, 450)
+) -> FilePath:
+    """Write a picture of several folded sheets, to one scale, in rows from the top left.
+
+    Args:
+        states: one a sheet; at least one.
+        file: to write, .png; appears whole or not at all.
+        size: width and height that each gets, pixels.
+
+    Returns:
+        The absolute path of the file.
+
+    Raises:
+        PlotError: no states, a size that cannot be, or no library to draw with.
+        FileFormatError: the file cannot be written.
+    """
+    if not states:
+        raise PlotError("there is no sheet to draw")
+    width, height = _possible(size)
+    cameras = [camera_of(state, width / height, None) for state in states]
+    half = max(camera.half_height for camera in cameras)
+    tiles = [
+        _render(state, None, size, camera._replace(half_height=half))
+        for state, camera in zip(states, cameras, strict=True)
+    ]
+    columns = math.ceil(math.sqrt(len(tiles)))
+    rows = math.ceil(len(tiles) / columns)
+    blank = np.ones_like(tiles[0])
+    tiles += [blank] * (rows * columns - len(tiles))
+    whole = np.vstack([np.hstack(tiles[columns * row : columns * (row + 1)]) for row in range(rows)])
+    figure = _frame(whole, (columns * width, rows * height), 0, "", None)
+    with replacing(FilePath(file)) as temporary:
+        figure.savefig(temporary, format="png", dpi=100, metadata={"Software": None})
+    return FilePath(file).resolve()
 
 
 def moving_pictures(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +82,10 @@ def _rescued(file: Path, found: Found, options: dict[str, object], assumed: list
         words = "no closed outline is drawn: the convex hull of all lines is taken"
     elif (sheets := SHEETS.search(why)) and "sheet" not in options:
         more = {"sheet": 1}
-        words = f"the drawing holds {sheets[1]} sheets: the first from the top left is folded; --sheet 2 folds another"
+        words = (
+            f"the drawing holds {sheets[1]} sheets: the first from the top left is folded; --sheet 2 folds another, "
+            "--sheet all each of them"
+        )
     else:
         return found
     again = _read(file, options | more)
@@ -94,21 +98,25 @@ def _rescued(file: Path, found: Found, options: dict[str, object], assumed: list
 
 def _read(file: Path, options: Mapping[str, object]) -> Found:
     """Own faces first, a pattern where these will not do: creases that bend, lines that end inside, no faces."""
-    from meshes.io import read_drawn, read_fold, read_pattern
+    from meshes.io import read_fold
+    from meshes.io.drawing import ReadDrawing, read_drawing
+
+    @cache
+    def lines() -> ReadDrawing:
+        return read_drawing(file, **dict(options))  # type: ignore[arg-type]
 
     found = Found()
-    given = dict(options)
     try:
-        if file.suffix.lower() == ".fold" and not given.keys() & {"sheet", "outline", "gap"}:
-            frame = given.pop("frame", None)
-            found.faces = read_fold(file, frame, **given)  # type: ignore[arg-type]
+        if file.suffix.lower() == ".fold" and not options.keys() & {"sheet", "outline", "gap"}:
+            given = dict(options)
+            found.faces = read_fold(file, given.pop("frame", None), **given)  # type: ignore[arg-type]
         else:
-            found.faces = read_drawn(file, **given)  # type: ignore[arg-type]
+            found.faces = lines().faces()
     except InputError as error:
         found.why.append(error)
     if found.faces is None or (found.faces.flat and (_bent(found.faces) or _has_curves(found.faces))):
         try:
-            found.pattern = read_pattern(file, **dict(options))  # type: ignore[arg-type]
+            found.pattern = lines().pattern()
         except InputError as error:
             found.why.append(error)
     return found

@@ -28,6 +28,7 @@ from bh.model.until import Until
 from bh.scene.bodies import BODIES, body
 from bh.scene.changes import set_keys
 from bh.scene.contact import contact_of
+from bh.scene.crease_tables import crease_law
 from bh.scene.meshing import Drawn, mesh_of
 from bh.scene.reading import (
     arguments,
@@ -321,7 +322,8 @@ def _vectors(fix: list[float] | list[list[float]], at: str) -> tuple[tuple[float
 def _crease(item: object, at: str) -> CreaseLaw:
     table = read_table(CreaseTable, item, at)
     with within(at):
-        return CreaseLaw(table.Lstar, table.stiffness, table.rest)
+        law = None if table.law is None else crease_law(table.law, f"{at}.law")
+        return CreaseLaw(table.Lstar, table.stiffness, table.rest, law)
 
 
 def _step(item: object, at: str) -> Step:

@@ -46,3 +46,16 @@ def a_time(text: str) -> float:
         typer.BadParameter: the text is none; one line.
     """
     return _read(text, "time")
+
+
+def a_sheet(text: str | int) -> int | str:
+    """The number of a sheet, from 1, or "all".
+
+    Raises:
+        typer.BadParameter: the text is neither; one line.
+    """
+    if text == "all" or (isinstance(text, int) and text > 0):
+        return text
+    if not isinstance(text, str) or not text.isdecimal() or int(text) < 1:
+        raise typer.BadParameter(f"'{text}' is no sheet; give a number from 1, or all")
+    return int(text)

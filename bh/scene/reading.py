@@ -54,6 +54,7 @@ _STIFF, _SECTOR, _PINCHED = (
     Interval(gt=0.0, lt=math.pi),
 )
 _TURN = Interval(ge=-TURN, le=TURN)
+_BEND = Interval(gt=0.0, le=TURN)
 
 Number = Annotated[float, _ANY]
 Positive = Annotated[float, _POSITIVE]
@@ -64,6 +65,8 @@ Curvature = Annotated[float, _ANY, spelled("curvature", _ANY)]
 Modulus = Annotated[float, _POSITIVE, spelled("modulus", _POSITIVE)]
 Stiffness = Annotated[float, _STIFF, spelled("stiffness", _STIFF)]
 Stiff = Annotated[float, _POSITIVE, spelled("stiffness", _POSITIVE)]
+Slope = Annotated[float, _ANY, spelled("stiffness", _ANY)]
+Bend = Annotated[float, _BEND, spelled("angle", _BEND)]
 Couple = Annotated[float, _ANY, spelled("couple", _ANY)]
 Closing = Annotated[float, _POSITIVE, spelled("couple", _POSITIVE)]
 Seconds = Annotated[float, _POSITIVE, spelled("time", _POSITIVE)]

@@ -214,11 +214,15 @@ class CreaseTable(Table):
     Lstar: Scale | None = Field(None, description=LSTAR)
     stiffness: Stiffness | None = Field(None, description="a stiffness a length, N mm / (mm rad), 0 or more")
     rest: Rest = Field(math.pi, description="a rest dihedral angle in rad from 0 to 2 pi (flat is pi)")
+    law: dict[str, object] | None = Field(
+        None,
+        description='a table with kind = "table", "bilinear", "softening", "elastic-plastic" or "module:Class"',
+    )
 
     @model_validator(mode="after")
     def one_stiffness(self) -> CreaseTable:
-        """Check that the stiffness is given in one of the two ways."""
-        if (self.Lstar is None) == (self.stiffness is None):
+        """Check that the stiffness is given in one of the two ways; where there is a law it tells."""
+        if self.law is None and (self.Lstar is None) == (self.stiffness is None):
             raise ValueError("needs either Lstar (mm) or stiffness (N mm / (mm rad)), one of them")
         return self
 

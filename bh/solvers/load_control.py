@@ -186,7 +186,7 @@ class LoadControl:
             step = min(largest, self._next(lam - here.lam, tried.solution.iterations, bool(cuts), imposed))
             yield Increment(
                 tried.point, Outcome.REACHED, iterations, imbalance, step, tuple(cuts), tried.note, bool(tried.note),
-                critical,
+                critical, tried.solution.factorised,
             )  # fmt: skip
             cuts, iterations, looked = [], 0, False
 
@@ -200,7 +200,9 @@ class LoadControl:
         mode that is left alone.
         """
         here = points[-1]
-        newton = replace(self.newton, unstable=self.at_bifurcation != "stable", held=held)
+        newton = replace(
+            self.newton, unstable=self.at_bifurcation != "stable", held=held, keep=lam >= 1.0
+        )  # where a step ends more is asked of the state
         method = replace(newton, globalised=0, hasty=True) if brisk or look else newton
         tangent = self._tangent_guess(system, points, lam)
         q, forces = _clear_guess(system, here, lam, extrapolate(points, lam), tangent)

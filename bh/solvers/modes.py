@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.matrices import Factor, IndefiniteError, Matrix
-from bh.solvers.saddle import MultiplierMatrix
+from bh.solvers.saddle import DenseSchurFactor, MultiplierFactor, MultiplierMatrix
 
 Array = NDArray[np.float64]
 NEUTRAL = 1e-13  # shift, in parts of the diagonal, at which an eigenvalue is zero but for rounding
@@ -29,16 +29,29 @@ def count_negative(matrix: Matrix, gap: float = GAP) -> int:
         matrix: symmetric.
         gap: see `neutral_mode`.
     """
+    return count_and_factor(matrix, gap)[0]
+
+
+def count_and_factor(matrix: Matrix, gap: float = GAP) -> tuple[int, Factor | None]:
+    """`count_negative`, and the factor that it was seen from.
+
+    Args:
+        matrix: symmetric.
+        gap: see `neutral_mode`.
+
+    Returns:
+        the number, and the factor of a matrix that is positive definite, but for a shift at the level of rounding;
+        None of one that is not.
+    """
     try:
-        matrix.factorise(NEUTRAL)
-        return 0
+        return 0, matrix.factorise(NEUTRAL)
     except IndefiniteError:
         try:
             counted = max(matrix.factorise_any()[1], 1)
         except IndefiniteError as error:
             counted = max(error.negative, 1)
     lowest = neutral_mode(matrix, len(matrix.diagonal()), gap)
-    return counted - 1 if lowest is not None and lowest.negative else counted
+    return counted - 1 if lowest is not None and lowest.negative else counted, None
 
 
 class NeutralMode(NamedTuple):
@@ -84,6 +97,46 @@ def neutral_mode(matrix: Matrix, primal: int, gap: float = GAP, iterations: int 
     if not abs(stiffnesses[soft]) < gap * stiffnesses[following]:
         return None
     return NeutralMode(bool(stiffnesses[soft] < 0.0), modes @ turns[:, soft])
+
+
+def softness(factor: Factor, primal: int) -> float:
+    """Stiffness of the softest mode in parts of the next one's, by two steps of inverse iteration with two vectors.
+
+    Only solves are needed: for Y = K^-1 V the matrix projected on the modes is Y^T K Y = V^T Y.
+
+    Args:
+        factor: of a positive definite matrix K; of one with multipliers it is the augmented one that is looked at.
+        primal: number of unknowns that are no multipliers.
+
+    Returns:
+        0 to 1; 1 where there is but one mode.
+    """
+    if isinstance(factor, MultiplierFactor | DenseSchurFactor):
+        factor = factor.factor
+    if primal < 2:
+        return 1.0
+    start = np.random.default_rng(20).normal(size=(primal, 2))
+    modes, _ = _orthonormal(factor.solve(start[:, 0]), factor.solve(start[:, 1]))
+    solved = np.array([factor.solve(mode) for mode in modes])
+    compliances, turns = np.linalg.eigh(modes @ solved.T)
+    # the softer one first: then the triangle R of Y = Q R is graded, and the stiff one is not lost beside the soft one
+    order = np.argsort(-np.abs(compliances))
+    _, triangle = _orthonormal(*(turns[:, order].T @ solved))
+    inverse = np.linalg.inv(triangle)
+    stiffnesses = np.abs(np.linalg.eigvalsh((inverse.T * compliances[order]) @ inverse))
+    return float(stiffnesses.min() / stiffnesses.max())
+
+
+def _orthonormal(first: Array, second: Array) -> tuple[Array, Array]:
+    """Two vectors (n,) made orthonormal (Gram-Schmidt, twice), as rows, and the triangle (2, 2) that was taken out."""
+    size = float(np.sqrt(first @ first))
+    first = first / size
+    share = 0.0
+    for _ in range(2):
+        more = float(first @ second)
+        second, share = second - more * first, share + more
+    rest = float(np.sqrt(second @ second))
+    return np.array([first, second / rest]), np.array([[size, share], [0.0, rest]])
 
 
 def without(factor: Factor, x: Array, mode: Array) -> Array:

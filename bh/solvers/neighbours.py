@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.matrices import IndefiniteError
-from bh.solvers.modes import lowest_mode, neutral_mode
+from bh.solvers.modes import count_and_factor, lowest_mode, softness
 from bh.solvers.newton import Newton, Solution
-from bh.solvers.points import Point
-from bh.solvers.system import System
+from bh.solvers.points import Factorised, Point
+from bh.solvers.system import System, Tangent
 
 Array = NDArray[np.float64]
 PUSHES = (0.3, 0.8)  # along the softest mode, in parts of the largest unknown; from 0.1 all came back
 SOFT = 1e-3  # a mode whose stiffness is less than this part of the next one's may lead anywhere
-ITERATIONS = 2  # of inverse iteration: a mode as soft as that stands out at once, and every step pays for it
 OTHER = 1e-5  # difference of energy, in parts of it, from which two states are not one
 DOWNHILL = 40  # steps at most
 
@@ -49,7 +48,9 @@ class Neighbour(NamedTuple):
         return f"another stable state is within reach ({-self.lower:.3g} N mm or {-self.part:.2%} higher)"
 
 
-def look_around(system: System, here: Point, doubtful: bool, newton: Newton) -> str:
+def look_around(
+    system: System, here: Point, doubtful: bool, newton: Newton, factorised: Factorised | None = None
+) -> str:
     """What lies beside the end of a step, where the way there, or the state itself, gives reason to look.
 
     Args:
@@ -57,29 +58,39 @@ def look_around(system: System, here: Point, doubtful: bool, newton: Newton) -> 
         here: its last state.
         doubtful: whether to look anyway; else only where a mode hardly resists.
         newton: settings of the solves.
+        factorised: what the state's stability was seen from; None to make it anew.
 
     Returns:
         one clause, or an empty string.
     """
-    if here.negative or not (doubtful or nearly_neutral(system, here)):
+    if here.negative:
         return ""
-    found = neighbour(system, here, newton)
+    if factorised is None:
+        tangent = system.tangent(here.q, here.lam, here.forces)
+        factorised = Factorised(tangent, None if doubtful else count_and_factor(tangent.matrix)[1])
+    if not (doubtful or nearly_neutral(system, factorised)):
+        return ""
+    found = neighbour(system, here, newton, tangent=factorised.tangent)
     return "" if found is None else str(found)
 
 
-def nearly_neutral(system: System, here: Point) -> bool:
+def nearly_neutral(system: System, factorised: Factorised) -> bool:
     """Whether a mode of a state hardly resists, beside the next one.
 
     Args:
         system: of the step.
-        here: a state in equilibrium.
+        factorised: what the stability of a state was seen from that has no negative mode; without a factor what
+            rounding makes of a neutral mode is all that is negative.
     """
-    matrix = system.tangent(here.q, here.lam, here.forces).matrix
-    return neutral_mode(matrix, system.primal, SOFT, ITERATIONS) is not None
+    return factorised.factor is None or softness(factorised.factor, system.primal) < SOFT
 
 
 def neighbour(
-    system: System, here: Point, newton: Newton, pushes: tuple[float, ...] = PUSHES
+    system: System,
+    here: Point,
+    newton: Newton,
+    pushes: tuple[float, ...] = PUSHES,
+    tangent: Tangent | None = None,
 ) -> Neighbour | None:
     """The stable state of least energy, other than `here`, that pushes along the softest mode lead to.
 
@@ -88,14 +99,16 @@ def neighbour(
         here: a stable state.
         newton: settings of the solves.
         pushes: in parts of the largest unknown.
+        tangent: of the state, if it is at hand.
 
     Returns:
         None where every push leads back, or nowhere.
     """
+    tangent = tangent or system.tangent(here.q, here.lam, here.forces)
     best: Neighbour | None = None
     spent = 0
     scale = 1e-12 * system.energy_scale
-    for found in _pushed(system, here, newton, pushes):
+    for found in _pushed(system, here, tangent, newton, pushes):
         spent += found.iterations
         if not (found.converged and found.stable) or system.penetration(here.q, here.lam, found.q, here.lam):
             continue
@@ -111,9 +124,10 @@ def neighbour(
     return None if best is None else best._replace(iterations=spent)
 
 
-def _pushed(system: System, here: Point, newton: Newton, pushes: tuple[float, ...]) -> Iterator[Solution]:
+def _pushed(
+    system: System, here: Point, tangent: Tangent, newton: Newton, pushes: tuple[float, ...]
+) -> Iterator[Solution]:
     """What solves from both sides of a state come to; by full steps, else downhill."""
-    tangent = system.tangent(here.q, here.lam, here.forces)
     p = system.primal
     try:
         _, mode = lowest_mode(tangent.matrix, len(here.q), p)

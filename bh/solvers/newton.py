@@ -17,18 +17,21 @@ from bh.solvers.modes import (
     KNOWN_GAP,
     NEUTRAL,
     ROUNDED,
-    count_negative,
+    count_and_factor,
     factorise_shifted,
     lowest_mode,
     without,
 )
+from bh.solvers.points import Factorised
 from bh.solvers.pseudo_transient import PseudoTransient
-from bh.solvers.system import Evaluation, System, limited
+from bh.solvers.system import Evaluation, Rounded, System, limited
 
 Array = NDArray[np.float64]
 INDEFINITE = "indefinite tangent"  # why full Newton gave up
 ALONG = "out of balance along the neutral mode"
 NEUTRAL_IMBALANCE = 100.0  # of the tolerance: what a neutral mode may have
+HIDING = 1e-3  # forces of rounding over the typical one, above which a guess in balance may only look so
+FALL = 1e-9  # part of the energy that a step has to gain to show it
 NO_STEP = 1e-10  # of the unknowns: a step that changes nothing
 ENDLESS = 1e100  # size of a step that a singular tangent has made
 NEAR_SADDLE = 1e-3  # imbalance below which an indefinite tangent is that of a saddle
@@ -39,7 +42,8 @@ class Solution:
     """What came of one solve; `q` is only an equilibrium where `converged`.
 
     `iterations` counts factorisations that moved the state; `negative` the negative eigenvalues of the Hessian there
-    (on the null space of the constraints; 0: stable), None where that was not looked at.
+    (on the null space of the constraints; 0: stable), None where that was not looked at. `factorised` is what they
+    were counted from, if it was to be kept.
     """
 
     q: Array
@@ -49,6 +53,7 @@ class Solution:
     reason: str = ""
     negative: int | None = None
     globalised: bool = False
+    factorised: Factorised | None = field(default=None, compare=False)
 
     @property
     def stable(self) -> bool | None:
@@ -73,6 +78,7 @@ class Newton:
         hasty: give full Newton up where its steps contract too slowly; for increments that are cheaper cut than saved.
         held: (primal,) a neutral mode that full steps leave alone (`bh.solvers.modes.neutral_mode`), None without one.
         unstable: take indefinite tangents as they are and take full steps only, to stay on a branch that is not stable.
+        keep: hand on the tangent and the factor of the state that is found (`Solution.factorised`); they take memory.
     """
 
     tolerance: float = 1e-8
@@ -83,6 +89,7 @@ class Newton:
     hasty: bool = False
     held: Array | None = None
     unstable: bool = False
+    keep: bool = False
 
     def solve(
         self,
@@ -276,9 +283,31 @@ class Newton:
     def _finish(
         self, system: System, q: Array, lam: float, now: Evaluation, iterations: int, globalised: bool
     ) -> Solution:
-        matrix = system.tangent(q, lam, now.forces).matrix
-        negative = count_negative(matrix, GAP if self.held is None else KNOWN_GAP)
-        return Solution(q, now, iterations, True, "", negative, globalised)
+        if iterations == 0 and not self.unstable:
+            q, now, iterations = self._past_rounding(system, q, lam, now)
+        tangent = system.tangent(q, lam, now.forces)
+        negative, factor = count_and_factor(tangent.matrix, GAP if self.held is None else KNOWN_GAP)
+        kept = Factorised(tangent, factor) if self.keep else None
+        return Solution(q, now, iterations, True, "", negative, globalised, kept)
+
+    def _past_rounding(
+        self, system: System, q: Array, lam: float, now: Evaluation
+    ) -> tuple[Array, Evaluation, int]:
+        """A step from a guess that was in balance as it was, where rounding hides the forces under tiny loads.
+
+        They are sums of large ones along stiff directions; what bends the sheet is known much better, so the step is
+        good where the balance says nothing. It is kept where the energy falls by it.
+        """
+        if not isinstance(system, Rounded) or system.rounding(q, lam) < HIDING:
+            return q, now, 0
+        factor = self._full_factor(system.tangent(q, lam, now.forces).matrix)
+        if factor is None:
+            return q, now, 0
+        there = q + limited(system, q, self._full_step(factor, now.residual), lam)
+        then = system.evaluate(there, lam)
+        if then.imbalance > self.tolerance or not now.energy - then.energy > FALL * abs(then.energy):
+            return q, now, 0
+        return there, then, 1
 
 
 def exhaust(steps: Generator[Array, None, Solution]) -> Solution:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.factor import IndefiniteError
+from bh.solvers.factor import Factor, IndefiniteError
 from bh.solvers.outcome import Critical, Outcome
-from bh.solvers.system import Evaluation, System
+from bh.solvers.system import Evaluation, System, Tangent
 
 Array = NDArray[np.float64]
 
@@ -63,6 +63,19 @@ class CriticalPoint:
     error: float
 
 
+@dataclass(frozen=True, eq=False)
+class Factorised:
+    """What the negative modes of a state were counted from, for who asks more of it.
+
+    Attributes:
+        tangent: at the state.
+        factor: of its matrix, but for a shift at the level of rounding; None where that is not positive definite.
+    """
+
+    tangent: Tangent
+    factor: Factor | None
+
+
 @dataclass(frozen=True)
 class Increment:
     """What one increment of lambda came to.
@@ -70,7 +83,7 @@ class Increment:
     `outcome` is "reached" for an accepted state; else it names why the step could not go on and `point` is the last
     accepted state. `cuts` tells why the increment was cut before it was accepted. `jumped` is True where the state
     lies on another branch than the one before, so that nothing can be extrapolated through it; `critical` holds what
-    was passed on the way.
+    was passed on the way. `factorised` is what stability was seen from at the end of a step, where it is at hand.
     """
 
     point: Point
@@ -82,6 +95,7 @@ class Increment:
     note: str = ""
     jumped: bool = False
     critical: tuple[CriticalPoint, ...] = ()
+    factorised: Factorised | None = field(default=None, compare=False)
 
     @property
     def reached(self) -> bool:

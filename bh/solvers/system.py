@@ -5,7 +5,8 @@ All actuation enters through one scalar lambda, which runs from 0 to 1 in a step
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -206,6 +207,15 @@ class Rounded(Protocol):
         """
         ...
 
+    def noise(self, q: Array, lam: float) -> float:
+        """Energy that rounding of the positions alone makes of a state, N mm.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        ...
+
 
 @runtime_checkable
 class Limited(Protocol):
@@ -220,6 +230,25 @@ class Limited(Protocol):
             lam: load parameter of the step, 0 to 1.
         """
         ...
+
+
+@contextmanager
+def remembering(system: System, history: Array | None) -> Iterator[None]:
+    """The system as it was with a `history`; a run that is under way finds it afterwards as it has left it.
+
+    Args:
+        system: any; only those that are `Remembering` change.
+        history: what it remembered; None for nothing.
+    """
+    if history is None or not isinstance(system, Remembering):
+        yield
+        return
+    kept = system.history
+    system.remember(history)
+    try:
+        yield
+    finally:
+        system.remember(kept)
 
 
 def limited(system: System, q: Array, dq: Array, lam: float) -> Array:
@@ -274,6 +303,17 @@ def pressing(system: System, q: Array, lam: float) -> bool:
     return touches is not None and touches(q, lam)
 
 
+def hessian(system: System, q: Array, lam: float) -> Matrix:
+    """Second derivative of the energy: the tangent with the element forces of the state itself.
+
+    Args:
+        system: that is asked.
+        q: (n,) unknowns.
+        lam: load parameter of the step, 0 to 1.
+    """
+    return system.tangent(q, lam, system.evaluate(q, lam).forces).matrix
+
+
 def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, float], float]) -> bool:
     """Does `measure`, zero in equilibrium, grow to first order along the path's own tangent from an accepted state?
 
@@ -287,12 +327,51 @@ def grows_ahead(system: System, q: Array, lam: float, measure: Callable[[Array, 
         True if it grows by more than a millionth a unit of lambda; False also where the tangent is indefinite.
     """
     try:
-        factor = system.tangent(q, lam, system.evaluate(q, lam).forces).matrix.factorise(1e-9)
+        factor = hessian(system, q, lam).factorise(1e-9)
     except IndefiniteError:
         return False
     ahead = 1e-3 * max(lam, 0.01)
     moved = q - ahead * factor.solve(system.control_rate(q, lam))
     return measure(moved, lam + ahead) - measure(q, lam) > 1e-6 * ahead
+
+
+@runtime_checkable
+class Remembering(Protocol):
+    """Ability of a system: what it answers may depend on states that were accepted before.
+
+    Between two accepted states it answers as an elastic one whose energy includes what is dissipated on the way from
+    the last of them. Who accepts a state says so: `system.remember(system.history_at(q, lam))`.
+    """
+
+    @property
+    def remembers(self) -> bool:
+        """Does it, in this model?"""
+        ...
+
+    @property
+    def history(self) -> Array:
+        """What was accepted last, in the system's own order."""
+        ...
+
+    def history_at(self, q: Array, lam: float) -> Array:
+        """What is to be remembered where a state is accepted.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            an array of the shape of `history`.
+        """
+        ...
+
+    def remember(self, history: Array) -> None:
+        """Go on from there.
+
+        Args:
+            history: as `history_at` gives it.
+        """
+        ...
 
 
 @runtime_checkable

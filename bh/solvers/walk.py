@@ -93,7 +93,12 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
                 return
             target, imbalance, spent = found
             yield replace(
-                item, point=target, iterations=item.iterations + spent, imbalance=imbalance, critical=()
+                item,
+                point=target,
+                iterations=item.iterations + spent,
+                imbalance=imbalance,
+                critical=(),
+                factorised=None,
             )
             return
         yield item

@@ -17,7 +17,7 @@ from bh.loading.load_step import same_until_here
 from bh.model.compare import differing_keys, first_differing_step, in_words
 from bh.model.model import Model
 from bh.model.serialise import describe, fingerprint
-from bh.paths.path import Path, new_file
+from bh.paths.path import Path, new_file, rewritten
 from bh.paths.record import Record, StepOutcome
 from bh.paths.storage import PathFile
 from bh.runtime.lock import only_writer
@@ -27,12 +27,14 @@ from bh.solvers.automatic import Automatic
 from bh.solvers.neighbours import look_around
 from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
-from bh.solvers.points import LOAD, Point, point
+from bh.solvers.points import LOAD, Increment, Point, point
+from bh.solvers.system import Remembering
 from bh.solvers.walk import Strategy, Walk, walk
 from bh.solving.coarser import Coarser
 from meshes.mesh import count
 
 if TYPE_CHECKING:
+    from bh.formulations.protocols import SheetSystem
     from bh.formulations.symmetry_reduction import Half
     from bh.loading.symmetry import Plane
 
@@ -77,7 +79,7 @@ def follow(  # noqa: PLR0913 - the options of `bh.trace`, all by name
     report = meter(progress)
     with nullcontext() if file is None else only_writer(FilePath(file)):
         if begun is not None:
-            path, target = begun, None if file is None else _rewritten(begun, FilePath(file))
+            path, target = begun, None if file is None else rewritten(begun, FilePath(file))
         else:
             path, target = _opened(model, symmetry, file, resume, after)
         _walk(path, target, strategy, report, None if coarser is None else Coarser(coarser), neighbours)
@@ -98,11 +100,12 @@ def _walk(
         for step in range(len(path.steps), len(model.steps)):
             with one_blas_thread():
                 way = strategy if coarser is None else coarser.guiding(strategy, model.mesh, step)
-                end = _run_step(path, step, way, report, target)
+                end, last = _run_step(path, step, way, report, target)
                 if end.reached and step == len(model.steps) - 1:
                     end = _stable_end(path, strategy)
                 if end.reached and neighbours is not False:
-                    end = StepOutcome(end.outcome, _beside(path, step, bool(neighbours)))
+                    end = StepOutcome(end.outcome, _beside(path, step, bool(neighbours), last))
+                del last  # its factor takes memory, which the next step may need
             path.steps.append(end)
             if target is not None:
                 target.finish_step(step, *astuple(end))
@@ -131,7 +134,8 @@ def _opened(
 
 def _run_step(
     path: Path, step: int, strategy: Strategy, report: ProgressMeter, target: PathFile | None
-) -> StepOutcome:
+) -> tuple[StepOutcome, Increment | None]:
+    """How a step ended, and its last increment; None where nothing was left to solve."""
     began = time.perf_counter()
     try:
         half = path.half(step)
@@ -139,9 +143,14 @@ def _run_step(
     except NotHeldError as error:  # in a state that nobody knew before
         if not path.records:
             raise
-        return StepOutcome(Outcome.MECHANISM, str(error))
+        return StepOutcome(Outcome.MECHANISM, str(error)), None
+
+    memory = system if isinstance(system, Remembering) and system.remembers else None
 
     def accept(record: Record) -> None:
+        if memory is not None:
+            memory.remember(memory.history_at(record.q, record.lam))
+            record = replace(record, history=memory.history)
         record = record if half is None else record.of_whole(half)
         path.records.append(record)
         if target is not None:
@@ -162,17 +171,18 @@ def _run_step(
             began = time.perf_counter()
     else:
         recent = [record if half is None else record.of_half(half) for record in _recent(done)]
-        history = [point(system, r.q, r.lam, r.mode, negative=r.negative) for r in recent]
+        history = _points(system, memory, done, recent)
         increment = done[-1].next_increment
         if (
             len(history) < 3 and step > 0 and not any(r.jumped for r in done)
         ):  # later steps do not store their start
             history.insert(0, origin)
     goal, tolerance = _goal(path, step, half)
+    item: Increment | None = None
     for item in walk(Walk(system, strategy, tuple(history), increment, origin, goal, tolerance)):
         now = time.perf_counter()
         if not item.reached:
-            return StepOutcome(item.outcome, item.note, item.iterations)
+            return StepOutcome(item.outcome, item.note, item.iterations), item
         at = item.point
         accept(
             Record(
@@ -183,20 +193,38 @@ def _run_step(
         )  # fmt: skip
         report.update(step, len(path.model.steps), at.lam, item.iterations, at.energy)
         began = time.perf_counter()
-    return StepOutcome(Outcome.REACHED)
+    # a tangent made before the end was remembered is not that of the end
+    return StepOutcome(Outcome.REACHED), item if memory is None else None
 
 
-def _beside(path: Path, step: int, asked: bool) -> str:
+def _points(
+    system: SheetSystem, memory: Remembering | None, done: list[Record], recent: list[Record]
+) -> list[Point]:
+    """The last records of a step as the run has seen them: each with what was remembered before it was accepted."""
+    found = []
+    for r, behind in zip(recent, [None, *done][len(done) - len(recent) :], strict=False):
+        if memory is not None and behind is not None and behind.history is not None:
+            memory.remember(behind.history)
+        found.append(point(system, r.q, r.lam, r.mode, negative=r.negative))
+    if memory is not None and done[-1].history is not None:
+        memory.remember(done[-1].history)
+    return found
+
+
+def _beside(path: Path, step: int, asked: bool, item: Increment | None) -> str:
     """A clause on another stable state beside the end of a step, or an empty string.
 
     It is looked for where it is `asked`, where an increment of the path was cut or took many iterations, where it has
     jumped or passed a critical point, and where a mode hardly resists; the look's iterations are not the path's.
     """
-    half, last = path.half(step), path.records[-1]
-    system, record = (path.system(step), last) if half is None else (half.system, last.of_half(half))
+    half = path.half(step)
+    system = path.system(step) if half is None else half.system
     doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in path.records)
     if not asked and path.model.stops_itself:
         return ""  # pushed states would have to find ways round all that presses, which takes longer than the path
+    if item is not None:
+        return look_around(system, item.point, doubtful, Newton(), item.factorised)
+    record = path.records[-1] if half is None else path.records[-1].of_half(half)
     here = point(system, record.q, record.lam, negative=record.negative)
     return look_around(system, here, doubtful, Newton())
 
@@ -302,17 +330,7 @@ def _resume_before(
     fresh = Path(model, symmetry=symmetry)
     fresh.records = [record for record in path.records if record.step < kept]
     fresh.steps = path.steps[:kept]
-    return fresh, _rewritten(fresh, file)
-
-
-def _rewritten(path: Path, file: FilePath) -> PathFile:
-    """A new file that has all that a path has, in place of an older one."""
-    target = new_file(path, file)
-    for index in range(len(path)):
-        target.add(path.row(index))
-    for step, end in enumerate(path.steps):
-        target.finish_step(step, *astuple(end))
-    return target
+    return fresh, rewritten(fresh, file)
 
 
 def _with_model(path: Path, model: Model, symmetry: Plane | None) -> Path:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 import bh.studio.messages as asked
 from bh.errors import InputError
-from bh.live import Controls, Session
-from bh.live.session import held
+from bh.live import Controls, Session, held
 from bh.model.sheet import Sheet
 from bh.solving.trace import trace
 from bh.studio.colours import offered, top_of
 from bh.studio.exports import export
-from bh.studio.frames import Json, described, head_of, line, packed
+from bh.studio.finer import Finer, finer
+from bh.studio.frames import Json, creases_of, described, head_of, line, packed, surface
 from bh.studio.sheets import LiveSheet, material_of, of_file, of_library
 
 BUDGET = 0.03  # s of an update
@@ -35,6 +36,7 @@ class Desk:
         self._colour = "bending"
         self._shown: tuple[object, ...] = ()
         self._snapped = False  # since the last picture
+        self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
         self.put(sheet or of_library("arc"))
 
     # ------------------------------------------------------------------------------- what is asked
@@ -200,6 +202,39 @@ class Desk:
         """
         self.work(budget)
         return self.picture()
+
+    def finer(self, going: Callable[[], bool], heard: int = 0) -> bytes | None:
+        """The state that is shown, on a finer mesh; other threads may work at the desk meanwhile.
+
+        Args:
+            going: asked between two iterations; False ends it.
+            heard: messages that have come until now; it is handed on.
+
+        Returns:
+            a frame of kind "finer" with its mesh, the error of the energy and why there is none; None where it was
+            ended, or there is no state at rest to be refined.
+        """
+        key, frame = self._now(), self.frame
+        if not frame.at_rest:
+            return None
+        if self._finer is None or self._finer[0] != key:
+            found = finer(self.sheet.model, frame, going)
+            if found is None:
+                return None
+            self._finer = key, found
+        found = self._finer[1]
+        head: Json = {"kind": "finer", "heard": heard, "error": found.error, "reason": found.reason}
+        state = found.state
+        if state is None:
+            return packed(head)
+        chosen = self._colours.get(self._colour)
+        values = np.zeros(len(state.points)) if chosen is None else chosen.values(state)
+        mesh = {**surface(state.mesh), "creases": creases_of(state.mesh)}
+        return packed(
+            {**head, "mesh": mesh, "top": top_of(values), "energy": state.energy.as_dict()},
+            state.points,
+            values,
+        )
 
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name."""

@@ -77,6 +77,25 @@ def surface(mesh: SheetMesh) -> Json:
     }
 
 
+def creases_of(mesh: SheetMesh) -> list[Json]:
+    """Name, kind and edges of every crease.
+
+    Args:
+        mesh: of a sheet.
+
+    Returns:
+        one each, with edges as pairs of nodes in one list.
+    """
+    return [
+        {
+            "name": name,
+            "fold": mesh.folds.get(name, "flat"),
+            "edges": np.asarray(mesh.crease_edges(name)).ravel().tolist(),
+        }
+        for name in mesh.creases
+    ]
+
+
 def described(
     sheet: LiveSheet, session: Session, material: str, colours: Mapping[str, Colour], colour: str
 ) -> Json:
@@ -91,14 +110,8 @@ def described(
     """
     mesh, model = session.mesh, sheet.model
     creases = [
-        {
-            "name": name,
-            "fold": mesh.folds.get(name, "flat"),
-            "edges": np.asarray(mesh.crease_edges(name)).ravel().tolist(),
-            "full": sheet.full.get(name, np.pi),
-            "handled": name in session.creases,
-        }
-        for name in mesh.creases
+        {**each, "full": sheet.full.get(str(each["name"]), np.pi), "handled": each["name"] in session.creases}
+        for each in creases_of(mesh)
     ]
     return {
         "kind": "sheet",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+import threading
 import webbrowser
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -26,6 +27,7 @@ HOST = "127.0.0.1"
 STATIC = Path(__file__).with_name("static")
 LONGEST_MESSAGE = LONGEST * 4 // 3 + 4096  # bytes of a file in base64, and its name
 WINDOWS = 8  # at once
+QUIET = 0.4  # s without a wish before a finer mesh is begun
 POLICY = (
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self' ws:"
 )
@@ -51,7 +53,7 @@ class Studio:
         self.token = secrets.token_urlsafe(16)
         self.sheet = sheet
         self.windows: set[Window] = set()
-        self.pool = ThreadPoolExecutor(WINDOWS, thread_name_prefix="bh-studio")
+        self.pool = ThreadPoolExecutor(2 * WINDOWS, thread_name_prefix="bh-studio")
 
     def application(self) -> tornado.web.Application:
         """The pages and the socket."""
@@ -127,6 +129,9 @@ class Window(tornado.websocket.WebSocketHandler):
         self.queue: asyncio.Queue[str | bytes] = asyncio.Queue()
         self.drawn = asyncio.Event()  # the last frame was shown
         self.work: asyncio.Task[None] | None = None
+        self.finer: asyncio.Task[None] | None = None
+        self.heard = 0  # messages
+        self.going = threading.Event()  # nobody has asked for anything since the finer mesh was begun
 
     def check_origin(self, origin: str) -> bool:
         """Only this server's own page."""
@@ -156,13 +161,17 @@ class Window(tornado.websocket.WebSocketHandler):
         if message == "drawn":
             self.drawn.set()
         else:
+            self.heard += 1
+            self.going.clear()
             self.queue.put_nowait(message)
 
     def on_close(self) -> None:
         """Give everything back."""
         self.studio.windows.discard(self)
-        if self.work is not None:
-            self.work.cancel()
+        self.going.clear()
+        for task in (self.work, self.finer):
+            if task is not None:
+                task.cancel()
         self.desk = None
 
     async def _work(self) -> None:
@@ -175,6 +184,10 @@ class Window(tornado.websocket.WebSocketHandler):
         await self._say(desk.describe())
         while True:
             if not desk.busy or not self.queue.empty():
+                if self.queue.empty():
+                    self.going = threading.Event()  # its own, so that one that was ended stays so
+                    self.going.set()
+                    self.finer = asyncio.create_task(self._refine(desk, self.going))
                 waiting = [await self.queue.get()]
                 while not self.queue.empty():
                     waiting.append(self.queue.get_nowait())
@@ -194,6 +207,22 @@ class Window(tornado.websocket.WebSocketHandler):
                     continue
                 self.drawn.clear()
                 await self.write_message(frame, binary=True)
+
+    async def _refine(self, desk: Desk, going: threading.Event) -> None:
+        """After a while without a wish, the same state on a finer mesh."""
+        heard = self.heard
+        await asyncio.sleep(QUIET)
+        if not going.is_set():
+            return
+        try:
+            found = await asyncio.get_running_loop().run_in_executor(
+                self.studio.pool, desk.finer, going.is_set, heard
+            )
+        except Exception as error:
+            await self._say({"kind": "line", "text": f"no finer mesh ({type(error).__name__}: {error})"})
+            return
+        if found is not None and going.is_set():
+            await self.write_message(found, binary=True)
 
     async def _do(self, desk: Desk, message: str | bytes) -> None:
         """One message, answered; the last good state is kept where it cannot be done."""

@@ -63,18 +63,21 @@ class Journal:
         Raises:
             SweepError: the folder cannot be written.
         """
+        draft = file.with_name(file.name + ".part")  # a kill leaves no file, or one that can be gone on from
         try:
-            for old in (file, *_logs(file)):
+            for old in (draft, *_logs(draft), file, *_logs(file)):
                 old.unlink(missing_ok=True)
-            db = _connect(file)
+            db = sqlite3.connect(draft)
             with db:
                 db.executescript(SCHEMA + f"PRAGMA user_version = {FORMAT};")
                 db.executemany(
                     "INSERT INTO meta VALUES (?, ?)", [(k, json.dumps(v)) for k, v in meta.items()]
                 )
+            db.close()
+            draft.replace(file)
+            return cls(file, _connect(file))
         except (OSError, sqlite3.Error) as error:
             raise SweepError(f"cannot write '{file}' ({error}); choose another output with -o") from error
-        return cls(file, db)
 
     @classmethod
     def open(cls, file: Path) -> Journal:

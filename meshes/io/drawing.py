@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
@@ -15,6 +15,7 @@ from meshes.curves import Array
 from meshes.drawn_pattern import pattern_of, region_of
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import one_line, shown
+from meshes.io.fine_lines import smooth
 from meshes.io.perforation import join_dashes
 from meshes.io.sizes import check_lengths, size_remarks
 from meshes.io.strokes import Rules, Stroke, Strokes, layer_angle
@@ -22,7 +23,7 @@ from meshes.limits import check_limit
 from meshes.mesh import SheetMesh
 from meshes.pattern import CreasePattern
 from meshes.planar import FOLDED, RIM, DrawnLine, Graph, check_crossings, heal
-from meshes.separate import one_sheet
+from meshes.separate import one_sheet, sheets_of
 
 OUTLINES = ("drawn", "hull")
 DRAWINGS = (".svg", ".svgz", ".dxf", ".cp", ".opx")
@@ -76,7 +77,7 @@ def read_pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]
     Raises:
         FileFormatError: one line that names the file, the line or place, and the mend.
     """
-    return _naming_the_file(path, lambda: _pattern(path, **options))
+    return read_drawing(path, **options).pattern()
 
 
 def read_drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> SheetMesh:
@@ -91,7 +92,20 @@ def read_drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) 
     Raises:
         FileFormatError: as for `read_pattern`.
     """
-    return _naming_the_file(path, lambda: _drawn(path, **options))
+    return read_drawing(path, **options).faces()
+
+
+def count_sheets(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> int:
+    """How many sheets a drawing holds; 0 where it has no closed outline.
+
+    Args:
+        path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
+        **options: as for `read_pattern`, without `sheet`.
+
+    Raises:
+        FileFormatError: as for `read_pattern`.
+    """
+    return _naming_the_file(path, lambda: len(sheets_of(read_graph(path, **options)[0])))
 
 
 def _naming_the_file(path: str | os.PathLike[str], read: Callable[[], Read]) -> Read:
@@ -104,18 +118,64 @@ def _naming_the_file(path: str | os.PathLike[str], read: Callable[[], Read]) -> 
         raise FileFormatError(f"{shown(path)}: {one_line(error)}") from error
 
 
-def _pattern(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> CreasePattern:
-    graph, lines, remarks = read_graph(path, **options)
-    pattern = pattern_of(graph, lines)
-    return replace(pattern, remarks=(*remarks, *pattern.remarks))
+@dataclass(frozen=True)
+class ReadDrawing:
+    """The lines of a drawing, read once, from which both its pattern and its own faces can be made.
+
+    Attributes:
+        path: of the file, for messages.
+        graph: its healed plane graph, mm.
+        lines: that the edges of the graph belong to.
+        remarks: what was taken for granted, one line each.
+    """
+
+    path: str | os.PathLike[str]
+    graph: Graph
+    lines: list[DrawnLine]
+    remarks: tuple[str, ...]
+
+    def pattern(self) -> CreasePattern:
+        """As `read_pattern`.
+
+        Raises:
+            FileFormatError: as for `read_pattern`.
+        """
+        return _naming_the_file(self.path, lambda: _pattern(self))
+
+    def faces(self) -> SheetMesh:
+        """As `read_drawn`.
+
+        Raises:
+            FileFormatError: as for `read_pattern`.
+        """
+        return _naming_the_file(self.path, lambda: _faces(self))
 
 
-def _drawn(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> SheetMesh:
+def read_drawing(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> ReadDrawing:
+    """The lines of a drawing.
+
+    Args:
+        path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
+        **options: as for `read_pattern`.
+
+    Raises:
+        FileFormatError: as for `read_pattern`.
+    """
+    graph, lines, remarks = _naming_the_file(path, lambda: read_graph(path, **options))
+    return ReadDrawing(path, graph, lines, tuple(remarks))
+
+
+def _pattern(read: ReadDrawing) -> CreasePattern:
+    pattern = pattern_of(read.graph, read.lines)
+    return replace(pattern, remarks=(*read.remarks, *pattern.remarks))
+
+
+def _faces(read: ReadDrawing) -> SheetMesh:
     from meshes.io.fold import sheet_of_frame
     from meshes.io.fold_frame import Frame
     from meshes.io.loose_ends import tie_ends
 
-    graph, lines, remarks = read_graph(path, **options)
+    graph, lines, remarks = read.graph, read.lines, list(read.remarks)
     region = region_of(graph, lines)
     rim = np.setdiff1d(np.arange(len(graph.edges)), [*region.inside.tolist(), *region.stubs.tolist()])
     letters = ["F" if kind == "boundary" else LETTERS[kind] for kind in graph.kinds]
@@ -206,6 +266,7 @@ def read_graph(
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
     check_crossings(np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in drawn]))
+    drawn, smoothed = smooth(drawn, gap, tolerance or fine * unit, diagonal)
     drawn, joined = join_dashes(drawn, gap)
     if outline == "hull":
         drawn.append(_hull(drawn))
@@ -213,7 +274,7 @@ def read_graph(
     graph = heal(drawn, gap)
     if sheet is not None:
         graph = one_sheet(graph, sheet, fit, Path(path).suffix.lower() not in UPWARDS or fit is not None)
-    return graph, drawn, [*remarks, *rules.remarks, *joined, *graph.remarks]
+    return graph, drawn, [*remarks, *rules.remarks, *joined, *smoothed, *graph.remarks]
 
 
 def _check(lengths: Mapping[str, float | None], outline: str) -> None:

@@ -15,7 +15,7 @@ from verification.studies.solver import attack
 from verification.studies.solver.attack import page
 from verification.studies.solver.attack.attempts import Found, Kind
 from verification.studies.solver.attack.kills import _judged
-from verification.studies.solver.attack.programs import Ended, play
+from verification.studies.solver.attack.programs import OURS, Ended, play
 
 ROOT = Path(__file__).resolve().parents[2]
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
@@ -45,7 +45,28 @@ def test_a_process_that_is_left_behind_is_seen(tmp_path: Path, monkeypatch: pyte
 def test_signals_reach_the_program(tmp_path: Path) -> None:
     words = (sys.executable, "-c", "import time; time.sleep(60)")
     assert play(words, tmp_path, send=signal.SIGKILL, after_s=0.2).code == -signal.SIGKILL
-    assert "KeyboardInterrupt" in play(words, tmp_path, send=signal.SIGINT, after_s=1.0).said
+    heeding = play(words, tmp_path, send=signal.SIGINT, after_s=1.0)
+    assert "KeyboardInterrupt" in heeding.said
+    assert heeding.heeds
+    deaf = play(("sleep", "60"), tmp_path, send=signal.SIGINT, after_s=0.2)
+    assert (deaf.code, deaf.heeds, deaf.before) == (-signal.SIGINT, False, True)
+
+
+def test_a_signal_before_the_program_is_told_apart() -> None:
+    """It is none where the program had begun, or where nothing shows that it had not."""
+
+    def before(code: int, said: str, heeds: bool = True) -> bool:
+        return Ended(code, said, 0.1, 0.1, 50.0, 0, heeds=heeds).before
+
+    site = 'Traceback\n  File "<frozen site>", line 616, in <module>\n'
+    start = f'  File "{OURS[0]}", line 0, in <module>\n'
+    assert before(-2, "", heeds=False)
+    assert before(1, f"Fatal Python error: init_import_site\n{site}KeyboardInterrupt\n")
+    assert before(-2, f"{site}{start}KeyboardInterrupt\n")
+    assert not before(-2, "")
+    assert not before(130, "bh: interrupted\n", heeds=False)
+    for place in (f'{OURS[0]}", line 9, in main', f'{OURS[1]}__init__.py", line 1, in <module>'):
+        assert not before(-2, f'{site}{start}  File "{place}\nKeyboardInterrupt\n')
 
 
 def test_ends_are_judged() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from bh.scene import bodies as scene_bodies
+from bh.scene import crease_tables
 from bh.scene import patterns as scene_patterns
 from bh.scene import reading as scene_tables
 from bh.scene import tables as schema
@@ -103,3 +104,9 @@ def test_places_of_the_page_are_places() -> None:
             len(mesh.nodes(place.replace("NAME", "crease").replace(":N", ":3").replace("X,Y", "100,1"))) >= 1
         )
     assert set(mesh.corners) <= set(places)
+
+
+@pytest.mark.parametrize("kind", crease_tables.TABLES)
+def test_laws_of_creases(kind: str) -> None:
+    section = PAGE.split(f'\n#### law, kind = "{kind}"\n')[1].split("\n#")[0]
+    assert [line for line in section.splitlines() if line.startswith("|")] == rows(crease_tables.TABLES[kind])

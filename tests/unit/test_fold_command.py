@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import bh
 from bh.commands.cli import main
-from bh.commands.fold import TimeUpError, _Clock
+from bh.commands.fold import TimeUpError, _Clock, fold_file
 from bh.errors import InputError
 from bh.runtime.progress import Silent
 from bh.scene.folding import Wish, proposals
@@ -196,26 +198,36 @@ class TestOneCommand:
         with pytest.raises(TimeUpError, match=r"lambda = 0\.50"):
             clock.update(0, 1, 0.5, 3, 1.0)
 
-    def test_a_run_that_will_end_in_time_goes_on_beyond_its_share(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        now = 0.0
-        monkeypatch.setattr("time.process_time", lambda: now)
+    def test_a_run_that_will_end_in_time_goes_on_beyond_its_share(self) -> None:
         clock = _Clock(Silent(), 10.0, 20.0)
-        now = 5.0
+        clock.spent = 5.0
         clock.update(0, 1, 0.6, 3, 1.0)
-        now = 10.5
+        clock.spent = 10.5
         clock.update(0, 1, 0.8, 3, 1.0)
-        now = 12.0
+        clock.spent = 12.0
         clock.check(0.9)  # 0.2 in the last 4 s: 4 s more of the 8 s that are left
-        now = 16.5
+        clock.spent = 16.5
         with pytest.raises(TimeUpError, match=r"its 16 s were over at lambda = 0\.90"):
             clock.check(0.9)  # nothing in the last 5.5 s
-        now = 8.0
+        clock.spent = 8.0
         clock.update(0, 1, 1.0, 3, 1.0)
         clock.update(0, 1, 0.1, 3, 1.0)  # another mesh
-        now = 14.0
+        clock.spent = 14.0
         with pytest.raises(TimeUpError):
+            clock.check(0.2)
+
+    def test_time_is_counted_by_work(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """However slow the machine is, the same scenes are tried in the same order."""
+        monkeypatch.setattr("time.process_time", itertools.count(0.0, 1000.0).__next__)
+        done = fold_file(svg(tmp_path), tmp_path / "out", Wish(angle=1.0))
+        assert done.path.reached
+        assert not done.notes
+        assert done.seconds >= 1000.0
+        clock = _Clock(Silent(), 1.0, 1.0)
+        clock.count(50_000)
+        clock.check(0.2)
+        clock.count(50_000)
+        with pytest.raises(TimeUpError, match=r"its 1 s were over at lambda = 0\.20"):
             clock.check(0.2)
 
     def test_angles(self) -> None:
@@ -314,3 +326,43 @@ class TestDrawnAngles:
     def test_a_part_of_drawn_angles_only(self) -> None:
         with pytest.raises(bh.ModelError, match="part"):
             bh.Fold("all", by=0.5, part=0.5)
+
+
+class TestAllSheets:
+    """Two sheets with a crease, and a frame with none, on one page."""
+
+    PAGE = (
+        RIM
+        + CREASE
+        + '<g transform="translate(100 0)"><rect width="40" height="30" stroke="black" fill="none"/>'
+        + '<path d="M0 10H40" stroke="red"/></g><rect x="160" width="20" height="10" stroke="black" fill="none"/>'
+    )
+
+    def test_they_are_folded_side_by_side(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        file, out = svg(tmp_path, self.PAGE), tmp_path / "out"
+        assert main(["fold", str(file), "-o", str(out), "--sheet", "all", "--angle", "60deg"]) == 0
+        assert folds(out / "sheet-1") == pytest.approx(60.0, abs=0.01)
+        assert folds(out / "sheet-2", "mountain") == pytest.approx(60.0, abs=0.01)
+        assert "sheet = 2" in (out / "sheet-2" / "sheet.toml").read_text()
+        told = capsys.readouterr()
+        assert "sheet 3 is left out: " in told.err
+        assert "there is no mountain or valley crease" in told.err
+        image = plt.imread(out / "folded.png")
+        assert image.shape[:2] == (450, 1200)
+        for tile in (image[:, :600, :3], image[:, 600:, :3]):
+            assert 0.02 < (tile.min(axis=2) < 0.95).mean() < 0.9
+        # one scale: the first sheet is larger
+        assert (image[:, :600, :3].min(axis=2) < 0.95).sum() > 2 * (
+            image[:, 600:, :3].min(axis=2) < 0.95
+        ).sum()
+
+    def test_nothing_else_is_a_sheet(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        file = svg(tmp_path, self.PAGE)
+        assert main(["fold", str(file), "--sheet", "both"]) == 2
+        assert "'both' is no sheet; give a number from 1, or all" in capsys.readouterr().err
+
+    def test_no_sheet_that_folds(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        file = svg(tmp_path, RIM)
+        assert main(["fold", str(file), "-o", str(tmp_path / "out"), "--sheet", "all"]) == 2
+        assert "there is no mountain or valley crease" in capsys.readouterr().err
+        assert not (tmp_path / "out").exists()

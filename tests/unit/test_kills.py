@@ -19,6 +19,7 @@ import meshes
 from bh.commands.cli import main
 from bh.errors import InputError, PathFileError
 from bh.runtime.lock import only_writer
+from bh.sweep.journal import Journal, Meta
 from bh.sweep.pools import reach
 from verification.framework import run as runner
 from verification.framework.checks import CaseResult
@@ -122,32 +123,65 @@ def test_an_interrupt_ends_verify(tmp_path: Path) -> None:
             os.kill(process, signal.SIGKILL)
 
 
-# the moment in which a module is imported, and the program that imports it
+# Ctrl-C in the moment in which a module is imported, and a program that imports it
 START = """
 import sys
+import _signal  # `signal` itself is imported by the program
+moment = sys.argv.pop(1)
 class Interrupt:
     def find_spec(self, name, path=None, target=None):
-        if name == sys.argv[1]:
-            raise KeyboardInterrupt
+        if name == moment:
+            _signal.raise_signal(_signal.SIGINT)
+sys.modules.pop("signal", None)
 sys.meta_path.insert(0, Interrupt())
-sys.argv[0] = "/somewhere/" + sys.argv[2]
-from bh.commands.cli import main
 """
+COMMAND = START + "from bh_command import main\nsys.exit(main())\n"
 
 
 @pytest.mark.parametrize(
-    "moment", ["bh.runtime.viewer", "bh.runtime.kernel_cache", "typer", "bh.commands.compare"]
+    "moment", ["signal", "bh", "bh.runtime.viewer", "typer", "bh.commands.compare", "bh.runtime.kernel_cache"]
 )
 def test_an_interrupt_in_the_moment_of_starting(moment: str) -> None:
-    """One line and 130, from the first import of the package on."""
-    done = subprocess.run(
-        [sys.executable, "-c", START, moment, "bh"], cwd=ROOT, capture_output=True, text=True
-    )
+    """One line and 130, from the first import of the program on."""
+    words = [sys.executable, "-c", COMMAND, moment, "--version"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (130, "bh: interrupted\n")
 
 
+@linux
+def test_ignored_interrupts_stay_ignored() -> None:
+    """As behind `nohup`, or in the background of a shell."""
+    words = [sys.executable, "-c", COMMAND, "typer", "--version"]
+    done = subprocess.run(
+        words, cwd=ROOT, capture_output=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_an_interrupt_when_all_is_told_changes_nothing() -> None:
+    late = "import _signal, atexit\natexit.register(_signal.raise_signal, _signal.SIGINT)\n"
+    words = [sys.executable, "-c", late + COMMAND, "nothing", "--version"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_an_interrupt_that_became_another_error(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Python 3.11 makes a RuntimeError of what is raised in `__set_name__` while a class is made."""
+
+    def interrupted(*_: Any, **__: Any) -> int:
+        raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
+
+    monkeypatch.setattr("bh.commands.cli.app", interrupted)
+    assert main(["check", "there-is-none.toml"]) == 130
+    assert capsys.readouterr().err == "bh: interrupted\n"
+
+
 def test_a_program_of_the_users_own_has_its_own_interrupts() -> None:
-    words = [sys.executable, "-c", START, "bh.runtime.viewer", "mine"]
+    """Neither `import bh` nor the module that the command begins in touches them."""
+    program = START + "import bh_command\nimport bh.commands.cli\n"
+    words = [sys.executable, "-c", program, "bh.runtime.viewer"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     assert "KeyboardInterrupt" in done.stderr
     assert "bh: interrupted" not in done.stderr
@@ -306,3 +340,21 @@ def test_a_cluster_of_ones_own_is_not_open_to_others(monkeypatch: pytest.MonkeyP
                 reach(address)
     finally:
         pool.close()
+
+
+def test_a_journal_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sweep that was killed while its journal was made could not go on: "has format 0"."""
+    file = tmp_path / "sweep.nc.points"
+    meta = Meta(identity="a", names=[], values=[], grid=True, labels={}, attributes={})
+    seen: list[bool] = []
+
+    def look(value: object) -> str:
+        seen.append(file.exists())
+        return json_text(value)
+
+    json_text = json.dumps
+    monkeypatch.setattr("bh.sweep.journal.json.dumps", look)
+    journal = Journal.create(file, meta)
+    assert (seen, journal.meta["identity"]) == ([False] * len(meta), "a")
+    journal.close()
+    assert [place.name for place in tmp_path.iterdir()] == [file.name]

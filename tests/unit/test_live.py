@@ -86,6 +86,57 @@ def test_a_pull_is_in_balance_and_fades_when_it_is_let_go() -> None:
     np.testing.assert_allclose(after.points, before.points, atol=1e-6)
 
 
+def test_a_node_that_is_caught_while_it_fades_keeps_no_force_that_is_not_told() -> None:
+    """Let go and caught at once, what pulled before is gone at rest; let go again, the fading begins in balance."""
+    session = Session(pleats())
+    session.fold("all", 0.7)
+    before = session.rest()
+    node = corner(session)
+    x, y, z = before.points[node].tolist()
+    session.pull(node, (x, y, z + 10.0))
+    session.rest()
+    session.let_go()
+    session.update(0.0)
+    session.pull(node, (x, y, z - 5.0))
+    frame = session.rest()
+    assert frame.at_rest
+    force = np.array(frame.forces[node])
+    np.testing.assert_allclose(frame.state.reactions.sum(axis=0), -force, atol=1e-7 * np.abs(force).max())
+    np.testing.assert_allclose(frame.points, bh.trace(session.scene())[-1].points, atol=1e-6)
+    session.let_go()
+    session.update(0.0)
+    session.pull(node, (x, y, z + 3.0))
+    session.update(0.0)
+    session.let_go()  # of a grip, and of what is left of the one before
+    assert not session.update(0.0).at_rest
+    assert session.imbalance() < 1e-6
+    np.testing.assert_allclose(session.rest().points, before.points, atol=1e-6)
+
+
+def test_what_has_faded_out_does_not_come_back() -> None:
+    """Asked again at rest, or led on by a slider, the sheet is pulled by nothing."""
+    session = Session(pleats())
+    session.fold("all", 0.7)
+    before = session.rest()
+    x, y, z = before.points[corner(session)].tolist()
+    session.pull(corner(session), (x, y, z + 10.0))
+    session.rest()
+    session.let_go()
+    session.rest()
+    again = session.rest()
+    assert again.at_rest
+    np.testing.assert_allclose(again.points, before.points, atol=1e-6)
+    session.pull(corner(session), (x, y, z + 10.0))
+    session.rest()
+    session.let_go()
+    session.fold("all", 0.8)
+    session.rest()
+    session.fold("all", 0.9)
+    while not (frame := session.update(1e-9)).at_rest:
+        assert not frame.fading
+        assert np.abs(frame.state.reactions.sum(axis=0)).max() < 1e-6
+
+
 def test_it_works_in_pieces_and_every_piece_is_an_equilibrium() -> None:
     """Without time an update does nothing; little by little it arrives, and each frame is a balanced state."""
     session = Session(pleats())

@@ -4,16 +4,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path as FilePath
+from typing import Literal
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import bh
+import meshes
 from bh.errors import InputError
+from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.consistent.system import ConsistentSystem
+from bh.solvers import neighbours
+from bh.solvers.factor import Factor
+from bh.solvers.matrices import BandMatrix
+from bh.solvers.modes import softness
 from bh.solvers.neighbours import look_around, nearly_neutral, neighbour
 from bh.solvers.newton import Newton
-from bh.solvers.points import Point, point
+from bh.solvers.points import Factorised, Point, point
 from bh.solvers.system import Evaluation
 from tests.unit.test_newton import Small
 from verification.studies.solver import branches
@@ -45,6 +53,13 @@ def at(system: Wells, w: float) -> Point:
     return point(system, found.q, 0.0, negative=0)
 
 
+def factorised(system: Wells, here: Point) -> Factorised:
+    kept = Newton(keep=True).solve_full(system, here.q, here.lam).factorised
+    assert kept is not None
+    assert Newton().solve_full(system, here.q, here.lam).factorised is None
+    return kept
+
+
 def test_the_lower_well_is_found() -> None:
     system = Wells(2, [0.0, 0.0])
     high, low = at(system, 2.0), at(system, 4.0)
@@ -71,13 +86,14 @@ def test_who_is_looked_at() -> None:
     """In doubt, or where a mode hardly resists; never where the state is not stable anyway."""
     system = Wells(2, [0.0, 0.0])
     here = at(system, 2.0)
-    assert not nearly_neutral(system, here)
+    assert not nearly_neutral(system, factorised(system, here))
     assert look_around(system, here, False, Newton()) == ""
     assert "lower energy" in look_around(system, here, True, Newton())
     assert look_around(system, replace(here, negative=1), True, Newton()) == ""
     system.stiff = 1e4
-    assert nearly_neutral(system, here)
+    assert nearly_neutral(system, factorised(system, here))
     assert "lower energy" in look_around(system, here, False, Newton())
+    assert "lower energy" in look_around(system, here, False, Newton(), factorised(system, here))
 
 
 def test_a_path_says_so(tmp_path: FilePath) -> None:
@@ -94,6 +110,47 @@ def test_a_path_says_so(tmp_path: FilePath) -> None:
     assert not any("within reach" in line for line in silent.remarks)
     assert silent[-1].energy == path[-1].energy
     assert silent.iterations == path.iterations
+
+
+@pytest.mark.parametrize("name", ["bars-and-hinges", "consistent"])
+@pytest.mark.parametrize("symmetry", [None, "y"])
+def test_the_look_makes_nothing_anew(
+    name: str, symmetry: Literal["y"] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A step that ends well is looked at through the tangent and the factor that its stability was seen from."""
+    made = {"factors": 0, "evaluations": 0, "tangents": 0}
+
+    def counted(owner: type, method: str, what: str) -> None:
+        plain = getattr(owner, method)
+
+        def counting(*arguments: object) -> object:
+            made[what] += 1
+            return plain(*arguments)
+
+        monkeypatch.setattr(owner, method, counting)
+
+    looks: list[float] = []
+
+    def looked(factor: Factor, primal: int) -> float:
+        looks.append(softness(factor, primal))
+        return looks[-1]
+
+    monkeypatch.setattr(neighbours, "softness", looked)
+    counted(BandMatrix, "factorise", "factors")
+    for owner in (BarsAndHingesSystem, ConsistentSystem):
+        counted(owner, "evaluate", "evaluations")
+        counted(owner, "tangent", "tangents")
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.5), along=8, rows=1)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, nu=0.0, t=0.1), formulation=name).fold("crease", by=0.5)
+    bh.trace(model, symmetry=symmetry, neighbours=False)
+    alone = dict(made)
+    made.update(dict.fromkeys(made, 0))
+    path = bh.trace(model, symmetry=symmetry)
+    assert path.reached
+    assert made == alone
+    assert min(made.values()) > 0
+    assert len(looks) == 1
+    assert looks[0] > neighbours.SOFT
 
 
 def test_rows_are_judged() -> None:

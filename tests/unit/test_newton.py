@@ -20,10 +20,12 @@ from bh.solvers.modes import (
     factorise_shifted,
     lowest_mode,
     neutral_mode,
+    softness,
     without,
 )
 from bh.solvers.newton import Newton, Solution, line_search, slow
 from bh.solvers.points import Increment, Point, extrapolate, point
+from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import Evaluation, Tangent
 from bh.solvers.walk import Walk, walk
@@ -524,6 +526,23 @@ def test_neutral_mode_is_left_alone(seed: int) -> None:
     factor = matrix.factorise_any()[0]
     x = without(factor, factor.solve(b), found.mode)
     assert x == pytest.approx(Q[:, 1:] @ ((Q[:, 1:].T @ b) / stiffness[1:]), abs=1e-5)
+
+
+@pytest.mark.parametrize("soft", [1e-12, 1e-6, 1e-3, 0.5])
+def test_softness(soft: float) -> None:
+    """The ratio of the two softest modes, from solves alone; with multipliers on what the constraints leave."""
+    rng = np.random.default_rng(4)
+    Q = np.linalg.qr(rng.normal(size=(30, 30)))[0]
+    stiffness = np.concatenate(([soft, 1.0], np.linspace(30.0, 1e3, 28)))
+    matrix = band(Q @ np.diag(stiffness) @ Q.T)
+    assert softness(matrix.factorise(), 30) == pytest.approx(soft, rel=2e-3, abs=1e-13)
+    row = ConstraintRows(
+        Q[None, :, 0].copy(), np.arange(30)[None], 30
+    )  # what holds the soft mode leaves 1 and 30
+    augmented = band(Q @ np.diag([1e4, *stiffness[1:]]) @ Q.T)
+    held = MultiplierMatrix(augmented, row, np.array([1e4]), np.array([1e-9]))
+    assert softness(held.factorise(), 30) == pytest.approx(1.0 / 30.0, rel=0.2)
+    assert softness(band(np.eye(1)).factorise(), 1) == 1.0
 
 
 @pytest.mark.parametrize("stiffness", [-1e-5, -0.5])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ import pytest
 import bh
 from bh.mechanics.shared.hinge_lock import ZONE
 from bh.mechanics.shared.penetration import left_to_close
+from bh.runtime.progress import Silent
 from bh.scene.load import parse_scene
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, point
@@ -94,24 +94,12 @@ def test_a_step_leaves_a_part_of_the_way_to_closed() -> None:
     assert left_to_close(before, np.array([1.0, 1.0, 1.0])) == 1.0
 
 
-@dataclass
-class _Watch:
-    """A clock that rings when it has been looked at so many times."""
-
-    left: int
-
-    def __call__(self, _: float) -> None:
-        self.left -= 1
-        if self.left < 0:
-            raise TimeoutError
-
-
 def test_the_clock_is_looked_at_within_an_increment() -> None:
-    from bh.commands.fold import _Timed
+    from bh.commands.fold import EVALUATION, TimeUpError, _Clock, _Timed
 
-    watch = _Watch(3)
-    timed = _Timed(Settling(), watch)
+    clock = _Clock(Silent(), 3.5 * EVALUATION, 3.5 * EVALUATION)
+    timed = _Timed(Settling(), clock)
     assert timed.limits(VonMisesTruss()) == (0.1, 0.34)
-    with pytest.raises(TimeoutError):
+    with pytest.raises(TimeUpError):
         walked(VonMisesTruss(), timed)  # type: ignore[arg-type]
-    assert watch.left == -1
+    assert 3.5 * EVALUATION < clock.spent < 5.0 * EVALUATION

@@ -98,7 +98,7 @@ def test_fold_pull_undo_export(window: Visit, tmp_path: Path) -> None:
     page.wait_for_function("studio.sheet.name === 'pleats.svg'")
     page.locator("#percent").fill("30")
     window.rests("Object.values(head.asked)[0] > 0.5")
-    assert page.locator("#badge").inner_text() == "in equilibrium"
+    assert page.locator("#badge").inner_text().startswith(("in equilibrium", "refined"))
     folded = window.points()
     node = int(np.argmax(folded[:, 0] + folded[:, 1]))
     x, y = page.evaluate(f"studio.place({node})")
@@ -167,6 +167,22 @@ def test_colours_have_a_scale_with_a_unit(window: Visit) -> None:
         assert float(page.locator("#top").inner_text()) > 0.0
     page.locator("#colour").select_option("none")
     page.wait_for_function("document.getElementById('scale').hidden")
+
+
+def test_at_rest_it_is_refined_and_a_hand_brings_the_coarse_mesh_back(window: Visit) -> None:
+    page = window.page
+    page.locator("#percent").fill("30")
+    page.wait_for_function("studio.refined && Object.values(studio.head.asked)[0] > 0.5", timeout=60_000)
+    assert page.locator("#badge").inner_text().startswith("refined: 1164 triangles, energy within about ")
+    x, y = page.evaluate("studio.place(150)")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    assert not page.evaluate("studio.refined")  # at once
+    page.mouse.up()
+    page.locator("#percent").fill("35")
+    assert not page.evaluate("studio.refined")
+    page.wait_for_function("studio.refined && Object.values(studio.head.asked)[0] > 1.0", timeout=60_000)
+    assert window.told == []
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(360, "dark"), (1400, "light"), (2560, "dark")])

@@ -18,6 +18,7 @@ from bh.loading.load_step import LoadStep
 from bh.mechanics.bars_and_hinges import remarks
 from bh.mechanics.bars_and_hinges.derivatives import BarHingeDerivatives
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.shared.crease_curves import refuse_curves
 from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles
@@ -80,6 +81,7 @@ class BarsAndHinges:
         """
         if system.barrier is not None:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
+        refuse_curves(system.curves)
         return BarHingeDerivatives(system, q, lam)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
@@ -105,7 +107,9 @@ class BarsAndHinges:
         stretch = 0.5 * s_bar**2 / np.maximum(e.bar_stiffness, 1e-300)
         bend = slice(0, e.bending)
         spring = slice(e.bending, e.bending + e.spring)
-        by_hinge = 0.5 * e.hinge_stiffness * turn**2
+        by_hinge, dissipated = 0.5 * e.hinge_stiffness * turn**2, 0.0
+        if system.curves is not None:
+            by_hinge[spring], dissipated = system.curves.held(e.hinge_stiffness[spring], turn[spring])
         by_lock = lock_terms(phi, e.lock)[:, 0].sum()
         density = {
             "stretching": to_triangles(mesh, stretch, np.arange(len(e.bars))),
@@ -124,9 +128,10 @@ class BarsAndHinges:
             mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(
                 float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum()), float(by_lock),
-                contact,
+                contact, dissipated,
             ),
             dihedral_angles=angles, energy_density=density, reactions=reactions,
             crease_moments=moments, stable=stable,
             contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
+            crease_history=system.history_at(q, lam) if system.remembers else None,
         )  # fmt: skip

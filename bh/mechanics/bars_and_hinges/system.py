@@ -21,6 +21,7 @@ from bh.mechanics.shared.assembly import (
     tangent_values,
 )
 from bh.mechanics.shared.base_system import SupportedSheet, typical_force
+from bh.mechanics.shared.crease_curves import Straightened, crease_curves, letting_go
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.model.laws import PRESCRIBED
 from bh.model.model import Model
@@ -83,7 +84,10 @@ class BarsAndHingesSystem(SupportedSheet):
         edges = mesh.points[mesh.topology.hinges[:, 1:3]]
         moments = np.zeros(len(prescribed_start)) if start is None else np.nan_to_num(start.crease_moments)
         moments *= np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+        if load_step.freed is not None:
+            load_step = letting_go(model, load_step, start, prescribed_start, moments)
         self.elements = sheet_elements(model, load_step, prescribed_start, moments)
+        self.curves = crease_curves(model, load_step, start, self.springs, plane is not None)
         if (
             start is not None
         ):  # a crease that was ordinary sheet up to here is held against the sheet's moment
@@ -158,13 +162,13 @@ class BarsAndHingesSystem(SupportedSheet):
 
     def _floor(self, x: Array) -> float:
         """Coordinates are rounded to eps |x| and angles to eps; the stiffest elements make forces of that."""
-        return ROUNDING * (self._stiffest_bar * float(np.abs(x).max()) + self._stiffest_hinge)
+        return ROUNDING * (self._stiffest_edge * float(np.abs(x).max()) + self._stiffest_hinge)
 
     def _size(self, x: Array, q: Array, lam: float) -> float:
         return self.internal_forces(x, q, lam)[1]
 
     @cached_property
-    def _stiffest_bar(self) -> float:
+    def _stiffest_edge(self) -> float:
         return float(self.elements.bar_stiffness.max())
 
     @cached_property
@@ -187,11 +191,58 @@ class BarsAndHingesSystem(SupportedSheet):
         f = np.zeros_like(x)
         turn = np.empty(len(e.hinges))
         forces = np.empty(len(e.bars) + len(e.hinges))
+        rest, couple, stiffness, more = e.rest.at(lam), self.couple(q, lam), e.hinge_stiffness, 0.0
+        if self.curves is not None:
+            line = self._straight(x, lam, couple)
+            stiffness, couple, more = line
         energy, size = nodal_forces(
-            x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, e.hinge_stiffness, e.lock,
-            e.rest.at(lam), self.couple(q, lam), f, forces[: len(e.bars)], forces[len(e.bars) :], turn,
+            x, e.bars, e.bar_length, e.bar_stiffness, e.green, e.hinges, stiffness, e.lock,
+            rest, couple, f, forces[: len(e.bars)], forces[len(e.bars) :], turn,
         )  # fmt: skip
-        return energy, size, f, forces, turn
+        return energy + more, size, f, forces, turn
+
+    # ------------------------------------------------------------------------------- creases that are no straight line
+
+    @property
+    def springs(self) -> Ints:
+        """(springs,) rows of `mesh.topology.hinges` of the spring creases, as the elements have them."""
+        return self.elements.source[self._of_springs]
+
+    @property
+    def _of_springs(self) -> slice:
+        return slice(self.elements.bending, self.elements.bending + self.elements.spring)
+
+    def _straight(self, x: Array, lam: float, couple: Array) -> Straightened:
+        """All hinges (h,) as straight lines at positions x (n, 3), with couples (h,), N mm."""
+        e, at = self.elements, self._of_springs
+        assert self.curves is not None
+        turns = dihedral_angles(x, e.hinges[at]) - e.rest.at(lam)[at]
+        line = self.curves.straight(e.hinge_stiffness[at], couple[at], turns)
+        stiffness, couple = e.hinge_stiffness.copy(), couple.copy()
+        stiffness[at], couple[at] = line.stiffness, line.couple
+        return Straightened(stiffness, couple, line.missing)
+
+    def hinge_stiffness(self, x: Array, lam: float) -> Array:
+        """(h,) present slopes of the hinges' moments at positions x (n, 3), N mm / rad.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        if self.curves is None:
+            return self.elements.hinge_stiffness
+        return self._straight(x, lam, self.elements.couple.start).stiffness
+
+    def history_at(self, q: Array, lam: float) -> Array:
+        """(m, 2) what creases remember where this state is accepted; see `bh.solvers.system.Remembering`.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        assert self.curves is not None
+        angles = dihedral_angles(self.near(q, lam), self.mesh.topology.hinges)
+        return self.curves.accepted(angles - self.load_step.rest.at(lam))
 
     def couple(self, q: Array, lam: float) -> Array:
         """(h,) couples on the hinges, N mm: applied moments, and the multipliers of prescribed creases.
@@ -216,7 +267,7 @@ class BarsAndHingesSystem(SupportedSheet):
         linear = Linearised(np.empty((bars, 3)), np.empty((len(e.hinges), 12)), np.empty(len(e.hinges)))
         tangent_values(
             x, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars], pattern.slots[0],
-            e.hinges, self._augmented_stiffness, e.lock, forces[bars:], pattern.slots[1],
+            e.hinges, self._augmented_stiffness(x, lam), e.lock, forces[bars:], pattern.slots[1],
             self.constraints.frame_of, self.constraints.frames, data, *linear,
         )  # fmt: skip
         matrix: Matrix
@@ -257,12 +308,12 @@ class BarsAndHingesSystem(SupportedSheet):
         x = self.near(q, lam)
         _, _, _, forces, _ = self.internal_forces(x, q, lam)
         g = dihedral_gradients(x, e.hinges)
-        moment_rate = e.couple.rate - e.hinge_stiffness * e.rest.rate
+        moment_rate = e.couple.rate - self.hinge_stiffness(x, lam) * e.rest.rate
         out = -self.force.rate.copy()
         np.add.at(out, e.hinges, (moment_rate[:, None] * g).reshape(-1, 4, 3))
         moving = self.displacements.prescribed_motion
         if moving.any():
-            out += self.tangent_times(x, moving, forces)
+            out += self.tangent_times(x, moving, forces, lam)
         if self.rigid_contact is not None:
             self.rigid_contact.force_rates(x, moving, lam, 1.0, out)
         if self.barrier is not None:
@@ -279,7 +330,10 @@ class BarsAndHingesSystem(SupportedSheet):
         e = self.elements
         x = self.near(q, lam)
         _, _, f, _, turn = self.internal_forces(x, q, lam)
-        moment = e.hinge_stiffness * turn + self.couple(q, lam)  # without the lock, which knows no rest angle
+        stiffness, couple = e.hinge_stiffness, self.couple(q, lam)
+        if self.curves is not None:
+            stiffness, couple, _ = self._straight(x, lam, couple)
+        moment = stiffness * turn + couple  # without the lock, which knows no rest angle
         total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.displacements.home))
         if self.rigid_contact is not None:
@@ -293,32 +347,34 @@ class BarsAndHingesSystem(SupportedSheet):
         """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         e = self.elements
         x = self.near(q, lam)
-        total = float(e.hinge_stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
+        stiffness = self.hinge_stiffness(x, lam)
+        total = float(stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
         moving = self.displacements.prescribed_motion
         if moving.any():
             _, _, _, forces, _ = self.internal_forces(x, q, lam)
-            out = self.tangent_times(x, moving, forces)
+            out = self.tangent_times(x, moving, forces, lam)
             g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
             turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
             if self.barrier is not None:
                 out += self.barrier.times(x, moving)
             total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
-            total += 2.0 * float((e.couple.rate - e.hinge_stiffness * e.rest.rate) @ turn)
+            total += 2.0 * float((e.couple.rate - stiffness * e.rest.rate) @ turn)
         return total if self.rigid_contact is None else total + self.rigid_contact.control_stiffness(x, lam)
 
-    def tangent_times(self, x: Array, v: Array, forces: Array) -> Array:
+    def tangent_times(self, x: Array, v: Array, forces: Array, lam: float = 0.0) -> Array:
         """Tangent of all elements times v (n, 3), in global axes and with no support left out.
 
         Args:
             x: (nodes, 3) positions, mm.
             v: (nodes, 3) velocities.
             forces: (f,) element forces of the geometric part, N and N mm.
+            lam: load parameter of the step, for creases that are no straight line.
         """
         e, bars = self.elements, len(self.elements.bars)
         out = np.zeros_like(x)
         tangent_times(
             x, v, e.bars, e.bar_length, e.bar_stiffness, e.green, forces[:bars],
-            e.hinges, e.hinge_stiffness, e.lock, forces[bars:], out,
+            e.hinges, self.hinge_stiffness(x, lam), e.lock, forces[bars:], out,
         )  # fmt: skip
         return out
 
@@ -345,8 +401,14 @@ class BarsAndHingesSystem(SupportedSheet):
         """
         return COMPLIANCE / self.elements.penalty
 
+    def _augmented_stiffness(self, x: Array, lam: float) -> Array:
+        e = self.elements
+        if self.curves is None:
+            return self._elastic_stiffness
+        return np.concatenate((self.hinge_stiffness(x, lam)[: len(e.hinges) - e.prescribed], e.penalty))
+
     @cached_property
-    def _augmented_stiffness(self) -> Array:
+    def _elastic_stiffness(self) -> Array:
         e = self.elements
         return np.concatenate((e.hinge_stiffness[: len(e.hinges) - e.prescribed], e.penalty))
 

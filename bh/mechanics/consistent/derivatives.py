@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from bh.mechanics.consistent import kernels
 from bh.mechanics.consistent.membrane import Cells
 from bh.mechanics.consistent.membrane_kernels import bar_rates, cell_forces
+from bh.mechanics.consistent.rotations import Slopes
 from bh.mechanics.shared import penetration as closings
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients, dihedral_hessians
@@ -118,7 +119,8 @@ class ConsistentDerivatives:
     def second_variation(self, v: Array, w: Array) -> tuple[Array, Array]:
         """Rates of the gradient, of all nodes and of the rotations, along v (n, 3) and w."""
         system, e, x = self.system, self.system.elements, self.x
-        rates, _ = system.force_rates(x, v, w, e.patches.B, closing=bool(self.L.any()), controlled=False)
+        slopes = Slopes(e.patches.B, e.spring_stiffness)
+        rates, _ = system.force_rates(x, v, w, slopes, closing=bool(self.L.any()), controlled=False)
         dN, dM, dS, _ = system.split(rates)
         f, r = np.zeros_like(x), np.zeros(e.rotations)
         e.stretching.force_rates(x, v, self.N, dN, f)

@@ -26,6 +26,7 @@ from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.membrane import Measure, constant_strain, smoothed_strain
 from bh.mechanics.consistent.resultants import resultants
 from bh.mechanics.consistent.system import ConsistentSystem
+from bh.mechanics.shared.crease_curves import refuse_curves
 from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.model.model import Model
@@ -80,6 +81,7 @@ class Consistent:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
         if not (system.elements.stretching.constant and system.elements.bending.constant):
             raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
+        refuse_curves(system.curves)
         return ConsistentDerivatives(system, q, lam)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
@@ -107,7 +109,9 @@ class Consistent:
         _, M, S, L = system.split(now.forces)
         contact = 0.0 if system.barrier is None else system.barrier.forces(x, now.f)
         stretching, bending = system.stretching_by_triangle(x), system.bending_by_triangle(now.theta)
-        folding = 0.5 * e.spring_stiffness * now.turns**2
+        folding, dissipated = 0.5 * e.spring_stiffness * now.turns**2, 0.0
+        if system.curves is not None:
+            folding, dissipated = system.curves.held(e.spring_stiffness, now.turns)
 
         angles = dihedral_angles(x, topology.hinges)
         prescribed = ~np.isnan(e.prescribed.end)
@@ -124,7 +128,9 @@ class Consistent:
         slopes, couples = read_slopes(mesh, e.patches, now.theta, M)
         return State(
             mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
-            energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact),
+            energy=Energy(
+                float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact, dissipated
+            ),
             dihedral_angles=angles,
             energy_density={
                 "stretching": stretching / mesh.areas,
@@ -135,6 +141,7 @@ class Consistent:
             crease_moments=moments, stable=stable, edge_slopes=slopes, clamp_couples=couples,
             recover=partial(resultants, model.sheet, mesh, e, self.material, x, now.theta),
             contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
+            crease_history=system.history_at(q, lam) if system.remembers else None,
         )  # fmt: skip
 
 

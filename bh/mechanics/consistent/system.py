@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
 from bh.materials import Material
-from bh.mechanics.consistent import kernels, setup
+from bh.mechanics.consistent import kernels
 from bh.mechanics.consistent.elements import LINEAR, consistent_elements, lock_stiffness
 from bh.mechanics.consistent.forces import ElementForces, Internal
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
+from bh.mechanics.consistent.rotations import Slopes, TurningEdges
 from bh.mechanics.consistent.sparsity import rotation_pattern
 from bh.mechanics.shared import penetration as closings
-from bh.mechanics.shared.base_system import SupportedSheet, typical_force
+from bh.mechanics.shared.base_system import typical_force
+from bh.mechanics.shared.crease_curves import crease_curves, letting_go
 from bh.mechanics.shared.hinge_lock import lock_terms
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.mechanics.shared.sparsity import Pattern
@@ -33,18 +33,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ROUNDING = 8.0 * np.finfo(float).eps
-ITERATIONS = 30  # for the rotations of least energy with a law of bending that is not linear
 
 
-class Solver(Protocol):
-    """A factorised matrix."""
-
-    def solve(self, b: Array) -> Array:
-        """Solution x of A x = b, both (n,)."""
-        ...
-
-
-class ConsistentSystem(SupportedSheet):
+class ConsistentSystem(TurningEdges):
     """`bh.solvers.System` of one step. Unknowns: free displacements in local axes (mm), then edge rotations (rad)."""
 
     def __init__(
@@ -90,9 +81,12 @@ class ConsistentSystem(SupportedSheet):
             if start is None
             else np.where(np.isnan(start.crease_moments), reference, start.dihedral_angles)
         )
+        if load_step.freed is not None:
+            self.load_step = load_step = letting_go(model, load_step, start, angles, moments)
         self.elements = consistent_elements(
             model, load_step, angles, moments, plane, measure, material, start
         )
+        self.curves = crease_curves(model, load_step, start, self.elements.springs, plane is not None)
         self.size = self.primal = self.moving + self.elements.rotations
         self._scale = model.sheet.E * model.sheet.t
         self._start_points = np.array(
@@ -127,49 +121,6 @@ class ConsistentSystem(SupportedSheet):
         q[self.moving :] = self.rotations_at(self.positions(q, lam), lam)
         return q
 
-    def rotations_at(self, x: Array, lam: float) -> Array:
-        """(rotations,) of least energy at positions x (n, 3).
-
-        Args:
-            x: (nodes, 3) positions, mm.
-            lam: load parameter of the step, 0 to 1.
-
-        Returns:
-            in rad.
-
-        Raises:
-            ModelError: the minimum is not found.
-        """
-        alpha = np.zeros(self.size - self.moving)
-        now = self.internal(x, alpha, lam)
-        if self.elements.bending.constant:
-            return np.asarray(-self._rotation_factor.solve(now.r)) if now.r.any() else now.r
-        for _ in range(ITERATIONS):
-            if np.abs(now.r).max(initial=0.0) <= 1e-12 * self._stiffest[1]:
-                return alpha
-            B = self.elements.bending.stiffness(now.theta)
-            alpha = alpha - sp.linalg.splu(self.rotation_stiffness(B)).solve(now.r)
-            now = self.internal(x, alpha, lam)
-        raise ModelError(
-            "no rotations of least energy at these positions: the law of bending is not convex there"
-        )
-
-    @cached_property
-    def _rotation_factor(self) -> Solver:
-        factor: Solver = sp.linalg.splu(self.rotation_stiffness(self.elements.patches.B))
-        return factor
-
-    def rotation_stiffness(self, B: Array) -> sp.csc_matrix:
-        """Hessian of the energy in the rotations alone, with stiffnesses B (c, a, a) of the patches."""
-        e, joined = self.elements, self.elements.patches
-        most = B.size + 4 * len(e.springs)
-        rows, columns, values = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-        used = setup.rotation_matrix(
-            e.rotation, joined.kind, B, e.turns, e.spring_stiffness, rows, columns, values
-        )
-        entries = (values[:used], (rows[:used], columns[:used]))
-        return sp.csc_matrix(entries, shape=(e.rotations, e.rotations))
-
     @cached_property
     def _counts(self) -> tuple[int, int, int, int]:
         e = self.elements
@@ -198,10 +149,13 @@ class ConsistentSystem(SupportedSheet):
         N, M, S, L = self.split(forces)
         stretching, size = e.stretching.forces(x, f, N)
         bending, more, closing = e.bending.forces(x, alpha, e.rest.at(lam), f, r, M, theta)
-        rest, couple = e.spring_rest.at(lam), e.couple.at(lam)
+        rest, couple, stiffness, missing = e.spring_rest.at(lam), e.couple.at(lam), e.spring_stiffness, 0.0
+        if self.curves is not None:
+            stiffness, couple, missing = self.curves.straight(stiffness, couple, self.turns(x, alpha, lam))
         springs, most, too = kernels.spring_forces(
-            x, alpha, e.hinges, e.spring_stiffness, rest, couple, e.turns, f, r, S, turns
+            x, alpha, e.hinges, stiffness, rest, couple, e.turns, f, r, S, turns
         )
+        springs += missing
         L[:] = 0.0
         lock = closings.lock_forces(x, self.hinges, e.lock, f, L) if closing or too else 0.0
         size = float(np.sqrt((size + more + most) / (len(forces) - len(L))))
@@ -252,24 +206,9 @@ class ConsistentSystem(SupportedSheet):
     def _size(self, x: Array, q: Array, lam: float) -> float:
         return self.internal(x, q[self.moving :], lam).size
 
-    @cached_property
-    def _heights(self) -> Array:
-        """(rotations,) height of a triangle on the edge of each rotation, mm: what turns a moment into a force."""
-        e = self.elements
-        height = np.ones((len(self.mesh.triangles), 3))
-        height[e.members] = e.heights
-        out = np.ones(e.rotations)
-        used = e.rotation >= 0
-        out[e.rotation[used]] = height.ravel()[e.patches.half_edge[used]]
-        return out
-
-    @cached_property
-    def _stiffest(self) -> tuple[float, float]:
-        """Largest stiffness of an edge, N/mm, and of a hinge over the height of its wing, N / rad."""
-        e = self.elements
-        bend = (np.einsum("tkk->tk", e.B_triangle) / e.heights).max()
-        spring = (e.spring_stiffness / e.heights.min()).max(initial=0.0)
-        return e.stretching.largest, float(max(bend, spring))
+    @property
+    def _stiffest_edge(self) -> float:
+        return self._stiffest[0]
 
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
@@ -288,8 +227,9 @@ class ConsistentSystem(SupportedSheet):
             x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, B, M, e.nodes, *axes,
             pattern.slots[1], data,
         )  # fmt: skip
+        stiffness = self.slopes(x, q, lam)
         closing |= kernels.spring_tangent(
-            x, e.hinges, e.spring_stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
+            x, e.hinges, stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
         )
         if self.rigid_contact is not None:
             self.rigid_contact.tangent(x, lam, *axes, pattern.slots[0], data)
@@ -300,7 +240,7 @@ class ConsistentSystem(SupportedSheet):
         matrix: Matrix = pattern.matrix(data)
         if self.constraints.rigid_body:
             matrix = self._free_body(x, data)
-        return Tangent(matrix, partial(self._predicted_forces, x, B, bool(closing)))
+        return Tangent(matrix, partial(self._predicted_forces, x, Slopes(B, stiffness), bool(closing)))
 
     def _free_body(self, x: Array, data: Array) -> FreeBodyMatrix:
         """The matrix of `data` where rigid motions are left free at positions x; grounds one triangle in `data`."""
@@ -327,24 +267,24 @@ class ConsistentSystem(SupportedSheet):
         pairs = None if self.barrier is None else self.contact_blocks.pairs
         return rotation_pattern(self.mesh, self.elements, self.displacements, ground, pairs)
 
-    def _predicted_forces(self, x: Array, B: Array, closing: bool, forces: Array, dq: Array) -> Array:
+    def _predicted_forces(self, x: Array, slopes: Slopes, closing: bool, forces: Array, dq: Array) -> Array:
         """Element forces after an increment dq (size,) from positions x with `forces`, linear in dq."""
-        rates, _ = self.force_rates(x, self.vectors(dq), dq[self.moving :], B, closing, controlled=False)
+        rates, _ = self.force_rates(x, self.vectors(dq), dq[self.moving :], slopes, closing, controlled=False)
         return forces + rates
 
     def force_rates(
-        self, x: Array, v: Array, w: Array, B: Array, closing: bool, controlled: bool
+        self, x: Array, v: Array, w: Array, slopes: Slopes, closing: bool, controlled: bool
     ) -> tuple[Array, Array]:
         """Rates of the element forces and of the springs' turns for velocities v (n, 3) and w (rotations,) at x.
 
-        B (c, a, a) are the stiffnesses of the patches there. `controlled` adds what rest angles and couples do while
+        `controlled` adds what rest angles and couples do while
         lambda grows at the rate 1; without `closing` there are no locks.
 
         Args:
             x: (nodes, 3) positions, mm.
             v: (nodes, 3) velocities.
             w: (rotations,) rates of the rotations.
-            B: (c, a, a) stiffnesses of the patches, N mm.
+            slopes: of patches and springs there.
             closing: a hinge is in the zone of its lock.
             controlled: lambda grows at the rate 1.
         """
@@ -353,13 +293,15 @@ class ConsistentSystem(SupportedSheet):
         N, M, S, L = self.split(rates)
         e.stretching.rates(x, v, N)
         joined = e.patches
-        kernels.bending_rates(x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, B, M)
+        kernels.bending_rates(
+            x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, slopes.patches, M
+        )
         kernels.spring_rates(
             x,
             v,
             w,
             e.hinges,
-            e.spring_stiffness,
+            slopes.springs,
             by * e.spring_rest.rate,
             by * e.couple.rate,
             e.turns,
@@ -380,8 +322,8 @@ class ConsistentSystem(SupportedSheet):
         x = self.near(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         v = self.displacements.prescribed_motion
-        B = e.bending.stiffness(now.theta)
-        rates, turns = self.force_rates(x, v, np.zeros(e.rotations), B, closing=False, controlled=True)
+        at = Slopes(e.bending.stiffness(now.theta), self.spring_stiffness(now.turns))
+        rates, turns = self.force_rates(x, v, np.zeros(e.rotations), at, closing=False, controlled=True)
         f, r = np.zeros_like(x), e.let_go.rate
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
         e.stretching.force_rates(x, v, N, dN, f)

@@ -11,6 +11,7 @@ from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
 from bh.mechanics.shared import penetration as hinge_penetration
+from bh.mechanics.shared.crease_curves import CreaseCurves
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.shared.rigid_contact import RigidContact
@@ -38,6 +39,7 @@ class SupportedSheet:
     """
 
     size: int
+    curves: CreaseCurves | None = None  # None where all creases are straight lines
 
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
@@ -112,6 +114,25 @@ class SupportedSheet:
             vars(self).pop("_pattern", None)
         return found
 
+    @property
+    def remembers(self) -> bool:
+        """Does what it answers depend on states before (`bh.solvers.system.Remembering`)?"""
+        return self.curves is not None and self.curves.remembers
+
+    @property
+    def history(self) -> Array:
+        """(m, 2) of creases as they were accepted last, rad; see `State.crease_history`."""
+        return np.zeros((0, 2)) if self.curves is None else self.curves.history
+
+    def remember(self, history: Array) -> None:
+        """Go on from a history (m, 2).
+
+        Args:
+            history: as `history_at` gives it.
+        """
+        if self.curves is not None:
+            self.curves.history = history
+
     def free_part(self, q: Array, dq: Array, lam: float) -> float:
         """How much of a step dq (size,) from q no panels stand in, 0 to 1; see `bh.solvers.system.Limited`."""
         if self.barrier is None:
@@ -172,6 +193,15 @@ class SupportedSheet:
         x = self.near(q, lam)
         typical = typical_force(self._size(x, q, lam), self.force.at(lam))
         return self._floor(x) / typical if typical > TINIEST else 0.0
+
+    def noise(self, q: Array, lam: float) -> float:
+        """Energy of rounding, N mm, see `bh.solvers.system.Rounded`: a force of rounding in as many edges as nodes."""
+        return 0.5 * len(self.mesh.points) * self._floor(self.near(q, lam)) ** 2 / self._stiffest_edge
+
+    @property
+    def _stiffest_edge(self) -> float:
+        """Largest stiffness of an edge, N / mm."""
+        raise NotImplementedError
 
     def _floor(self, x: Array) -> float:
         """Largest force of rounding, N, at positions x (n, 3), that nobody can balance."""

@@ -21,14 +21,21 @@ export function connect(answer, frame) {
   const query = new URLSearchParams(location.search);
   socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(query.get("token") ?? "")}`);
   socket.binaryType = "arraybuffer";
-  socket.onopen = () => { wait = 500; tell(""); };
+  socket.onopen = () => { wait = 500; asked = 0; tell(""); };
   socket.onmessage = ({ data }) => (typeof data === "string" ? answer(JSON.parse(data)) : frame(data));
   socket.onclose = () => {
     tell("The connection to bh is gone; what you see is the last state. It is tried again.", true);
     setTimeout(() => connect(answer, frame), wait); wait = Math.min(2 * wait, 8000);
   };
 }
-export const ask = (message) => { if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message)); };
+const before = []; // what is to be done before anything is asked
+export const whenAsked = (done) => before.push(done);
+export let asked = 0; // messages of this connection; what was computed before the last of them is old
+export function ask(message) {
+  for (const done of before) done(message);
+  if (socket?.readyState !== WebSocket.OPEN) return;
+  asked += 1; socket.send(JSON.stringify(message));
+}
 
 let quiet = 0;
 export function tell(text, stays = false) {

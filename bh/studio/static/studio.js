@@ -3,6 +3,7 @@ import { $, ask, connect, drawn, now, save, tell } from "./common.js";
 import { draw, fit, lay, move, seen, vector } from "./view.js";
 import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
+import { back, badge, finer, refined, seenCoarse } from "./finer.js";
 import { history, numbers, panel, slider } from "./panel.js";
 import { remember } from "./record.js";
 
@@ -16,7 +17,7 @@ function answer(message) {
 
 function show(sheet) {
   Object.assign(now, { sheet, head: null, points: new Float32Array(sheet.points) });
-  lay(sheet); fit();
+  seenCoarse(null); lay(sheet); fit();
   flat(choose); panel();
 }
 
@@ -24,19 +25,23 @@ function choose(name) { $("each").open = true; slider(name)?.focus(); }
 
 function frame(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
-  now.head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const floats = new Float32Array(buffer, 4 + length);
+  if (head.kind === "finer") { finer(head, floats); return; }
+  now.head = head;
   if (!now.sheet) { drawn(); return; }
-  const n = now.sheet.points.length / 3, all = new Float32Array(buffer, 4 + length);
-  now.points = all.subarray(0, 3 * n);
-  move(now.points, all.subarray(3 * n, 4 * n), now.head.top);
-  numbers();
+  const n = now.sheet.points.length / 3, values = floats.subarray(3 * n, 4 * n);
+  now.points = floats.subarray(0, 3 * n);
+  seenCoarse(values);
+  move(now.points, values, head.top);
+  numbers(); badge();
   requestAnimationFrame(drawn);
-  remember(now.head);
+  remember(head);
 }
 
 // ---------------------------------------------------------------- what is clicked
 
-pulls(() => {}, () => { history.force = []; });
+pulls(back, () => { history.force = []; });
 $("percent").oninput = (e) => ask({ do: "percent", value: Number(e.target.value) });
 $("undo").onclick = () => ask({ do: "undo" });
 $("redo").onclick = () => ask({ do: "redo" });
@@ -67,5 +72,5 @@ async function open(file) {
 }
 
 connect(answer, frame); draw();
-window.studio = { get points() { return now.points; }, get rest() { return now.head?.rest ?? false; }, get head() { return now.head; }, get sheet() { return now.sheet; },
+window.studio = { get points() { return now.points; }, get rest() { return now.head?.rest ?? false; }, get head() { return now.head; }, get sheet() { return now.sheet; }, get refined() { return refined(); },
   place: (node) => seen(vector(now.points, node)) };

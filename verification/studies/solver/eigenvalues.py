@@ -23,7 +23,7 @@ CASE = "eigenvalues"
 E, T, DENSITY = 4000.0, 0.3, 1400.0  # MPa, mm, kg/m^3
 LONG, WIDE, SIDE = 60.0, 10.0, 30.0  # of the strip and the square, mm
 PRESSED = 0.01  # mm
-TOLERANCE = 0.01
+TOLERANCE, QUICK_TOLERANCE = 0.01, 0.04
 TONNE = 1e-12  # kg / m^3 in t / mm^3
 LEVELS = {"consistent": (16, 32, 64), "shell": (8, 16)}  # cells along
 ROOT = 1.875104068711961  # cos b cosh b = -1
@@ -143,12 +143,23 @@ def run(context: Context) -> CaseResult:
         "Are the lowest eigenvalues of a state, which no path shows, right?",
         "closed forms; the shell",
     )
+    # quick is without the finest meshes, so of a coarser one more error is allowed
     levels = {name: each[:-1] if context.quick else each for name, each in LEVELS.items()}
+    tolerance = QUICK_TOLERANCE if context.quick else TOLERANCE
     for problem in problems():
-        _against(result, problem.name, problem.source, problem.unit, problem.exact, problem.found, levels)
+        _against(
+            result,
+            problem.name,
+            problem.source,
+            problem.unit,
+            problem.exact,
+            problem.found,
+            levels,
+            tolerance,
+        )
     exact = _trough("shell", 2 * levels["shell"][-1])
-    shown = {"consistent": levels["consistent"], "shell": levels["shell"][-1:]}
-    _against(result, "folded strip", SHELL, "presses and Hz", exact, _trough, shown)
+    shown = {"consistent": levels["consistent"]} | ({} if context.quick else {"shell": levels["shell"][-1:]})
+    _against(result, "folded strip", SHELL, "presses and Hz", exact, _trough, shown, tolerance)
     result.notes.append(
         "Masses are lumped at the nodes, and Green's strain lets a pressed sheet shorten before it buckles (2e-5 of "
         "its length for the column). Of the folded strip the buckling loads are multiples of a press by 0.01 mm, its "
@@ -165,6 +176,7 @@ def _against(
     exact: Sequence[float],
     found: Callable[[str, int], list[float]],
     levels: dict[str, tuple[int, ...]],
+    tolerance: float,
 ) -> None:
     """Relative errors by formulation and mesh; the finest mesh of each is judged."""
     series = []
@@ -174,7 +186,7 @@ def _against(
             began = time.perf_counter()
             values = found(formulation, along)
             cost = Cost(wall_time_s=time.perf_counter() - began)
-            judged = TOLERANCE if along == cells[-1] else None
+            judged = tolerance if along == cells[-1] else None
             check = partial(result.check, unit=unit, source=source, tolerance=judged, path=cost)
             for number, (value, right) in enumerate(zip(values, exact, strict=True), 1):
                 params = {"formulation": formulation, "along": along, "number": number}

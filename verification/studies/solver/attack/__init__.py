@@ -30,14 +30,14 @@ CASES = "finished cases are stored with the same figures, the file is whole, no 
 KINDS = (
     Kind("a file names code", "refused in one line, nothing of it is run", strangers.proofs, 1, 1),
     Kind("bombs", "one line within 5 s of processor time and 1 GB", bombs.bomb, 1, 1, "s"),
-    Kind("kills of bh run", KEPT, kills.killed_run, 8, 1),
-    Kind("Ctrl-C in bh run", ENDED, kills.interrupted_run, 8, 1, "s"),
-    Kind("kills of bh sweep, two workers", KEPT, kills.killed_sweep, 8, 1),
-    Kind("Ctrl-C in bh sweep, two workers", ENDED, kills.interrupted_sweep, 8, 1, "s"),
-    Kind("kills of bh verify, two workers", CASES, kills.killed_verify, 8, 0),
-    Kind("Ctrl-C in bh verify, two workers", ENDED, kills.interrupted_verify, 8, 0, "s"),
-    Kind("kills of bh report", CASES, kills.killed_report, 8, 0),
-    Kind("Ctrl-C in bh report", ENDED, kills.interrupted_report, 8, 0, "s"),
+    Kind("kills of bh run", KEPT, kills.killed_run, 4, 1),
+    Kind("Ctrl-C in bh run", ENDED, kills.interrupted_run, 4, 1, "s"),
+    Kind("kills of bh sweep, two workers", KEPT, kills.killed_sweep, 4, 1),
+    Kind("Ctrl-C in bh sweep, two workers", ENDED, kills.interrupted_sweep, 4, 1, "s"),
+    Kind("kills of bh verify, two workers", CASES, kills.killed_verify, 4, 0),
+    Kind("Ctrl-C in bh verify, two workers", ENDED, kills.interrupted_verify, 4, 0, "s"),
+    Kind("kills of bh report", CASES, kills.killed_report, 4, 0),
+    Kind("Ctrl-C in bh report", ENDED, kills.interrupted_report, 4, 0, "s"),
     Kind(
         "two writers of one folder",
         "one is refused, or they take turns; same states",
@@ -115,11 +115,13 @@ def run(context: Context) -> CaseResult:
 def _count(result: CaseResult, kind: Kind, found: list[Found]) -> None:
     """One record of a kind: how many attacks there were, and in how many a promise did not hold."""
     skipped = next((f.skipped for f in found if f.skipped), "")
+    before = sum(f.before for f in found)
     worst = [f.worst for f in found if math.isfinite(f.worst)]
     params = {
         "promise": kind.promise,
         "attacks": sum(f.tried for f in found),
         **({"worst": round(max(worst), 2), "unit": kind.unit} if worst and kind.unit else {}),
+        **({"before": before} if before else {}),
         **({"skipped": skipped} if skipped else {}),
     }
     broken = [line for f in found for line in f.failures]

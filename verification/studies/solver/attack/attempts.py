@@ -19,12 +19,14 @@ class Found:
         failures: one line each of what did not hold; what cannot be tried here says so in `skipped`.
         worst: the largest figure seen (time, memory), in the unit of the kind; nan without one.
         skipped: why nothing could be tried.
+        before: signals beside `tried` that came before the first line of the program (`Ended.before`).
     """
 
     tried: int
     failures: list[str] = field(default_factory=list)
     worst: float = float("nan")
     skipped: str = ""
+    before: int = 0
 
     def plain(self) -> dict[str, Any]:
         """As plain data."""

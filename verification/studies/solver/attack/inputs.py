@@ -31,7 +31,7 @@ SWEEP = """
 scene = "scene.toml"
 [axes.t]
 key = "sheet.t"
-values = [0.1, 0.12, 0.14, 0.16, 0.18, 0.2]
+values = [0.1, 0.12, 0.14, 0.16]
 """
 
 

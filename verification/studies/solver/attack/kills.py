@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -20,10 +21,10 @@ from verification.studies.solver.attack.attempts import Found
 from verification.studies.solver.attack.inputs import write
 from verification.studies.solver.attack.programs import BH, Ended, play
 
-CHAIN = 5  # kills, then the program may end
+CHAIN = 10  # signals that hit, then the program may end
 SOON_S = 1.0  # within which an interrupted program has ended
 MOST_S = 25.0  # of a program's time in which it is killed
-CASES = ("strips", "shear_calibration")
+CASES = ("shear_calibration", "strips")
 
 
 def digest(*parts: bytes) -> str:
@@ -125,37 +126,44 @@ def _reference(target: Target) -> tuple[str, float]:
         return target.bits(folder), time.monotonic() - began
 
 
-@cache
-def _start_s() -> float:
-    """Time until `bh` has begun to look at its command line, s, with half as much again."""
-    began = time.monotonic()
-    play((*BH, "--version"), Path())
-    return 1.5 * (time.monotonic() - began)
-
-
 def _disturbed(target: Target, send: signal.Signals, folder: Path, random: np.random.Generator) -> Found:
-    """A chain of signals at random moments, each to a program that goes on; then it ends by itself."""
+    """A chain of signals at random moments, each to a program that goes on; where one was done, it begins anew."""
     bits, seconds = _reference(target)
+    failures: list[str] = []
+    worst, tried, before = 0.0, 0, 0
     write(folder)
-    failures, worst, tried = [], 0.0, 0
-    least = _start_s() if send is signal.SIGINT else 0.0
-    for _ in range(CHAIN):
+    for _ in range(4 * CHAIN):
         words = target.words if (folder / target.holds).exists() else target.first
-        moment = random.uniform(least, max(min(seconds, MOST_S), 1.5 * least))
-        ended = play((*BH, *words), folder, send=send, after_s=moment)
-        tried += 1
-        if ended.code == 0:  # it was done before the signal
-            continue
-        failures += _judged(ended, send)
-        worst = max(worst, ended.after_s)
+        ended = play((*BH, *words), folder, send=send, after_s=random.uniform(0.0, min(seconds, MOST_S)))
+        if ended.before:
+            before += 1
+        elif ended.code == 0:  # it was done before the signal, or all but
+            failures += _other(target, folder, bits)
+            _empty(folder)
+            write(folder)
+        else:
+            tried += 1
+            failures += _judged(ended, send)
+            worst = max(worst, ended.after_s)
         failures += _broken(target, folder)
+        if tried == CHAIN:
+            break
     words = target.words if (folder / target.holds).exists() else target.first
     ended = play((*BH, *words), folder)
     if ended.code != 0:
         failures.append(f"went on to exit code {ended.code}: {ended.said.strip()}")
-    elif target.bits(folder) != bits:
-        failures.append("other bits than without the signals")
-    return Found(tried, failures, worst)
+    else:
+        failures += _other(target, folder, bits)
+    return Found(tried, failures, worst, before=before)
+
+
+def _empty(folder: Path) -> None:
+    for place in folder.iterdir():
+        shutil.rmtree(place) if place.is_dir() else place.unlink()
+
+
+def _other(target: Target, folder: Path, bits: str) -> list[str]:
+    return [] if target.bits(folder) == bits else ["other bits than without the signals"]
 
 
 def _broken(target: Target, folder: Path) -> list[str]:
@@ -216,26 +224,30 @@ def _figures() -> dict[str, str]:
 
 @cache
 def _cases_s() -> float:
-    """Time, s, in which verify and report are disturbed: a third more than the first case needs."""
+    """Time, s, in which verify and report are disturbed: until workers, which start as long, have ended a case."""
     with TemporaryDirectory() as place:
         began = time.monotonic()
         play((*BH, "verify", CASES[0], "--quick", "--results", "results"), Path(place))
-        return 1.3 * (time.monotonic() - began)
+        return 2.0 * (time.monotonic() - began)
 
 
 def _cases(words: Sequence[str], send: signal.Signals, folder: Path, random: np.random.Generator) -> Found:
     """A chain of signals; finished cases are stored, whole, and have the same figures."""
     bits = _figures()
-    failures, worst = [], 0.0
-    least = _start_s() if send is signal.SIGINT else 0.0
+    failures: list[str] = []
+    worst, tried, early = 0.0, 0, 0
     file = folder / "results" / "checks.json"
-    for _ in range(CHAIN):
+    for _ in range(4 * CHAIN):
+        if tried == CHAIN:
+            break
         before = case_bits(file) if file.exists() else {}
-        ended = play(
-            (*BH, *words), folder, send=send, after_s=random.uniform(least, max(_cases_s(), 1.5 * least))
-        )
-        if ended.code in (0, 1):
+        ended = play((*BH, *words), folder, send=send, after_s=random.uniform(0.0, _cases_s()))
+        if ended.before:
+            early += 1
             continue
+        if ended.code in (0, 1):  # it was done before the signal
+            continue
+        tried += 1
         failures += _judged(ended, send)
         worst = max(worst, ended.after_s)
         try:
@@ -247,7 +259,7 @@ def _cases(words: Sequence[str], send: signal.Signals, folder: Path, random: np.
         # the last may be told of and not yet stored
         failures += [f"{name} was finished and is lost" for name in {*before, *told[:-1]} - set(stored)]
         failures += [f"{n} has other figures" for n in stored if n in bits and stored[n] != bits[n]]
-    return Found(CHAIN, failures, worst)
+    return Found(tried, failures, worst, before=early)
 
 
 VERIFY = ("verify", *CASES, "--quick", "--jobs", "2", "--results", "results")

@@ -16,5 +16,8 @@ def table(checks: Sequence[Check]) -> str:
     for check in checks:
         of = check.params
         worst = f"{of['worst']:g} {of['unit']}" if "worst" in of else of.get("skipped", "")
-        rows.append(f"| {check.quantity} | {of['promise']} | {of['attacks']} | {check.value:.0f} | {worst} |")
+        count = f"{of['attacks']}" + (
+            f", and {of['before']} before Python began the program" if "before" in of else ""
+        )
+        rows.append(f"| {check.quantity} | {of['promise']} | {count} | {check.value:.0f} | {worst} |")
     return "\n".join(rows) + "\n"

@@ -12,7 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-BH = (sys.executable, "-m", "bh.commands.cli")
+import bh
+
+ROOT = Path(bh.__file__).parents[1]
+BH = (sys.executable, str(ROOT / "bh_command.py"))  # as the script `bh` begins, installed or not
+OURS = tuple(
+    str(ROOT / name) for name in ("bh_command.py", "bh/", "fem/", "meshes/", "verification/", "reports/")
+)
 PATIENCE_S = 900.0  # then a program that nobody ends is killed, and its attempt lost
 GONE_S = 5.0  # within which workers have to be gone
 
@@ -29,6 +35,8 @@ class Ended:
         megabytes: the most memory that it held.
         left: processes of its session that were still there `GONE_S` later.
         crowd: processes that shared a core then (mean of a minute), 1 or more.
+        heeds: whether the program had a handler of SIGINT right before the signal; Python itself sets one on its way
+            to the first line of any program.
     """
 
     code: int
@@ -38,6 +46,20 @@ class Ended:
     megabytes: float
     left: int
     crowd: float = 1.0
+    heeds: bool = True
+
+    @property
+    def before(self) -> bool:
+        """Whether SIGINT came before the first line of the program could run; no program can change what happens then.
+
+        Either Python had not set its own handler yet, and the signal ended it without a word; or it says where it was,
+        and no place in this project's functions is among them.
+        """
+        if self.code == -signal.SIGINT and not self.said:
+            return not self.heeds
+        places = [line for line in self.said.splitlines() if any(place in line for place in OURS)]
+        begun = [line for line in places if not line.endswith(" in <module>") or OURS[0] not in line]
+        return self.code != 130 and "KeyboardInterrupt" in self.said and not begun
 
     @property
     def lines(self) -> int:
@@ -89,7 +111,9 @@ def play(
             preexec_fn=_heeding,
         )
         done = _wait(program.pid, PATIENCE_S if send is None else after_s)
+        heeds = True
         if done is None:
+            heeds = _heeds_interrupts(program.pid)
             began = time.monotonic()
             if send is signal.SIGINT:
                 os.killpg(program.pid, send)
@@ -105,12 +129,22 @@ def play(
     cpu = usage.ru_utime + usage.ru_stime if usage else 0.0
     memory = usage.ru_maxrss / 1024.0 if usage else 0.0
     crowd = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-    return Ended(program.returncode, text, took, cpu, memory, left, crowd)
+    return Ended(program.returncode, text, took, cpu, memory, left, crowd, heeds)
 
 
 def _heeding() -> None:
     """Interrupts count in the program, also where this process runs in the background of a shell."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _heeds_interrupts(pid: int) -> bool:
+    """Whether a process has a handler of SIGINT now."""
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return True
+    caught = next(line.split()[1] for line in lines if line.startswith("SigCgt:"))
+    return bool(int(caught, 16) >> (signal.SIGINT - 1) & 1)
 
 
 def _wait(pid: int, seconds: float) -> tuple[int, os.struct_rusage] | None:  # type: ignore[name-defined]

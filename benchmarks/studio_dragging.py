@@ -1,0 +1,224 @@
+"""Random handling for as long as wanted: `python -m benchmarks.studio_dragging --seconds 3600 --seed 1`.
+
+A seeded hand drags sliders, pulls and lets go of points, holds nodes, undoes, changes the material and opens other
+patterns. Of every state that is shown the forces are computed anew, at rest by a system that knows the controls of
+the frame and nothing else; now and then the controls are solved from flat as well. Seconds are of the processor. It
+ends with exit code 1 where a state is out of balance, the memory has grown by more than `LEAK`, or a state that never
+snapped is not that of the run from flat.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from bh.errors import InputError
+from bh.formulations.protocols import PlacedSystem
+from bh.formulations.registry import formulation
+from bh.live import Frame
+from bh.live.controls import Way
+from bh.loading.builder import LoadStepBuilder
+from bh.model.actuations import Force
+from bh.model.model import Model
+from bh.model.step import Step
+from bh.runtime.terminal import say
+from bh.solving.trace import trace
+from bh.studio.desk import Desk
+from bh.studio.messages import read
+from bh.studio.sheets import LIBRARY
+
+TOLERANCE = 1e-6  # imbalance: that of a state that is told as a neutral one; the others keep 1e-8
+LEAK = 50.0  # MB
+WARM = 60.0  # s of processor time before the memory is read first
+COMPARED = 40  # one of so many states at rest is solved from flat as well
+DRAWINGS = Path(__file__).parents[1] / "tests" / "data"
+FILES = ("miura.svg", "pleats.svg")
+WAYS = (
+    "percent",
+    "fold",
+    "drag",
+    "drag",
+    "let-go",
+    "undo",
+    "redo",
+    "hold",
+    "material",
+    "flatten",
+    "colour",
+    "open",
+)
+
+
+@dataclass
+class Log:
+    """What was seen.
+
+    Attributes:
+        actions, frames, rests: how many there were.
+        refused: requests that were answered by a line.
+        stuck: frames that said why the sheet cannot go on, and `snaps` those that said it left its branch.
+        worst: largest imbalance of a state that was shown as an equilibrium.
+        compared: states that were solved from flat as well, and `elsewhere` those of them on another branch after a
+            snap; `wrong` those that differ without one.
+        slowest: s of processor time of one answer.
+    """
+
+    actions: int = 0
+    frames: int = 0
+    rests: int = 0
+    refused: int = 0
+    stuck: int = 0
+    snaps: int = 0
+    worst: float = 0.0
+    compared: int = 0
+    elsewhere: int = 0
+    wrong: list[str] = field(default_factory=list)
+    slowest: float = 0.0
+
+
+class Hand:
+    """A seeded hand at a desk."""
+
+    def __init__(self, seed: int) -> None:
+        """Begin with a pattern of the library."""
+        self.random = np.random.default_rng(seed)
+        self.desk = Desk()
+        self.log = Log()
+        self.snapped = False  # since the sheet was put on the desk
+
+    def act(self) -> None:
+        """Do something, watch what comes of it."""
+        way = str(self.random.choice(WAYS))
+        moves = self._moves(way)
+        for message in moves:
+            self.log.actions += 1
+            try:
+                self.desk.take(read(json.dumps(message)))
+            except InputError:
+                self.log.refused += 1
+            if message["do"] in ("open", "pattern", "material", "hold"):
+                self.snapped = self.snapped and message["do"] in ("material", "hold")
+            for _ in range(self.random.integers(0, 4)):
+                self._frame()
+        if self.random.random() < 0.3:
+            for _ in range(60):
+                if not self.desk.busy:
+                    break
+                self._frame()
+            self._rest()
+
+    def _moves(self, way: str) -> list[dict[str, object]]:
+        random, session = self.random, self.desk.session
+        if way == "percent":
+            a, b = random.uniform(-30.0, 90.0, 2)
+            return [{"do": way, "value": v} for v in np.linspace(a, b, random.integers(1, 12)).tolist()]
+        if way == "fold" and session.creases:
+            crease = str(random.choice(session.creases))
+            return [{"do": way, "crease": crease, "angle": a} for a in random.uniform(-1.0, 2.5, 3).tolist()]
+        if way == "drag":
+            node = int(random.integers(len(session.mesh.points)))
+            at = self.desk.frame.points[node]
+            size = float(np.ptp(session.mesh.points, axis=0).max())
+            far = size * random.choice([0.02, 0.1, 0.3, 3.0], p=[0.4, 0.4, 0.15, 0.05])
+            steps = np.cumsum(random.normal(0.0, far / 4.0, (random.integers(1, 15), 3)), axis=0)
+            return [{"do": "pull", "node": node, "to": to} for to in (at + steps).tolist()]
+        if way == "hold":
+            node = int(random.integers(len(session.mesh.points)))
+            return [{"do": way, "node": node, "on": bool(random.random() < 0.4)}]
+        if way == "material":
+            return [{"do": way, "name": str(random.choice(["paper", "card", "pet", "steel"]))}]
+        if way == "colour":
+            return [{"do": way, "by": str(random.choice(["stress", "bending", "curvature", "none"]))}]
+        if way == "open":
+            return [self._another()] if random.random() < 0.25 else []
+        return [{"do": way}] if way in ("undo", "redo", "flatten", "let-go") else []
+
+    def _another(self) -> dict[str, object]:
+        import base64
+
+        if self.random.random() < 0.5:
+            return {"do": "pattern", "name": str(self.random.choice(list(LIBRARY)))}
+        name = str(self.random.choice(FILES))
+        return {"do": "open", "name": name, "data": base64.b64encode((DRAWINGS / name).read_bytes()).decode()}
+
+    def _frame(self) -> None:
+        began = time.process_time()
+        self.desk.update()
+        self.log.slowest = max(self.log.slowest, time.process_time() - began)
+        frame = self.desk.frame
+        self.log.frames += 1
+        self.log.stuck += bool(frame.note)
+        self.log.snaps += frame.snapped
+        self.snapped = self.snapped or frame.snapped
+        if not np.isfinite(frame.points).all():
+            raise ArithmeticError("a state with nan was shown")
+        self.log.worst = max(self.log.worst, self.desk.session.imbalance())
+
+    def _rest(self) -> None:
+        frame, session = self.desk.frame, self.desk.session
+        if not frame.at_rest:
+            return
+        self.log.rests += 1
+        self.log.worst = max(self.log.worst, own_imbalance(session.model, frame))
+        if self.log.rests % COMPARED or not any(frame.wanted.folds.values()):
+            return
+        path = trace(session.scene(), warn=False)
+        self.log.compared += 1
+        off = float(np.abs(path[-1].points - frame.points).max()) / float(np.ptp(session.mesh.points))
+        if path.reached and off > 1e-6:
+            self.log.elsewhere += self.snapped
+            if not self.snapped:
+                energies = path[-1].energy.total, frame.state.energy.total
+                self.log.wrong.append(
+                    f"{self.desk.sheet.name}: {off:.1e} of its size off, energies {energies}"
+                )
+
+
+def own_imbalance(model: Model, frame: Frame) -> float:
+    """Forces out of balance at rest under what the frame names and nothing else, by a system that is made anew.
+
+    Returns:
+        as of `Evaluation`; 0 where a formulation cannot begin at a shape.
+    """
+    start = replace(frame.controls, folds=dict.fromkeys(frame.controls.folds, 0.0))
+    items = Way(start, frame.controls).actuations(model.creases) or (Force([0], each=(0.0, 0.0, 0.0)),)
+    system = formulation(model.formulation).system(model, LoadStepBuilder(model).build(Step(items)), None)
+    if not isinstance(system, PlacedSystem):
+        return 0.0
+    return system.evaluate(system.unknowns_at(frame.points, 1.0), 1.0).imbalance
+
+
+def resident() -> float:
+    """Memory of this process, MB."""
+    import psutil
+
+    return float(psutil.Process().memory_info().rss) / 2**20
+
+
+def main() -> int:
+    """Print what was seen, and a line every minute of the processor."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=600.0)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    hand = Hand(given.seed)
+    began, told, base = time.process_time(), 0.0, 0.0
+    while (spent := time.process_time() - began) < given.seconds:
+        hand.act()
+        if not base and spent > min(WARM, 0.5 * given.seconds):
+            base = resident()
+        if spent - told > WARM:
+            told = spent
+            say(f"{spent:.0f} s: {resident():.0f} MB, {hand.log}")
+    grown = resident() - base
+    say(f"{spent:.0f} s of the processor, memory grown by {grown:.0f} MB, {hand.log}")
+    return int(grown > LEAK or hand.log.worst > TOLERANCE or bool(hand.log.wrong))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

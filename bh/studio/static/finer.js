@@ -1,0 +1,41 @@
+// The state at rest on a finer mesh: shown until a hand asks for something else.
+import { $, asked, now, number, whenAsked } from "./common.js";
+import { lay, move } from "./view.js";
+import { scale } from "./panel.js";
+
+let shown = false, said = "", coarse = null;
+
+// A frame of the coarse mesh: what is seen from now on.
+export function seenCoarse(values) {
+  if (shown) lay(now.sheet);
+  coarse = values; shown = false; said = "";
+}
+
+// Back to the coarse mesh at once: a point is taken, or a slider moved.
+export function back() {
+  if (!shown) return;
+  lay(now.sheet); move(now.points, coarse, now.head.top); scale(now.head.top);
+  shown = false; said = ""; badge();
+}
+whenAsked(back);
+
+export function finer(head, floats) {
+  if (!now.head?.rest || head.heard !== asked) return;
+  const error = head.error === null ? "" : `, energy within about ${number(100 * head.error, 2)} %`;
+  said = head.mesh ? `refined: ${head.mesh.triangles.length / 3} triangles${error}` : "in equilibrium, on this mesh";
+  now.error = head.error === null ? `not known: ${head.reason}` : `${number(100 * head.error, 2)} %${head.reason ? `; ${head.reason}` : ""}`;
+  if (head.mesh) {
+    const n = head.mesh.points.length / 3;
+    lay(head.mesh); move(floats.subarray(0, 3 * n), floats.subarray(3 * n, 4 * n), head.top); scale(head.top);
+    shown = true;
+  }
+  badge();
+  $("error").textContent = now.error; $("error").title = now.error;
+}
+
+export function badge() {
+  const { head } = now, place = $("badge");
+  place.textContent = said || (head.note ? `cannot go on: ${head.note}` : head.snapped ? "snapped" : head.rest ? "in equilibrium" : "on its way");
+  place.classList.toggle("away-from", !said && (Boolean(head.note) || head.snapped || !head.rest));
+}
+export const refined = () => shown;
