@@ -130,18 +130,12 @@ class LoadControl:
         first, largest = self.limits(system)
         step = first if increment is None else increment
         cuts: list[str] = []
-        iterations, looked = 0, False
+        iterations, looked, apart = 0, False, True  # apart: nothing has been met so far
         held: Array | None = None  # the neutral mode, once the path has one
-        apart = isinstance(system, Hindered) and system.hindered  # as far as is known
         while points[-1].lam < 1.0:
             here = points[-1]
-            lam, meets = lambda_after(here.lam, step), False
-            free: _Trial | None = None
-            if apart:
-                lam, free, apart, spent = self._apart(system, points, lam, held)
-                iterations += spent
-            if free is None:
-                lam, meets = _up_to_contact(system, points, lam, SMALLEST)
+            lam, free, apart, spent = self._apart(system, points, lambda_after(here.lam, step), held, apart)
+            lam, meets = (lam, False) if free else _up_to_contact(system, points, lam, SMALLEST)
             fold = fold_ahead(points, system.primal)
             if self.foresee and fold <= lam and len(cuts) > 2:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
@@ -156,7 +150,7 @@ class LoadControl:
             if len(cuts) == 1 and held is None:  # a step may begin on a buckled ring
                 held = _neutral(system, here, known=False)
             tried = free or self._try(system, points, lam, brisk, look, held)
-            iterations += 0 if free else tried.iterations
+            iterations += spent + tried.iterations
             looked = looked or bool(tried.branch.critical)
             if tried.branch.points:
                 yield from tried.branch.increments(tuple(cuts), iterations)
@@ -253,7 +247,7 @@ class LoadControl:
         return _Trial(there, found, primary, objection, note, iterations, branch)
 
     def _apart(
-        self, system: System, points: Sequence[Point], lam: float, held: Array | None
+        self, system: System, points: Sequence[Point], lam: float, held: Array | None, apart: bool
     ) -> tuple[float, _Trial | None, bool, int]:
         """A state that is found as if nothing could stand in the way, if the way to it is clear.
 
@@ -262,9 +256,10 @@ class LoadControl:
 
         Returns:
             lambda of the state or of the increment to try, the state or None, whether nothing has been met so far,
-            and the iterations.
+            and the iterations that led to nothing.
         """
-        assert isinstance(system, Hindered)
+        if not (apart and isinstance(system, Hindered) and system.hindered):
+            return lam, None, False, 0
         here, spent = points[-1], 0
         for _ in range(APPROACHES):
             with system.unhindered():
@@ -274,7 +269,7 @@ class LoadControl:
                 return lam, None, True, spent
             clear = system.clear_ways(ways(points, tried.point, WAYS)) / WAYS
             if clear >= 1.0:
-                return lam, tried, True, spent
+                return lam, tried, True, spent - tried.iterations
             lam = here.lam + SHORT_OF * clear * (lam - here.lam)
             if clear < LEAST_CLEAR:
                 break
