@@ -25,13 +25,18 @@ from bh.solvers.points import (
     lambda_after,
     point,
     power_rate,
+    ways,
 )
 from bh.solvers.stability import leave_saddle, locate
-from bh.solvers.system import System, clear_part, meeting, pressing
+from bh.solvers.system import Hindered, System, clear_part, meeting, pressing
 
 Array = NDArray[np.float64]
 LOOK = 2  # cuts of an increment before a bifurcation is looked for
 SMALLEST = 1e-5  # part of a step that an increment up to a contact may be
+APPROACHES = 2  # states that are looked for on a way before what stands in it is reckoned with
+WAYS = 4  # straight ones that an increment is looked at in
+SHORT_OF = 0.98  # of the way to what stands there
+LEAST_CLEAR = 0.2  # of an increment, for a shorter one to be worth it
 AtBifurcation = Literal["stable", "primary", "stop"]
 
 
@@ -125,11 +130,12 @@ class LoadControl:
         first, largest = self.limits(system)
         step = first if increment is None else increment
         cuts: list[str] = []
-        iterations, looked = 0, False
+        iterations, looked, apart = 0, False, True  # apart: nothing has been met so far
         held: Array | None = None  # the neutral mode, once the path has one
         while points[-1].lam < 1.0:
             here = points[-1]
-            lam, meets = _up_to_contact(system, points, lambda_after(here.lam, step), SMALLEST)
+            lam, free, apart, spent = self._apart(system, points, lambda_after(here.lam, step), held, apart)
+            lam, meets = (lam, False) if free else _up_to_contact(system, points, lam, SMALLEST)
             fold = fold_ahead(points, system.primal)
             if self.foresee and fold <= lam and len(cuts) > 2:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
@@ -143,8 +149,8 @@ class LoadControl:
             look = self.at_bifurcation == "stable" and len(cuts) >= LOOK and not looked
             if len(cuts) == 1 and held is None:  # a step may begin on a buckled ring
                 held = _neutral(system, here, known=False)
-            tried = self._try(system, points, lam, brisk, look, held)
-            iterations += tried.iterations
+            tried = free or self._try(system, points, lam, brisk, look, held)
+            iterations += spent + tried.iterations
             looked = looked or bool(tried.branch.critical)
             if tried.branch.points:
                 yield from tried.branch.increments(tuple(cuts), iterations)
@@ -239,6 +245,35 @@ class LoadControl:
             # the stable state may be far, but not on the other side of a closed hinge
             objection = system.penetration(here.q, here.lam, there.q, lam) if note else found.reason
         return _Trial(there, found, primary, objection, note, iterations, branch)
+
+    def _apart(
+        self, system: System, points: Sequence[Point], lam: float, held: Array | None, apart: bool
+    ) -> tuple[float, _Trial | None, bool, int]:
+        """A state that is found as if nothing could stand in the way, if the way to it is clear.
+
+        The way is along the polynomial through the last states and the new one. Where it is not clear, a state just
+        before what stands there is looked for in the same manner.
+
+        Returns:
+            lambda of the state or of the increment to try, the state or None, whether nothing has been met so far,
+            and the iterations that led to nothing.
+        """
+        if not (apart and isinstance(system, Hindered) and system.hindered):
+            return lam, None, False, 0
+        here, spent = points[-1], 0
+        for _ in range(APPROACHES):
+            with system.unhindered():
+                tried = self._try(system, points, lam, brisk=True, look=False, held=held)
+            spent += tried.iterations
+            if tried.objection or tried.note or tried.branch.points:
+                return lam, None, True, spent
+            clear = system.clear_ways(ways(points, tried.point, WAYS)) / WAYS
+            if clear >= 1.0:
+                return lam, tried, True, spent - tried.iterations
+            lam = here.lam + SHORT_OF * clear * (lam - here.lam)
+            if clear < LEAST_CLEAR:
+                break
+        return lam, None, False, spent
 
     def _critical(
         self, system: System, here: Point, found: Solution, lam: float

@@ -187,6 +187,23 @@ def extrapolate(points: Sequence[Point], lam: float) -> tuple[Array, Array]:
     return q, forces
 
 
+def ways(points: Sequence[Point], there: Point, pieces: int) -> list[tuple[Array, float]]:
+    """Places from the last of some points to another one, on the polynomial through three points or two.
+
+    Args:
+        points: last ones of the path, in order.
+        there: where it leads to.
+        pieces: straight ways between the places.
+
+    Returns:
+        unknowns (n,) and lambda of each place, the two points included.
+    """
+    here = points[-1]
+    through = [*points[-2:], there]
+    lams = np.linspace(here.lam, there.lam, pieces + 1)[1:-1].tolist()
+    return [(here.q, here.lam), *((extrapolate(through, lam)[0], lam) for lam in lams), (there.q, there.lam)]
+
+
 def lambda_after(lam: float, step: float) -> float:
     """Where an increment of size `step` leads to; it leaves no crumb for the end of the step at 1.
 

@@ -5,8 +5,8 @@ All actuation enters through one scalar lambda, which runs from 0 to 1 in a step
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -228,6 +228,30 @@ class Limited(Protocol):
             q: (n,) unknowns, with nothing in their way.
             dq: (n,) step.
             lam: load parameter of the step, 0 to 1.
+        """
+        ...
+
+
+@runtime_checkable
+class Hindered(Limited, Protocol):
+    """Ability of a system: what can stand in the way can be left out, and the way be looked at afterwards."""
+
+    @property
+    def hindered(self) -> bool:
+        """Does anything stand in the way, ever?"""
+        ...
+
+    def unhindered(self) -> AbstractContextManager[None]:
+        """While it lasts nothing stands in the way."""
+        ...
+
+    def clear_ways(self, places: Sequence[tuple[Array, float]]) -> float:
+        """How many of the straight ways from place to place are clear, and a part of the one that is not.
+
+        If it is all of them, the last place is one that the path has come to.
+
+        Args:
+            places: unknowns (n,) and load parameter of each; the first is an accepted state.
         """
         ...
 

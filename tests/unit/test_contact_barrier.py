@@ -252,3 +252,52 @@ def test_a_sheet_without_contact_does_not_load_the_library() -> None:
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "False"
+
+
+def test_a_way_is_looked_at_again_from_where_detection_has_stopped_short(
+    near: tuple[SheetBarrier, Array], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # detection may stop where a pair has come to a tenth of its distance, and nothing stands in the way
+    barrier, x = near
+    detection = barrier._detection
+    seen = iter((0.5, 0.5, 1.0))
+    monkeypatch.setattr(detection, "_seen_free", lambda *_: next(seen))
+    assert detection.free_part(x, x + 1.0) == 1.0
+    monkeypatch.setattr(detection, "_seen_free", lambda *_: 0.5)
+    assert detection.free_part(x, x + 2.0) == 0.5
+
+
+def test_ways_are_clear_up_to_where_parts_begin_to_press() -> None:
+    mesh, x = two_layers(5.0)
+    barrier = SheetBarrier(mesh, 0.0, GAP, 2.0)
+    assert barrier.begin(x)
+    places = [x.copy() for _ in range(4)]
+    for k, place in enumerate(places):
+        place[3:, 2] -= 2.0 * k  # 5, 3, 1, -1 mm apart
+    assert barrier.clear_ways(places[:3]) == 2.0
+    assert 2.3 < barrier.clear_ways(places) <= 2.45  # pressing begins 0.45 of the way down
+    inside = places[2].copy()
+    inside[3:, 2] -= 0.95
+    assert barrier.clear_ways([places[2], inside]) < 1.0
+
+
+def test_a_barrier_asleep_is_none_and_wakes_up(
+    near: tuple[SheetBarrier, Array],
+) -> None:
+    barrier, x = near
+    f = np.zeros_like(x)
+    with barrier.asleep():
+        assert barrier.forces(x, f) == 0.0
+        assert not barrier.presses(x)
+        assert not f.any()
+    assert barrier.forces(x, f) > 0.0
+
+
+@pytest.mark.parametrize("name", FORMULATIONS)
+def test_what_never_meets_takes_the_iterations_of_a_model_without_contact(name: str) -> None:
+    # 118 degrees: the outer panels come to 1.2 mm of each other
+    with_contact = bh.trace(letter(name, by=2.06))
+    without = bh.trace(letter(name, contact=False, by=2.06))
+    assert [r.lam for r in with_contact.records] == [r.lam for r in without.records]
+    assert with_contact.steps[0].iterations == without.steps[0].iterations
+    assert with_contact[-1].points == pytest.approx(without[-1].points, abs=1e-9)

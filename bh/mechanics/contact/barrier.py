@@ -11,7 +11,9 @@ gradients, Hessians and continuous collision detection.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 import ipctk
 import numpy as np
@@ -65,6 +67,36 @@ class SheetBarrier:
         slack = max(reach, SLACK * float(np.median(mesh_edges(mesh))))
         self._detection = Detection(self._mesh, offset, offset + reach, slack)
         self._last: tuple[Array, ipctk.NormalCollisions] | None = None
+        self._asleep = False
+
+    @contextmanager
+    def asleep(self) -> Iterator[None]:
+        """Stands in nobody's way and presses on nothing: a state is found first, and the way to it looked at then."""
+        self._asleep = True
+        try:
+            yield
+        finally:
+            self._asleep = False
+
+    def clear_ways(self, places: Sequence[Array]) -> float:
+        """How many of the straight ways from place to place are clear; if all, motions are looked for from the last.
+
+        Clear is a way on which no parts come within the reach of each other, so that nothing presses.
+
+        Args:
+            places: each (nodes, 3) positions, mm; the first is an accepted state.
+
+        Returns:
+            number of the ways, and a part of the one that is not clear.
+        """
+        for k, (x, moved) in enumerate(itertools.pairwise(places)):
+            part = self._detection.free_part(x, moved, self.offset + self.reach)
+            if part < 1.0:
+                return k + part
+        if self.presses(places[-1]):
+            return len(places) - 2.0
+        self._detection.begin(places[-1])
+        return len(places) - 1.0
 
     def clear(self, x: Array) -> bool:
         """Is the sheet at positions x free of intersections, with layers farther apart than the offset?"""
@@ -92,6 +124,8 @@ class SheetBarrier:
         """
         if not np.isfinite(x).all():
             return np.inf
+        if self._asleep:
+            return 0.0
         if not self._detection.linked(x) and ipctk.has_intersections(self._mesh, x):
             return np.inf
         pairs = self._pairs(x)
@@ -162,7 +196,7 @@ class SheetBarrier:
             x: (nodes, 3) positions, mm, with nothing passing through anything.
             moved: (nodes, 3) positions, mm.
         """
-        return self._detection.free_part(x, moved)
+        return 1.0 if self._asleep else self._detection.free_part(x, moved)
 
     def begin(self, x: Array) -> bool:
         """Whether the sheet is clear at x (`clear`), from where motions are looked for from now on.
@@ -182,7 +216,7 @@ class SheetBarrier:
             x: (nodes, 3) positions of an accepted state, mm.
             moved: (nodes, 3) positions of the next one, mm.
         """
-        if self._detection.linked(moved):
+        if self._asleep or self._detection.linked(moved):
             return False
         return not (self.clear(moved) and self.free_part(x, moved) >= 1.0)
 
@@ -245,6 +279,8 @@ class SheetBarrier:
         return found
 
     def _pairs(self, x: Array) -> ipctk.NormalCollisions:
+        if self._asleep:
+            return ipctk.NormalCollisions()
         # the same state is asked for its energy, its Hessian and its distance one after the other
         if self._last is not None and np.array_equal(self._last[0], x):
             return self._last[1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -160,6 +162,27 @@ class SupportedSheet:
         if self.barrier is None:
             return 1.0
         return self.barrier.approach(self.near(q, lam), self.near(q + dq, lam))
+
+    @property
+    def hindered(self) -> bool:
+        """Do panels stop each other?"""
+        return self.barrier is not None
+
+    def unhindered(self) -> AbstractContextManager[None]:
+        """While it lasts no panels stop each other."""
+        return nullcontext() if self.barrier is None else self.barrier.asleep()
+
+    def clear_ways(self, places: Sequence[tuple[Array, float]]) -> float:
+        """How many of the straight ways from place to place no panels come near each other on.
+
+        If it is all of them, the last place is one that the path has come to.
+
+        Args:
+            places: unknowns (size,) and load parameter of each; the first is an accepted state.
+        """
+        if self.barrier is None:
+            return len(places) - 1.0
+        return self.barrier.clear_ways([self.near(q, lam) for q, lam in places])
 
     def pressing(self, q: Array, lam: float) -> bool:
         """Do panels press on each other at q (size,)?
