@@ -26,8 +26,8 @@ ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
 PAGES = {
     "Use": (
-        "installation", "drawing", "studio", "scenes", "materials", "results", "plots", "testing", "report",
-        "reliability",
+        "installation", "which_model", "drawing", "studio", "scenes", "materials", "from_a_test", "results", "plots",
+        "accuracy", "testing", "report", "reliability",
     ),
     "Studies": (
         "stiffness", "corrugations", "pinching", "inverse_design", "isometric", "sensitivities", "scaling", "scan",
@@ -36,11 +36,15 @@ PAGES = {
     "How it works": ("architecture", "extending", "formulation", "fem", "solver", "glossary", "decisions"),
     "Project": ("releasing",),
 }  # fmt: skip
-# The reference: packages whose __all__ is public, the modules that `bh` gives a short name, what is read and written
-# (USE), the classes that a pattern, a support, an actuation or a formulation of one's own is made from (EXTENSION;
-# extending.md), and all modules of `fem` and `meshes`.
+# The reference: packages whose __all__ is public, the modules that `bh` gives a short name, what docs import by its
+# full name (USE), the classes that a pattern, a support, an actuation or a formulation of one's own is made from
+# (EXTENSION; extending.md), and all modules of `fem` and `meshes`.
 PUBLIC = ("bh", "meshes")
-USE = ("meshes.io", "bh.testing")
+USE = (
+    "meshes.io", "bh.testing", "bh.applications.response", "bh.applications.comparison",
+    "bh.applications.corrugation.design", "bh.applications.inverse.reach", "bh.applications.inverse.tolerances",
+    "bh.analysis.richardson", "bh.analysis.shapes",
+)  # fmt: skip
 EXTENSION = (
     "bh.model.step", "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
     "bh.formulations.protocols", "bh.formulations.registry", "bh.solvers.system",

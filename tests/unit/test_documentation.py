@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+import re
 import subprocess
 import sys
 from importlib import util
@@ -112,6 +113,21 @@ def test_reference_has_what_extensions_are_made_from(reference: dict[str, str]) 
     there = described(reference)
     for base in (bh.Support.__bases__[0], bh.Fold.__bases__[0], Formulation, System):
         assert id(base) in there, base
+
+
+def test_what_docs_import_by_its_full_name_is_in_the_reference(reference: dict[str, str]) -> None:
+    there = described(reference)
+    imports = r"^from ((?:bh|fem|meshes)[\w.]*) import ([\w, ]+)$"
+    found = [
+        (file.name, module, name)
+        for file in (*(ROOT / "docs").glob("*.md"), ROOT / "README.md", *(ROOT / "examples").rglob("*.py"))
+        if file.name != "extending.md"  # imports what it derives from, private modules of a formulation too
+        for module, names in re.findall(imports, file.read_text(encoding="utf-8"), re.MULTILINE)
+        for name in names.split(", ")
+    ]
+    assert len(found) >= 5
+    values = [(file, name, getattr(importlib.import_module(module), name)) for file, module, name in found]
+    assert [(file, name) for file, name, value in values if callable(value) and id(value) not in there] == []
 
 
 def test_every_example_is_in_the_readme_of_the_examples() -> None:
