@@ -9,11 +9,14 @@ host. Warnings are errors: a broken link or a reference to a name that is not th
 from __future__ import annotations
 
 import argparse
+import contextlib
 import html
 import inspect
+import io
 import os
 import pkgutil
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -43,7 +46,7 @@ PUBLIC = ("bh", "meshes")
 USE = (
     "meshes.io", "bh.testing", "bh.applications.response", "bh.applications.comparison",
     "bh.applications.corrugation.design", "bh.applications.inverse.reach", "bh.applications.inverse.tolerances",
-    "bh.analysis.richardson", "bh.analysis.shapes",
+    "bh.analysis.richardson", "bh.analysis.shapes", "bh.paths.export",
 )  # fmt: skip
 EXTENSION = (
     "bh.model.step", "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
@@ -87,6 +90,7 @@ def build(folder: Path, gallery: bool = True, reference: bool = True) -> int:
         write_reference(source / "reference")
     if gallery:
         write_gallery(source / "gallery")
+        write_cookbook(source / "gallery")
     (source / "viewer").mkdir(exist_ok=True)
     write_index(source, gallery, reference)
     command = [sys.executable, "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "-b", "html", str(source)]
@@ -101,8 +105,9 @@ def write_index(source: Path, gallery: bool, reference: bool) -> None:
     rest = sorted(page.stem for page in (source / "docs").glob("*.md") if page.stem not in listed)
     trees = {caption: [f"docs/{name}" for name in names] for caption, names in PAGES.items()}
     trees["Studies"] += [f"docs/{name}" for name in rest]
-    trees["Use"].insert(1, "gallery/index" if gallery else "examples/README")
-    trees["Use"] += [*(["examples/README"] if gallery else []), "examples/own_project/README"]
+    trees["Use"][1:1] = ["gallery/index", "gallery/cookbook"] if gallery else ["examples/README"]
+    trees["Use"] += [*(["examples/README"] if gallery else []), "examples/cookbook/README"]
+    trees["Use"] += ["examples/own_project/README"]
     trees["Project"] = ["CONTRIBUTING", *trees["Project"], "SECURITY", "CHANGELOG"]
     if reference:
         trees["Reference"] = ["reference/index"]
@@ -274,6 +279,22 @@ def script_page(file: Path, folder: Path) -> str:
             lines += [f"{{download}}`{made.name} <{made.name}>`, a page to open in a browser", ""]
     (folder / f"{file.stem}.md").write_text("\n".join(lines), encoding="utf-8")
     return title
+
+
+def write_cookbook(folder: Path) -> None:
+    """One page of all entries of the cookbook, each run here: what it says, its code, its picture."""
+    lines = ["# Cookbook", "", "Each entry is run when these pages are built, and in the tests.", ""]
+    with contextlib.chdir(folder):
+        for file in sorted((EXAMPLES / "cookbook").glob("*.py")):
+            text = file.read_text(encoding="utf-8")
+            with contextlib.redirect_stdout(io.StringIO()):
+                runpy.run_path(str(file), run_name="__main__")
+            about, code = text.split('"""\n', 1)
+            title, rest = about.removeprefix('"""').split("\n\n", 1)
+            (picture,) = re.findall(rf'"({file.stem}\.(?:png|svg))"', text.split("__main__")[1])
+            lines += [f"## {title}", "", rest.strip(), "", "```python", code.strip(), "```", ""]
+            lines += [f"![{file.stem.replace('_', ' ')}]({picture})", ""]
+    Path(folder / "cookbook.md").write_text("\n".join(lines), encoding="utf-8")
 
 
 if __name__ == "__main__":
