@@ -44,6 +44,7 @@ def test_scenes_are_the_same_every_time_and_ask_for_contact() -> None:
         assert model.contact in (0.05, 0.1, 0.2)
 
 
+@pytest.mark.slow
 def test_a_scene_is_played_and_presses() -> None:
     row = play(2)
     assert row.outcome == "reached"
