@@ -17,6 +17,7 @@ import bh
 import meshes
 from bh.mechanics.consistent.system import ConsistentSystem
 from bh.paths.path import Path
+from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context
 from verification.framework.store import Store
 from verification.studies.solver.branches import part_of
@@ -103,18 +104,32 @@ def meeting(result: CaseResult, rows: Sequence[Row]) -> None:
     crossing = [row for row in rows if row.crossing]
     apart = [row for row in compared if row.apart > APART]
     silent = [row for row in apart if not row.told]
-    ended = [row for row in rows if row.outcome != "reached"]
+    ended = [row for row in rows if row.outcome != Outcome.REACHED]
     unsaid = [row for row in ended if not row.reason]
     result.check(
-        "scenes with an accepted state that meets itself", len(crossing), reference=0.0, source=PREDICATE,
-        tolerance=0.0, params=params,
-    )  # fmt: skip
-    result.check("scenes that do not reach and do not say why", len(unsaid), reference=0.0, source="asked for",
-                 tolerance=0.0, params=params)  # fmt: skip
+        "scenes with an accepted state that meets itself",
+        len(crossing),
+        reference=0.0,
+        source=PREDICATE,
+        tolerance=0.0,
+        params=params,
+    )
     result.check(
-        "scenes whose energy differs by more than 2 % from finer increments without a remark", len(silent),
-        reference=0.0, source="asked for", tolerance=0.0, params=params,
-    )  # fmt: skip
+        "scenes that do not reach and do not say why",
+        len(unsaid),
+        reference=0.0,
+        source="asked for",
+        tolerance=0.0,
+        params=params,
+    )
+    result.check(
+        "scenes whose energy differs by more than 2 % from finer increments without a remark",
+        len(silent),
+        reference=0.0,
+        source="asked for",
+        tolerance=0.0,
+        params=params,
+    )
     for name, count in (
         ("scenes whose panels press on each other", sum(row.pressed for row in rows)),
         ("scenes that do not reach their end", len(ended)),

@@ -121,10 +121,16 @@ def play(number: int) -> Row:
     met = first_contact(path)
     pressed = any(state.energy.contact > 0.0 for state in path)
     found = Row(
-        number, words, str(path.outcome), path.reason, pressed, "" if met is None else str(met), told=telling(path),
+        number,
+        words,
+        str(path.outcome),
+        path.reason,
+        pressed,
+        "" if met is None else str(met),
+        told=telling(path),
         iterations=sum(step.iterations for step in path.steps) + sum(r.iterations for r in path.records),
         seconds=seconds,
-    )  # fmt: skip
+    )
     if not path.reached:
         return found
     try:
