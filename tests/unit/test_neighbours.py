@@ -168,10 +168,10 @@ def test_rows_are_judged() -> None:
 
 def test_a_part_of_the_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(branches.PART, raising=False)
-    assert branches.numbers(False) == range(500)
+    assert branches.part_of("BH_BRANCHES", 500, 500) == range(500)
     monkeypatch.setenv(branches.PART, "100:200")
-    assert branches.numbers(False) == range(100, 200)
+    assert branches.part_of("BH_BRANCHES", 500, 500) == range(100, 200)
     monkeypatch.setenv(branches.PART, "200:900")
     with pytest.raises(InputError, match="two numbers such as 100:200"):
-        branches.numbers(False)
+        branches.part_of("BH_BRANCHES", 500, 500)
     assert drawn(7).words == drawn(7).words != drawn(8).words

@@ -65,6 +65,7 @@ SLOW = {
     "shell_benchmarks",  # the same
     "appendix_b_cross",
     "branches",
+    "contact",
     "consistent",
     "convergence",
     "appendix_b_fields",

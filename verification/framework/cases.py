@@ -78,6 +78,7 @@ STUDIES = (
     Study("campaign", "solver", long=True),
     Study("attack", "solver", long=True),
     Study("branches", "solver", long=True),
+    Study("contact", "solver", long=True),
     Study("drawings", "solver", long=True),
     Study("gradients", "solver", seconds=50),
     Study("top_down", "4"),

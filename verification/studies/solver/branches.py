@@ -73,21 +73,22 @@ class Row:
         return self.apart > APART and not self.told
 
 
-class _OutOfTimeError(Exception):
+class OutOfTimeError(Exception):
     """A scene has had its share."""
 
 
-class _Clock:
+class Clock:
     """A meter that ends a run whose processor time is over."""
 
     def __init__(self, seconds: float) -> None:
+        """Begins now, with `seconds` of processor time."""
         self.end = time.process_time() + seconds
 
     def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
         """Look at the clock."""
         del step, steps, lam, iterations, energy
         if time.process_time() > self.end:
-            raise _OutOfTimeError
+            raise OutOfTimeError
 
     def close(self, outcome: str) -> None:
         """Nothing to close."""
@@ -115,10 +116,10 @@ def play(number: int) -> Row:
     scene = drawn(number)
     began = time.process_time()
     try:
-        path = trace(scene.model, progress=_Clock(COARSE_S), warn=False)
+        path = trace(scene.model, progress=Clock(COARSE_S), warn=False)
     except InputError:
         return Row(number, scene.words, "refused")
-    except _OutOfTimeError:
+    except OutOfTimeError:
         return Row(number, scene.words, "out of time")
     seconds = time.process_time() - began
     told = telling(path)
@@ -126,9 +127,9 @@ def play(number: int) -> Row:
         return Row(number, scene.words, str(path.outcome), told=told, seconds=seconds)
     try:
         fine = trace(
-            scene.model, strategy=Automatic(load=FINE), progress=_Clock(FINE_S), warn=False, neighbours=False
+            scene.model, strategy=Automatic(load=FINE), progress=Clock(FINE_S), warn=False, neighbours=False
         )
-    except _OutOfTimeError:
+    except OutOfTimeError:
         return Row(number, scene.words, str(path.outcome), "out of time", told=told, seconds=seconds)
     if not fine.reached:
         return Row(number, scene.words, str(path.outcome), str(fine.outcome), told=told, seconds=seconds)
@@ -136,20 +137,24 @@ def play(number: int) -> Row:
     return Row(number, scene.words, str(path.outcome), str(fine.outcome), difference, lower, told, seconds)
 
 
-def numbers(quick: bool) -> range:
-    """Which scenes are played.
+def part_of(variable: str, most: int, scenes: int) -> range:
+    """Which scenes are played: those that a variable of the environment names, such as 100:200, or the first `most`.
+
+    Args:
+        variable: of the environment.
+        most: without it.
+        scenes: all.
 
     Raises:
-        InputError: the variable of the environment names no such part.
+        InputError: the variable names no such part.
     """
-    most = QUICK if quick else SCENES
-    word = os.environ.get(PART, "").strip()
+    word = os.environ.get(variable, "").strip()
     if not word:
         return range(most)
     first, _, last = word.partition(":")
-    if not (first.isdecimal() and last.isdecimal() and int(first) < int(last) <= SCENES):
+    if not (first.isdecimal() and last.isdecimal() and int(first) < int(last) <= scenes):
         raise InputError(
-            f"{PART} = {word[:40]!r} cannot be; give two numbers such as 100:200, up to {SCENES}"
+            f"{variable} = {word[:40]!r} cannot be; give two numbers such as 100:200, up to {scenes}"
         )
     return range(int(first), int(last))
 
@@ -157,7 +162,7 @@ def numbers(quick: bool) -> range:
 def run(context: Context) -> CaseResult:
     """Play the scenes that are not stored, and count all that are."""
     store = Store.open(context.folder, RUNS, context.quick)
-    for number in numbers(context.quick):
+    for number in part_of(PART, QUICK if context.quick else SCENES, SCENES):
         if str(number) not in store.runs:
             context.tell(f"{CASE}: scene {number}")
             store.keep(str(number), asdict(play(number)))

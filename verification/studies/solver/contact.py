@@ -1,9 +1,15 @@
-"""Case `contact`: a strip on two supports that wraps round the cylinder which presses its middle.
+"""Case `contact`: a strip that wraps round a cylinder, and random sheets whose panels meet.
 
-Not in the list of cases yet: random scenes with contact of panels and an exact predicate are to come.
+The strip lies on two supports and is pressed in its middle: force and lift-off by the elastica. Scenes are stored one
+by one, so a run that was stopped goes on; with BH_CONTACT=50:100 in the environment it plays these and counts all that
+are stored.
 """
 
 from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
 
 import numpy as np
 
@@ -11,7 +17,11 @@ import bh
 import meshes
 from bh.mechanics.consistent.system import ConsistentSystem
 from bh.paths.path import Path
+from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context
+from verification.framework.store import Store
+from verification.studies.solver.branches import part_of
+from verification.studies.solver.contact_scenes import SEED, Row, play
 from verification.theory.wrapped import wrapped_by
 
 CASE = "contact"
@@ -20,6 +30,9 @@ TRAVEL = 12.0  # mm
 GAPS = (0.2, 0.1, 0.05)  # mm
 ALONG = (32, 64, 128)
 TOLERANCE = 0.02
+SCENES, QUICK, RUNS, PART = 200, 2, "contact_runs.json", "BH_CONTACT"
+APART = 0.02  # in parts of the energy
+PREDICATE = "the predicate of bh.contact, which shares nothing with the barrier"
 ELASTICA = "elastica that wraps round a cylinder (verification/theory/wrapped.py)"
 
 
@@ -48,15 +61,14 @@ def read(path: Path) -> tuple[float, float, float]:
     return -float(x[middle, 2].mean()), -float(path[-1].contact_forces["bar"][2]), arm
 
 
-def run(context: Context) -> CaseResult:
-    """Force and arm at three gaps and three meshes; the finest mesh of each gap is judged."""
-    result = CaseResult(
-        CASE,
-        "A strip that wraps round a cylinder",
-        "Are the force of a rigid cylinder, and the place where a strip lifts off it, right?",
-        ELASTICA,
-    )
-    cells = ALONG[:-1] if context.quick else ALONG
+def wrapping(result: CaseResult, quick: bool) -> None:
+    """Force and arm at three gaps and three meshes; the finest mesh of each gap is judged.
+
+    Args:
+        result: to which checks are added.
+        quick: without the finest mesh.
+    """
+    cells = ALONG[:-1] if quick else ALONG
     for gap in GAPS:
         for along in cells:
             path = pressed(along, gap)
@@ -69,6 +81,82 @@ def run(context: Context) -> CaseResult:
                 ("arm of the force", arm, exact.arm, "mm"),
             ):
                 result.check(
-                    name, value, unit=unit, reference=right, tolerance=judged, params=params, path=path
+                    name,
+                    value,
+                    unit=unit,
+                    reference=right,
+                    source=ELASTICA,
+                    tolerance=judged,
+                    params=params,
+                    path=path,
                 )
+
+
+def meeting(result: CaseResult, rows: Sequence[Row]) -> None:
+    """What became of the random scenes.
+
+    Args:
+        result: to which checks are added.
+        rows: one a scene.
+    """
+    compared = [row for row in rows if math.isfinite(row.apart)]
+    params = {"scenes": len(rows), "compared": len(compared), "seed": SEED}
+    crossing = [row for row in rows if row.crossing]
+    apart = [row for row in compared if row.apart > APART]
+    silent = [row for row in apart if not row.told]
+    ended = [row for row in rows if row.outcome != Outcome.REACHED]
+    unsaid = [row for row in ended if not row.reason]
+    result.check(
+        "scenes with an accepted state that meets itself",
+        len(crossing),
+        reference=0.0,
+        source=PREDICATE,
+        tolerance=0.0,
+        params=params,
+    )
+    result.check(
+        "scenes that do not reach and do not say why",
+        len(unsaid),
+        reference=0.0,
+        source="asked for",
+        tolerance=0.0,
+        params=params,
+    )
+    result.check(
+        "scenes whose energy differs by more than 2 % from finer increments without a remark",
+        len(silent),
+        reference=0.0,
+        source="asked for",
+        tolerance=0.0,
+        params=params,
+    )
+    for name, count in (
+        ("scenes whose panels press on each other", sum(row.pressed for row in rows)),
+        ("scenes that do not reach their end", len(ended)),
+        ("scenes whose energy differs by more than 2 % from finer increments", len(apart)),
+    ):
+        result.check(name, count, source="measured", params=params)
+    for row in (*crossing, *ended, *apart):
+        told = row.crossing or row.reason or "; ".join(row.told) or "nothing is said"
+        result.notes.append(
+            f"Scene {row.number}, {row.outcome} ({row.words}), apart by {row.apart:.2%}: {told}."
+        )
+
+
+def run(context: Context) -> CaseResult:
+    """The strip, and the scenes that are not stored yet; all that are stored are counted."""
+    result = CaseResult(
+        CASE,
+        "Contact",
+        "Are forces of contact right, and does nothing pass through anything?",
+        f"{ELASTICA}; {SCENES} random scenes of seed {SEED}",
+    )
+    wrapping(result, context.quick)
+    store = Store.open(context.folder, RUNS, context.quick)
+    for number in part_of(PART, QUICK if context.quick else SCENES, SCENES):
+        if str(number) not in store.runs:
+            context.tell(f"{CASE}: scene {number}")
+            store.keep(str(number), asdict(play(number)))
+    known = [store.runs[str(n)] for n in range(SCENES) if str(n) in store.runs]
+    meeting(result, [Row(**{**row, "told": tuple(row["told"])}) for row in known])
     return result
