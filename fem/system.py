@@ -423,7 +423,7 @@ class ShellSystem:
         return slot[slot >= 0], value[slot >= 0]
 
     def _rigid(self, here: Here) -> Array:
-        return free_rigid_motions(self.components, self.elements, here.x, here.B)
+        return free_rigid_motions(self.components, self.elements, self.frames, here.x)
 
     @cached_property
     def _ground_triangle(self) -> int:
@@ -441,6 +441,8 @@ class ShellSystem:
     def _unbalanced(self, q: Array, lam: float) -> float:
         """Part of the loads that works on free rigid motions."""
         load = self.load.at(lam)[self.components.free]
+        if not load.any():
+            return 0.0
         work = self._rigid(self.at(q, lam)).T @ load
         return float(np.abs(work).max(initial=0.0)) / max(float(np.abs(load).sum()), 1e-300)
 
