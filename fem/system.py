@@ -152,7 +152,7 @@ class ShellSystem:
         """Number of unknowns: there are no multipliers."""
         return self.size
 
-    @property
+    @cached_property
     def rotation(self) -> float:
         """Largest angle that the step imposes on a crease, rad."""
         return self.load_step.rotation
