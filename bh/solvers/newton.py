@@ -184,7 +184,7 @@ class Newton:
             forces = tangent.predicted_forces(now.forces, dq)
             q, before = q + dq, now.imbalance
             now = system.evaluate(q, lam)
-            if not np.isfinite(now.energy) or now.imbalance > 1e8 * max(least, 1.0):
+            if not np.isfinite(now.energy) or 1e-8 * now.imbalance > max(least, 1.0):
                 return Solution(q, now, iteration + 1, False, "diverged")
             least = min(least, now.imbalance)
             yield q
