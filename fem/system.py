@@ -441,9 +441,7 @@ class ShellSystem:
     def _unbalanced(self, q: Array, lam: float) -> float:
         """Part of the loads that works on free rigid motions."""
         load = self.load.at(lam)[self.components.free]
-        if not load.any():
-            return 0.0
-        work = self._rigid(self.at(q, lam)).T @ load
+        work = self._rigid(self.at(q, lam)).T @ load if load.any() else load
         return float(np.abs(work).max(initial=0.0)) / max(float(np.abs(load).sum()), 1e-300)
 
     def _check_balance(self) -> None:
