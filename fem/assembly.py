@@ -47,28 +47,36 @@ def turn_blocks(K, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
 def scatter(K, sides, slots, data):  # type: ignore[no-untyped-def]
     """Add element matrices (t, w, w) by positions and gamma = +-alpha + beta / 2 to `data`; sides (t, 3 r)."""
     width, turns = K.shape[1], sides.shape[1]
+    moves = width - turns
     source = np.empty(width + turns, dtype=np.int64)
     factor = np.ones(width + turns)
     for i in range(width + turns):
         source[i] = i if i < width else i - turns
     for e in range(len(K)):
-        for i in range(turns):
-            factor[width - turns + i] = sides[e, i]
-            factor[width + i] = 0.5
-        at = 0
-        for i in range(width + turns):
+        for i in range(moves):
+            at = i * (i + 1) // 2
             for j in range(i + 1):
-                slot = slots[e, at]
+                slot = slots[e, at + j]
+                if slot >= 0:
+                    data[slot] += K[e, i, j]
+        for i in range(turns):
+            factor[moves + i] = sides[e, i]
+            factor[width + i] = 0.5
+        for i in range(moves, width + turns):
+            at = i * (i + 1) // 2
+            if slots[e, at + i] < 0:  # prescribed, or no fold angle there, which is so in most triangles
+                continue
+            for j in range(i + 1):
+                slot = slots[e, at + j]
                 if slot >= 0:
                     data[slot] += factor[i] * factor[j] * K[e, source[i], source[j]]
-                at += 1
 
 
 @dataclass(frozen=True)
 class Pattern(Storage):
     """Where the lower entries of all element matrices go; -1 in `slots` where a component is prescribed."""
 
-    slots: Ints
+    slots: NDArray[np.int32]
 
 
 def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
@@ -100,17 +108,20 @@ def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: boo
     high, low = _pairs(vertex[mesh.carriers], len(used))
     order = unknowns(reverse_cuthill_mckee(high, low, len(used))[0])
     rows = _rows(components, number, order)
-    reach = rows.max(axis=1) - np.where(rows >= 0, rows, len(order)).min(axis=1)
-    bandwidth = int(reach.max(initial=0))
+    last = rows.max(axis=1)
+    bandwidth = int((last - np.where(rows >= 0, rows, len(order)).min(axis=1)).max(initial=0))
     if band_is_cheaper(len(order), bandwidth) if banded is None else banded:
         lower = np.tril_indices(rows.shape[1])
         a, b = rows[:, lower[0]], rows[:, lower[1]]
         column = np.minimum(a, b)
-        slots = np.where(column >= 0, np.abs(a - b) + column * (bandwidth + 1), -1)
-        return Pattern(order, bandwidth, (bandwidth + 1) * len(order), None, slots)
+        slots = np.where(column >= 0, np.abs(a - b) + column * (bandwidth + 1), -1).astype(np.int32)
+        reach = np.arange(len(order))
+        np.maximum.at(reach, rows[rows >= 0], np.repeat(last, (rows >= 0).sum(axis=1)))
+        reach = np.maximum.accumulate(reach)
+        return Pattern(order, bandwidth, (bandwidth + 1) * len(order), None, reach, slots)
     sparse, _ = SparsePattern.dissected(high, low, sizes[used], mesh.places[used, :2], unknowns)
     slots = _sparse_slots(_rows(components, number, sparse.order), sparse.indptr, sparse.indices)
-    return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, slots)
+    return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, None, slots)
 
 
 def _owners(mesh: ElementMesh, components: Ints, number: Ints) -> Ints:
@@ -144,7 +155,7 @@ def _rows(components: Ints, number: Ints, order: Ints) -> Ints:
 def _sparse_slots(rows, indptr, indices):  # type: ignore[no-untyped-def]
     """Slots of the lower entries of all elements in compressed columns, by bisection."""
     width = rows.shape[1]
-    slots = np.full((len(rows), width * (width + 1) // 2), -1, dtype=np.int64)
+    slots = np.full((len(rows), width * (width + 1) // 2), -1, dtype=np.int32)
     for e in range(len(rows)):
         at = -1
         for i in range(width):

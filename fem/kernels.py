@@ -15,8 +15,9 @@ from fem.points import (
     cross,
     curvature_hessian,
     dot,
-    edge_angle,
     edge_angle_hessian,
+    edge_rise,
+    edge_slopes,
 )
 
 Array = NDArray[np.float64]
@@ -85,7 +86,7 @@ def measures(x, gamma, loops, frames, strain, curvature):  # type: ignore[no-unt
     n, own, turns = loops.nodes.shape[1], loops.factors.shape[2], len(loops.turn)
     xe, gram = np.empty((n, 3)), np.empty((n, n))
     p, r, N, second = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
-    tau, c, t, d, g = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((2, 3))
+    tau, c, t, d = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     points = loops.turn.shape[1]
     for e in range(len(loops.nodes)):
         _gather(x, loops.nodes[e], xe)
@@ -115,7 +116,7 @@ def measures(x, gamma, loops, frames, strain, curvature):  # type: ignore[no-unt
         for j in range(3):
             for q in range(points):
                 _edge_point(xe, loops, frames, e, j, q, tau, c, t, d)
-                turn = edge_angle(tau, c, t, d, g)
+                turn = edge_rise(tau, c, t, d)
                 for k in range(turns):
                     turn -= loops.turn[k, q] * gamma[e, j, k]
                 for k in range(turns):
@@ -130,16 +131,20 @@ def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
     xe = np.empty((n, 3))
     p, r, N, second = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
     tau, c, t, d, g = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((2, 3))
-    by_p, by_r, y, rate = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3 * n))
+    by_p, by_r, y, rate, value = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3 * n)), np.empty(3 * n)
     points = loops.turn.shape[1]
     for e in range(len(loops.nodes)):
         B[e] = 0.0
         _gather(x, loops.nodes[e], xe)
         for k in range(3 * own):
             for i in range(n):
+                s0, s1, s2 = 0.0, 0.0, 0.0
                 for j in range(n):
-                    for b in range(3):
-                        B[e, k, 3 * i + b] += loops.Q[k, i, j] * xe[j, b]
+                    weight = loops.Q[k, i, j]
+                    s0 += weight * xe[j, 0]
+                    s1 += weight * xe[j, 1]
+                    s2 += weight * xe[j, 2]
+                B[e, k, 3 * i], B[e, k, 3 * i + 1], B[e, k, 3 * i + 2] = s0, s1, s2
         for b in range(3):
             combine(loops.bend[b], xe, second[b])
         for q in range(loops.inside.shape[1]):
@@ -161,81 +166,103 @@ def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
                             + loops.slopes[q, 1, i] * by_r[k]
                         )
             for j in range(3):
+                s0, s1, s2 = loops.S[j, 0], loops.S[j, 1], loops.S[j, 2]
                 for i in range(3 * n):
-                    value = (
-                        loops.S[j, 0] * rate[0, i] + loops.S[j, 1] * rate[1, i] + loops.S[j, 2] * rate[2, i]
-                    )
-                    for k in range(own):
-                        B[e, first + own * j + k, i] += loops.factors[q, j, k] * value
+                    value[i] = s0 * rate[0, i] + s1 * rate[1, i] + s2 * rate[2, i]
+                for k in range(own):
+                    factor = loops.factors[q, j, k]
+                    for i in range(3 * n):
+                        B[e, first + own * j + k, i] += factor * value[i]
         for j in range(3):
             for q in range(points):
                 _edge_point(xe, loops, frames, e, j, q, tau, c, t, d)
-                edge_angle(tau, c, t, d, g)
+                edge_slopes(tau, c, t, g)
+                for i in range(n):
+                    for b in range(3):
+                        value[3 * i + b] = loops.along[j, q, i] * g[0, b] + loops.across[j, q, i] * g[1, b]
                 for k in range(turns):
                     part = loops.rim[e, j, q] * loops.turn[k, q]
-                    for i in range(n):
-                        for b in range(3):
-                            B[e, first + own * j + k, 3 * i + b] -= part * (
-                                loops.along[j, q, i] * g[0, b] + loops.across[j, q, i] * g[1, b]
-                            )
+                    for i in range(3 * n):
+                        B[e, first + own * j + k, i] -= part * value[i]
                     for m in range(turns):
                         B[e, first + own * j + k, 3 * n + turns * j + m] += part * loops.turn[m, q]
 
 
 @njit(**OPTIONS)
-def _add_block(K, a, b, H, symmetric_pair):  # type: ignore[no-untyped-def]
-    """K (3 n, 3 n) += a_i b_j H, and its transposed if the pair of arguments is not the same."""
-    for i in range(len(a)):
-        for j in range(len(b)):
-            w = a[i] * b[j]
-            if w != 0.0:
-                for k in range(3):
-                    for m in range(3):
-                        K[3 * i + k, 3 * j + m] += w * H[k, m]
-                        if symmetric_pair:
-                            K[3 * j + m, 3 * i + k] += w * H[k, m]
+def _add_form(block, D, H, scale, half):  # type: ignore[no-untyped-def]
+    """Add scale D^T H D to the lower half of `block` (n, n, 9): the Hessian of a function of m vectors.
+
+    Vector a is sum_i D[a, i] x_i; H (m, m, 9) are the second derivatives by any two of them, row by row, symmetric as
+    a whole; `half` (m, 9) is room to work in. H is multiplied by D first on one side, then on the other.
+    """
+    m, n = D.shape
+    for j in range(n):
+        for a in range(m):
+            for k in range(9):
+                half[a, k] = 0.0
+            for b in range(m):
+                weight = scale * D[b, j]
+                if weight != 0.0:
+                    for k in range(9):
+                        half[a, k] += weight * H[a, b, k]
+        for i in range(j, n):
+            for a in range(m):
+                weight = D[a, i]
+                if weight != 0.0:
+                    for k in range(9):
+                        block[i, j, k] += weight * half[a, k]
+
+
+@njit(**OPTIONS)
+def _add_halves(block, K):  # type: ignore[no-untyped-def]
+    """K (w, w) += the symmetric matrix whose lower half are the 3 x 3 blocks of `block` (n, n, 9)."""
+    for i in range(len(block)):
+        for k in range(3):
+            for j in range(i):
+                for m in range(3):
+                    K[3 * i + k, 3 * j + m] += block[i, j, 3 * k + m]
+                    K[3 * j + m, 3 * i + k] += block[i, j, 3 * k + m]
+            for m in range(3):
+                K[3 * i + k, 3 * i + m] += block[i, i, 3 * k + m]
 
 
 @njit(**OPTIONS)
 def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
     """K += sum over the element forces (t, 6 m) of force times second derivatives of its measure by positions."""
     n, own, turns = loops.nodes.shape[1], loops.factors.shape[2], len(loops.turn)
-    xe = np.empty((n, 3))
-    p, r, y, weights = np.empty(3), np.empty(3), np.empty(3), np.empty(n)
+    xe, D, E = np.empty((n, 3)), np.empty((3, n)), np.empty((2, n))
+    p, r, y, weights = np.empty(3), np.empty(3), np.empty(3), D[2]
     tau, c, t, d = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    H, G, T = np.empty((3, 3, 3, 3)), np.empty((2, 2, 3, 3)), np.empty((3, 3))
-    block = np.empty((3 * n, 3 * n))
+    H, G = np.empty((3, 3, 3, 3)), np.empty((2, 2, 3, 3))
+    of_face, of_edge = H.reshape((3, 3, 9)), G.reshape((2, 2, 9))
+    block, half = np.empty((n, n, 9)), np.empty((3, 9))
     points = loops.turn.shape[1]
     for e in range(len(loops.nodes)):
         _gather(x, loops.nodes[e], xe)
         block[:] = 0.0
         for i in range(n):
-            for j in range(n):
+            for j in range(i + 1):
                 total = 0.0
                 for k in range(3 * own):
                     total += forces[e, k] * loops.Q[k, i, j]
                 for b in range(3):
-                    block[3 * i + b, 3 * j + b] += total
+                    block[i, j, 4 * b] = total
         for q in range(loops.inside.shape[1]):
             combine(loops.slopes[q, 0], xe, p)
             combine(loops.slopes[q, 1], xe, r)
             for i in range(n):
-                weights[i] = 0.0
+                D[0, i], D[1, i], D[2, i] = loops.slopes[q, 0, i], loops.slopes[q, 1, i], 0.0
             for j in range(3):
                 moment = 0.0
                 for k in range(own):
                     moment += forces[e, (3 + j) * own + k] * loops.factors[q, j, k]
                 for b in range(3):
+                    scale = loops.inside[e, q] * moment * loops.S[j, b]
                     for i in range(n):
-                        weights[i] += loops.inside[e, q] * moment * loops.S[j, b] * loops.bend[b, i]
+                        weights[i] += scale * loops.bend[b, i]
             combine(weights, xe, y)
             curvature_hessian(p, r, y, H)
-            first, second = loops.slopes[q, 0], loops.slopes[q, 1]
-            _add_block(block, first, first, H[0, 0], False)
-            _add_block(block, second, second, H[1, 1], False)
-            _add_block(block, first, second, H[0, 1], True)
-            _add_block(block, first, weights, H[0, 2], True)
-            _add_block(block, second, weights, H[1, 2], True)
+            _add_form(block, D, of_face, 1.0, half)
         for j in range(3):
             for q in range(points):
                 _edge_point(xe, loops, frames, e, j, q, tau, c, t, d)
@@ -243,36 +270,36 @@ def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
                 force = 0.0
                 for k in range(turns):
                     force -= loops.rim[e, j, q] * loops.turn[k, q] * forces[e, (3 + j) * own + k]
-                for a in range(2):
-                    for b in range(a, 2):
-                        for i in range(3):
-                            for k in range(3):
-                                T[i, k] = force * G[a, b, i, k]
-                        left = loops.along[j, q] if a == 0 else loops.across[j, q]
-                        right = loops.along[j, q] if b == 0 else loops.across[j, q]
-                        _add_block(block, left, right, T, a != b)
-        for i in range(3 * n):
-            for j in range(3 * n):
-                K[e, i, j] += block[i, j]
+                for i in range(n):
+                    E[0, i], E[1, i] = loops.along[j, q, i], loops.across[j, q, i]
+                _add_form(block, E, of_edge, force, half)
+        _add_halves(block, K[e])
 
 
 @njit(**OPTIONS)
 def add_material(B, membrane, bending, K):  # type: ignore[no-untyped-def]
     """K += B^T diag(membrane, bending) B with (t, 3 m, 3 m) stiffness of either kind."""
     count, width = membrane.shape[1], K.shape[1]
-    CB = np.empty((2 * count, width))
+    CB, half = np.empty((2 * count, width)), np.empty((width, width))
     for e in range(len(B)):
         for k in range(count):
             for j in range(width):
-                a, b = 0.0, 0.0
-                for m in range(count):
-                    a += membrane[e, k, m] * B[e, m, j]
-                    b += bending[e, k, m] * B[e, count + m, j]
-                CB[k, j] = a
-                CB[count + k, j] = b
+                CB[k, j] = 0.0
+                CB[count + k, j] = 0.0
+            for m in range(count):
+                a, b = membrane[e, k, m], bending[e, k, m]
+                for j in range(width):
+                    CB[k, j] += a * B[e, m, j]
+                    CB[count + k, j] += b * B[e, count + m, j]
         for i in range(width):
+            for j in range(i + 1):
+                half[i, j] = 0.0
             for k in range(2 * count):
                 left = B[e, k, i]
                 if left != 0.0:
-                    for j in range(width):
-                        K[e, i, j] += left * CB[k, j]
+                    for j in range(i + 1):
+                        half[i, j] += left * CB[k, j]
+            for j in range(i):
+                K[e, i, j] += half[i, j]
+                K[e, j, i] += half[i, j]
+            K[e, i, i] += half[i, i]

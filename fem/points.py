@@ -28,7 +28,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
 
 
 @njit(**OPTIONS)
@@ -65,32 +65,48 @@ def skew_times(v, A, sign, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
+def edge_rise(tau, c, t0, d0):  # type: ignore[no-untyped-def]
+    """Angle theta of one edge point alone; in scalars, since an array that is made here costs more than the angle."""
+    N0 = tau[1] * c[2] - tau[2] * c[1]
+    N1 = tau[2] * c[0] - tau[0] * c[2]
+    N2 = tau[0] * c[1] - tau[1] * c[0]
+    length = math.sqrt(dot(tau, tau))
+    k = dot(d0, tau) / (length + dot(t0, tau))
+    x = d0[0] - k * (t0[0] + tau[0] / length)
+    y = d0[1] - k * (t0[1] + tau[1] / length)
+    z = d0[2] - k * (t0[2] + tau[2] / length)
+    m0, m1, m2 = tau[1] * N2 - tau[2] * N1, tau[2] * N0 - tau[0] * N2, tau[0] * N1 - tau[1] * N0
+    return math.atan2((x * m0 + y * m1 + z * m2) / length, x * N0 + y * N1 + z * N2)
+
+
+@njit(**OPTIONS)
+def edge_slopes(tau, c, t0, g):  # type: ignore[no-untyped-def]
+    """Write d theta / d tau and d theta / d c of one edge point into the rows of `g` (2, 3)."""
+    N0 = tau[1] * c[2] - tau[2] * c[1]
+    N1 = tau[2] * c[0] - tau[0] * c[2]
+    N2 = tau[0] * c[1] - tau[1] * c[0]
+    length = math.sqrt(dot(tau, tau))
+    NN = N0 * N0 + N1 * N1 + N2 * N2
+    spin = 1.0 / (length * (length + dot(t0, tau)))
+    lean, fall = dot(c, tau) / (length * NN), -length / NN
+    g[0, 0] = lean * N0 + spin * (tau[1] * t0[2] - tau[2] * t0[1])
+    g[0, 1] = lean * N1 + spin * (tau[2] * t0[0] - tau[0] * t0[2])
+    g[0, 2] = lean * N2 + spin * (tau[0] * t0[1] - tau[1] * t0[0])
+    g[1, 0], g[1, 1], g[1, 2] = fall * N0, fall * N1, fall * N2
+
+
+@njit(**OPTIONS)
 def edge_angle(tau, c, t0, d0, g):  # type: ignore[no-untyped-def]
     """Angle theta of one edge point; writes d theta / d tau and d theta / d c into the rows of `g` (2, 3)."""
-    N, d, m = np.empty(3), np.empty(3), np.empty(3)
-    cross(tau, c, N)
-    length = math.sqrt(dot(tau, tau))
-    NN = dot(N, N)
-    along = dot(t0, tau)
-    k = dot(d0, tau) / (length + along)
-    for i in range(3):
-        d[i] = d0[i] - k * (t0[i] + tau[i] / length)
-    cross(tau, N, m)
-    theta = math.atan2(dot(d, m) / length, dot(d, N))
-    cross(tau, t0, d)
-    spin = 1.0 / (length * (length + along))
-    lean = dot(c, tau) / (length * NN)
-    for i in range(3):
-        g[0, i] = lean * N[i] + spin * d[i]
-        g[1, i] = -length / NN * N[i]
-    return theta
+    edge_slopes(tau, c, t0, g)
+    return edge_rise(tau, c, t0, d0)
 
 
 @njit(**OPTIONS)
 def edge_angle_hessian(tau, c, t0, H):  # type: ignore[no-untyped-def]
     """Second derivatives of theta with respect to (tau, c) into H (2, 2, 3, 3)."""
-    N, hol = np.empty(3), np.empty(3)
-    W = np.empty((3, 3))
+    room = np.empty((5, 3))  # made at once: it costs as much as the arithmetic
+    N, hol, W = room[0], room[1], room[2:5]
     cross(tau, c, N)
     NN = dot(N, N)
     length = math.sqrt(dot(tau, tau))
@@ -134,8 +150,8 @@ def edge_angle_hessian(tau, c, t0, H):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def curvature_hessian(p, r, y, H):  # type: ignore[no-untyped-def]
     """Second derivatives of nu . y with respect to (p, r, y) into H (3, 3, 3, 3), y linear."""
-    N, nu, Py = np.empty(3), np.empty(3), np.empty(3)
-    P, A = np.empty((3, 3)), np.empty((3, 3))
+    room = np.empty((12, 3))
+    N, nu, Py, P, A, half = room[0], room[1], room[2], room[3:6], room[6:9], room[9:12]
     cross(p, r, N)
     size = math.sqrt(dot(N, N))
     for i in range(3):
@@ -150,7 +166,6 @@ def curvature_hessian(p, r, y, H):  # type: ignore[no-untyped-def]
             A[i, j] = -(nu[i] * Py[j] + Py[i] * nu[j] + lift * P[i, j]) / (size * size)
             P[i, j] /= size
     # dN = [p]x dr - [r]x dp; B^T A B with B one of the skew matrices, [v]x^T = -[v]x
-    half = np.empty((3, 3))
     for b in range(2):
         left, sign = (r, -1.0) if b == 0 else (p, 1.0)
         # half = B_b^T A, row by row the transposed of A B_b (A symmetric)

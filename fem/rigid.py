@@ -5,45 +5,51 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.model.constraints import MOTIONS, free_motions, rigid_motions
+from bh.model.constraints import MOTIONS, free_motions, orthonormal, rigid_motions
 from fem.components import Components
 from fem.creases import Connectors
-from fem.shell import ShellElements
+from fem.kernels import Frames
+from fem.shell import ShellElements, edge_tangents, unit
 from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 
 
-def free_rigid_motions(components: Components, elements: ShellElements, x: Array, B: Array) -> Array:
+def free_rigid_motions(components: Components, elements: ShellElements, frames: Frames, x: Array) -> Array:
     """(n, r) orthonormal rates of the unknowns in the rigid motions left free at positions x (all nodes).
 
-    Edges turn such that no curvature arises, with B (t, 6 m, w) the gradients there.
+    Edges turn such that no curvature arises. Where the sheet rotates at the rate w, the conormal at a point of an edge
+    with tangent t rises above the frame that was carried there from the tangent t0 at the rate
+
+        -w . (t0 + t) / (1 + t0 . t),
+
+    which is -w . t less the spin of the frame (`fem.points`). What of it the functions of the edge can take is taken as
+    curvatures are measured, weighted by 1 / |dx/ds| of the flat edge.
 
     Args:
         components: of the step.
         elements: of the sheet.
+        frames: of the step.
         x: (n, 3) positions of all nodes, mm.
-        B: (t, 6 m, w) gradients there.
     """
-    motions = rigid_motions(x) @ free_motions(x, components.constraints)
+    allowed = free_motions(x, components.constraints)
+    motions = rigid_motions(x) @ allowed
     count = motions.shape[1]
     if count == 0:
         return np.zeros((len(components.free), 0))
-    moves = motions.reshape(-1, 3, count)
-    table, width = elements.tables, elements.moves
-    own, turns = table.measures // 3, table.rotations
-    element = moves[elements.mesh.triangles].reshape(-1, width, count)
     whole = np.zeros((len(components.number), count))
-    for column in range(count):
-        whole[: components.first_alpha, column] = components.to_local(moves[..., column]).ravel()
-    for j in range(3):
-        first, column = table.measures + own * j, width + turns * j
-        rows, columns = slice(first, first + turns), slice(column, column + turns)
-        rate = -np.linalg.solve(B[:, rows, columns], B[:, rows, :width] @ element)
-        whole[components.of_element[:, columns]] = elements.loops.sides[:, j, None, None] * rate
-    out: Array = np.linalg.qr(whole[components.free])[0]
-    return out
+    whole[: components.first_alpha] = motions
+    if (components.constraints.frame_of >= 0).any():
+        for column in range(count):
+            local = components.to_local(motions[:, column].reshape(-1, 3))
+            whole[: components.first_alpha, column] = local.ravel()
+    t = unit(edge_tangents(elements.mesh, x))
+    both = frames.t0 + t
+    both /= 1.0 + np.einsum("epc,epc->ep", frames.t0, t)[..., None]
+    turns = -np.einsum("erp,epc->erc", elements.edge_fit, both)
+    whole[components.first_alpha : components.first_beta] = (turns @ allowed[3:]).reshape(-1, count)
+    return orthonormal(whole[components.free])
 
 
 def ground_triangle(components: Components, elements: ShellElements) -> int:

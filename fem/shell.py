@@ -30,6 +30,7 @@ from fem import grain, kernels
 from fem.kernels import Frames, Loops
 from fem.spaces import MOMENTS, STRAINS, Tables, tables
 from meshes.curved import ElementMesh, plane_axes
+from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,7 @@ class ShellElements:
         strain0: (t, 3 m) strains that the metric of the flat sheet would have.
         lengths: (e,) lengths of the (curved) edges, mm.
         areas: (t,) of the flat triangles, mm^2.
+        edge_fit: (e, r, p) rotations of edges whose angles at the points of the edge come nearest to given ones.
     """
 
     mesh: ElementMesh
@@ -54,6 +56,7 @@ class ShellElements:
     strain0: Array
     lengths: Array
     areas: Array
+    edge_fit: Array
 
     @property
     def moves(self) -> int:
@@ -136,13 +139,14 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
     sides = np.where(np.roll(corners, -1, axis=1) < np.roll(corners, -2, axis=1), 1.0, -1.0)
     lengths = np.empty(len(mesh.sheet.topology.edges))
     lengths[edges] = speed @ table.edge_weights
+    rim = table.edge_weights / speed
     inside = table.weights / J if mesh.degree > 1 else np.empty((len(edges), 0))  # linear shapes do not bend
     loops = Loops(
         nodes=mesh.triangles,
         edges=np.ascontiguousarray(edges),
         sides=sides,
         inside=inside,
-        rim=table.edge_weights / speed,
+        rim=rim,
         Q=table.Q,
         factors=np.ascontiguousarray(table.factors),
         slopes=np.ascontiguousarray(table.slopes.transpose(0, 2, 1)),
@@ -160,6 +164,7 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
         np.zeros((len(edges), table.measures)),
         lengths,
         J @ table.weights,
+        _edge_fit(table, rim, edges, sides),
     )
     frames = flat_frames(mesh)
     strain0, _ = elements.measures(mesh.nodes, np.zeros((len(edges), 3, table.rotations)), frames)
@@ -176,6 +181,16 @@ def _stiffness(table: Tables, F: Array, J: Array, sheet: Sheet) -> tuple[Array, 
         )
     metric = np.einsum("tqca,tqcb->tqab", F, F)
     return membrane_stiffness(table, metric, J, sheet), bending_stiffness(table, metric, J, sheet)
+
+
+def _edge_fit(table: Tables, rim: Array, edges: Ints, sides: Array) -> Array:
+    """(e, r, p) see `ShellElements`: least squares with the weights (t, 3, p) with which curvatures are measured."""
+    weights = np.empty((int(edges.max()) + 1, len(table.s)))
+    weights[edges] = np.where(
+        sides[..., None] > 0.0, rim, rim[..., ::-1]
+    )  # from the lower to the higher node
+    weighted = weights[:, None] * table.turn
+    return np.asarray(np.linalg.solve(weighted @ table.turn.T, weighted))
 
 
 def _basis(table: Tables, tensors: Array) -> Array:

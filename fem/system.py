@@ -152,7 +152,7 @@ class ShellSystem:
         """Number of unknowns: there are no multipliers."""
         return self.size
 
-    @property
+    @cached_property
     def rotation(self) -> float:
         """Largest angle that the step imposes on a crease, rad."""
         return self.load_step.rotation
@@ -423,7 +423,7 @@ class ShellSystem:
         return slot[slot >= 0], value[slot >= 0]
 
     def _rigid(self, here: Here) -> Array:
-        return free_rigid_motions(self.components, self.elements, here.x, here.B)
+        return free_rigid_motions(self.components, self.elements, self.frames, here.x)
 
     @cached_property
     def _ground_triangle(self) -> int:
@@ -441,7 +441,7 @@ class ShellSystem:
     def _unbalanced(self, q: Array, lam: float) -> float:
         """Part of the loads that works on free rigid motions."""
         load = self.load.at(lam)[self.components.free]
-        work = self._rigid(self.at(q, lam)).T @ load
+        work = self._rigid(self.at(q, lam)).T @ load if load.any() else load
         return float(np.abs(work).max(initial=0.0)) / max(float(np.abs(load).sum()), 1e-300)
 
     def _check_balance(self) -> None:

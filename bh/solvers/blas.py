@@ -20,9 +20,10 @@ Addresses = NDArray[np.int64]
 
 @cache
 def addresses() -> Addresses:
-    """(4,) addresses of dgemm, dtrsm, dtrsv and dgemv of SciPy's BLAS."""
-    names = ("dgemm", "dtrsm", "dtrsv", "dgemv")
-    return np.array([get_cython_function_address("scipy.linalg.cython_blas", name) for name in names])
+    """(6,) addresses of dgemm, dtrsm, dtrsv, dgemv and dsyrk of SciPy's BLAS, and of its LAPACK's dpotrf."""
+    names = ("dgemm", "dtrsm", "dtrsv", "dgemv", "dsyrk")
+    blas = [get_cython_function_address("scipy.linalg.cython_blas", name) for name in names]
+    return np.array([*blas, get_cython_function_address("scipy.linalg.cython_lapack", "dpotrf")])
 
 
 def _code_of_call(_typing, address, arguments):  # type: ignore[no-untyped-def]
@@ -109,3 +110,31 @@ def subtract_transpose_times(blas, whole, real, m, n, a, lda, x, y):  # type: ig
     whole[8], whole[9], whole[10] = m, n, lda
     w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
     _call(blas[3], (w + 4, w + 32, w + 36, r, a, w + 40, x, w + 20, r + 8, y, w + 20))
+
+
+@njit(inline="always")
+def cholesky(blas, whole, n, a, lda):  # type: ignore[no-untyped-def]
+    """Cholesky's factor in place of the lower triangle of A (n, n) at address a; 0 where A is positive definite."""
+    whole[8], whole[9] = n, lda
+    w = np.int64(whole.ctypes.data)
+    _call(blas[5], (w + 12, w + 32, a, w + 36, w + 56))
+    return whole[14]
+
+
+@njit(inline="always")
+def solve_right_scaled(blas, whole, real, m, n, a, lda, b, ldb):  # type: ignore[no-untyped-def]
+    """B <- B L^-T with L (n, n) the lower triangle at address a, its diagonal included, B (m, n) at address b."""
+    whole[8], whole[9], whole[10], whole[11] = m, n, lda, ldb
+    w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
+    _call(
+        blas[1],
+        (w + 8, w + 12, w + 4, w, w + 32, w + 36, r + 8, a, w + 40, b, w + 44),
+    )
+
+
+@njit(inline="always")
+def subtract_square(blas, whole, real, n, k, a, lda, c, ldc):  # type: ignore[no-untyped-def]
+    """C -= A A^T in the lower triangle of C (n, n), with A (n, k)."""
+    whole[8], whole[9], whole[10], whole[11] = n, k, lda, ldc
+    w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
+    _call(blas[4], (w + 12, w, w + 32, w + 36, r, a, w + 40, r + 8, c, w + 44))

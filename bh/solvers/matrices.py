@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from bh.solvers import envelope
 from bh.solvers.factor import Descent, unpermuted
 from bh.solvers.factor import Factor as Factor
 from bh.solvers.factor import IndefiniteError as IndefiniteError
@@ -30,20 +31,24 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class BandMatrix:
-    """Symmetric band, lower part in LAPACK form `ab` (b + 1, n) Fortran order, rows permuted by `order`."""
+    """Symmetric band, lower part in LAPACK form `ab` (b + 1, n) Fortran order, rows permuted by `order`.
+
+    `reach` (n,) is the last row with an entry in any of the columns up to each; None where only the band is known.
+    """
 
     ab: Array
     order: Ints
+    reach: Ints | None = None
 
     def factorise(self, shift: float = 0.0) -> BandFactor:
         """Cholesky factor of A + shift * diag(|A|); raises `IndefiniteError`."""
-        ab = self.ab.copy(order="F")
-        if shift:
-            ab[0] += shift * np.maximum(np.abs(ab[0]), 1e-3 * np.abs(ab[0]).mean())
-        factor, info = lapack.dpbtrf(ab, lower=1, overwrite_ab=1)
-        if info != 0:
+        n, reach = len(self.order), self.reach
+        if reach is None:
+            reach = np.minimum(np.arange(n) + len(self.ab) - 1, n - 1)
+        factor = envelope.factor_of(self.ab, reach, shift)
+        if factor is None:
             raise IndefiniteError(1)
-        return BandFactor(factor, self.order)
+        return BandFactor(factor, reach, self.order)
 
     def factorise_any(self) -> tuple[Factor, int]:
         """Cholesky or L D L^T factor of A and its number of negative eigenvalues; see `Matrix.factorise_any`."""
@@ -74,17 +79,15 @@ class BandMatrix:
 
 @dataclass(frozen=True)
 class BandFactor(Factor):
-    """Cholesky factor of a band, in LAPACK form."""
+    """Cholesky factor of a band (`bh.solvers.envelope`)."""
 
-    ab: Array
+    L: Array
+    reach: Ints
     order: Ints
 
     def solve(self, b: Array) -> Array:
         """Solution x of A x = b, b (n,) or (n, k)."""
-        x, info = lapack.dpbtrs(self.ab, b[self.order], lower=1)
-        if info != 0:
-            raise ArithmeticError(f"LAPACK dpbtrs refused argument {-info}")
-        return unpermuted(x, self.order)
+        return unpermuted(envelope.solve(self.L, self.reach, b[self.order]), self.order)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -147,12 +150,14 @@ class Storage:
         bandwidth: of the permuted matrix; used if `banded`.
         size: number of values.
         sparse: the pattern of the sparse matrix, None if banded.
+        reach: (n,) of a band, see `BandMatrix`; None if sparse.
     """
 
     order: Ints
     bandwidth: int
     size: int
     sparse: SparsePattern | None
+    reach: Ints | None
 
     @property
     def banded(self) -> bool:
@@ -162,7 +167,8 @@ class Storage:
     def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
         """The matrix of values data (size,), which it keeps without a copy."""
         if self.sparse is None:
-            return BandMatrix(data.reshape((self.bandwidth + 1, len(self.order)), order="F"), self.order)
+            ab = data.reshape((self.bandwidth + 1, len(self.order)), order="F")
+            return BandMatrix(ab, self.order, self.reach)
         return SparseMatrix(data, self.sparse)
 
 

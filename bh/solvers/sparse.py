@@ -23,11 +23,11 @@ Ints = NDArray[np.int64]
 Index = NDArray[np.int32]
 
 
-WIDEST = 180  # half-bandwidth up to which LAPACK's band is faster than a sparse factor (docs/performance.md)
+WIDEST = 180  # half-bandwidth up to which a band is faster than a sparse factor (docs/performance.md)
 
 
 def band_is_cheaper(n: int, bandwidth: int) -> bool:
-    """Choice between LAPACK's band and a sparse factor by measurement, unless the band would not fit into memory.
+    """Choice between a band and a sparse factor by measurement, unless the band would not fit into memory.
 
     Per unknown the band costs 3e-11 (b + 1)^2 s and more for narrow ones, the sparse factor about 1e-6 s on sheets of
     that width, whatever their length; on sheets of 1,000 to 50,000 unknowns the two meet at b = 140 to 220.

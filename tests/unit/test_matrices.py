@@ -142,6 +142,30 @@ def test_reverse_cuthill_mckee() -> None:
     assert np.abs(position[rows] - position[columns]).max() == 1
 
 
+@pytest.mark.parametrize(("n", "width"), [(1, 0), (7, 9), (50, 3), (83, 40)])
+def test_factor_of_a_ragged_band(n: int, width: int) -> None:
+    """Columns that end early, blocks that do not divide n, bands wider than the matrix: as dense, and nothing is read
+    of a column behind its end."""
+    rng = np.random.default_rng(n)
+    reach = np.minimum(np.arange(n) + rng.integers(0, width + 1, n), n - 1)
+    reach = np.maximum.accumulate(reach)
+    i, j = np.indices((n, n))
+    A = np.where((i >= j) & (i <= reach[j]), rng.normal(size=(n, n)), 0.0)
+    A = A + A.T + 4.0 * (width + 2) * np.eye(n)
+    ab = np.zeros((width + 1, n), order="F")
+    for d in range(min(width + 1, n)):
+        ab[d, : n - d] = np.where(np.arange(d, n) <= reach[: n - d], np.diag(A, -d), np.nan)
+    factor = BandMatrix(ab, np.arange(n), reach).factorise()
+    b = rng.normal(size=(n, 3))
+    expected = np.linalg.solve(A, b)
+    assert np.allclose(factor.solve(b), expected, rtol=0.0, atol=1e-13)
+    assert np.allclose(factor.solve(b[:, 1]), expected[:, 1], rtol=0.0, atol=1e-13)
+    A[-1, -1] = -1.0
+    ab[0, -1] = -1.0
+    with pytest.raises(IndefiniteError):
+        BandMatrix(ab, np.arange(n), reach).factorise()
+
+
 # --------------------------------------------------------------------------------------- assembled patterns
 
 

@@ -17,6 +17,7 @@ from bh.model.sheet import Sheet
 from fem import system as system_module
 from fem.assembly import build_pattern
 from fem.kirchhoff_love import LinearShell, Shell
+from fem.rigid import free_rigid_motions
 from fem.shell import carried_frames, flat_frames, shell_elements
 from fem.state import ShellState
 from fem.system import ShellSystem
@@ -218,3 +219,18 @@ def test_both_patterns_hold_the_same_matrix(formulation: str, monkeypatch: pytes
     np.testing.assert_allclose(matrix @ v, expected @ v, atol=1e-9 * np.abs(expected @ v).max())
     flat = other.tangent(other.start(), 0.0, np.zeros_like(now.forces)).matrix
     np.testing.assert_allclose(flat @ flat.factorise().solve(v), v, atol=1e-6)
+
+
+@pytest.mark.parametrize("shell", [Shell, LinearShell])
+def test_rigid_motions_change_no_measure_of_a_bent_sheet(shell: type[Shell]) -> None:
+    """The closed form for the edges' rotations, against the gradients of what elements measure."""
+    system = system_of(Model(SECTOR, MYLAR, formulation=shell.name).fold("crease", by=1.0), shell)
+    q = system.start() + 0.3 * np.random.default_rng(1).normal(size=system.size)
+    here = system.at(q, 0.5)
+    Z = free_rigid_motions(system.components, system.elements, system.frames, here.x)
+    assert np.allclose(Z.T @ Z, np.eye(6), rtol=0.0, atol=1e-14)
+    for motion in Z.T:
+        whole = np.zeros(len(system.components.number))
+        whole[system.components.free] = motion
+        rate = np.einsum("tkj,tj->tk", here.B, system.components.gather(whole))
+        assert np.abs(rate).max() < 1e-13 * np.abs(here.B).max()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -193,7 +194,7 @@ class SupportedSheet:
         """
         return self.barrier is not None and self.barrier.presses(self.near(q, lam))
 
-    @property
+    @cached_property
     def rotation(self) -> float:
         """Largest change of an imposed or rest angle in the step, rad."""
         return self.load_step.rotation

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.model.constraints import UNBALANCED, Constraints, free_motions, rigid_motions
+from bh.model.constraints import UNBALANCED, Constraints, free_motions, orthonormal, rigid_motions
 from bh.model.ramp import Ramp
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -144,9 +144,10 @@ class Displacements:
     def rigid(self, x: Array) -> Array:
         """Orthonormal rigid motions (k, r) that the supports leave free at positions x."""
         motions = rigid_motions(x) @ free_motions(x, self.constraints)
-        for column in range(motions.shape[1]):
-            motions[:, column] = self.to_local(motions[:, column].reshape(-1, 3)).ravel()
-        return np.asarray(np.linalg.qr(motions[self.free])[0])
+        if len(self.turned):
+            for column in range(motions.shape[1]):
+                motions[:, column] = self.to_local(motions[:, column].reshape(-1, 3)).ravel()
+        return orthonormal(motions[self.free])
 
     @cached_property
     def ground_triangle(self) -> int:
@@ -179,6 +180,8 @@ class Displacements:
             x: (nodes, 3) positions, mm.
             force: (nodes, 3) N.
         """
+        if not force.any():
+            return 0.0
         local = self.components(force)
         size = max(float(np.abs(local).sum()), 1e-300)
         return float(np.abs(self.rigid(x).T @ local).max(initial=0.0)) / size

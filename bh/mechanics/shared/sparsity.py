@@ -48,12 +48,16 @@ def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None =
     n = int(sizes.sum())
     order, _ = reverse_cuthill_mckee(high, low, len(used))
     place, first = _places(order, sizes)
-    reach = first[np.maximum(place[high], place[low]) + 1] - first[np.minimum(place[high], place[low])]
-    bandwidth = int(max(reach.max(initial=0), sizes.max(initial=0))) - 1 if n else 0
+    before, behind = np.minimum(place[high], place[low]), np.maximum(place[high], place[low])
+    wide = first[behind + 1] - first[before]
+    bandwidth = int(max(wide.max(initial=0), sizes.max(initial=0))) - 1 if n else 0
     if band_is_cheaper(n, bandwidth):
         starts = np.arange(n, dtype=np.int64) * (bandwidth + 1)
         slots = tuple(_band_slots(group, number, place, first, starts) for group in groups)
-        return Pattern(_unknowns(number, order), bandwidth, (bandwidth + 1) * n, None, slots)
+        last = np.arange(len(order))
+        np.maximum.at(last, before, behind)
+        reach = np.repeat(first[np.maximum.accumulate(last) + 1] - 1, np.diff(first))
+        return Pattern(_unknowns(number, order), bandwidth, (bandwidth + 1) * n, None, reach, slots)
     sparse, tree_order = SparsePattern.dissected(
         high, low, sizes, None if places is None else places[used], lambda order: _unknowns(number, order)
     )
@@ -61,7 +65,7 @@ def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None =
     slots = tuple(
         _sparse_slots(group, number, place, first, sparse.indptr, sparse.indices) for group in groups
     )
-    return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, slots)
+    return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, None, slots)
 
 
 def _unknowns(number: Ints, order: Ints) -> Ints:
