@@ -13,7 +13,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from typing import Any
+
+from bh.runtime.compiling import compilations_heard
 
 MOST = 2  # processes beside the run
 # what a run of the default formulation compiles, in the order in which it is needed; a test holds it to the code.
@@ -55,20 +56,14 @@ def compiled_ahead() -> Iterator[None]:
 
     Where all kernels are in the cache nothing happens.
     """
-    from numba.core import event
-
     helpers: list[subprocess.Popen[bytes]] = []
 
-    class Listener(event.Listener):  # type: ignore[misc]
-        def on_start(self, event: Any) -> None:
-            if not helpers and event.data["dispatcher"].py_func.__module__.startswith("bh.mechanics"):
-                helpers.extend(_begin(place) for place in range(min(MOST, _cores() - 1)))
-
-        def on_end(self, event: Any) -> None:
-            """Nothing to do."""
+    def help_with(module: str) -> None:
+        if not helpers and module.startswith("bh.mechanics"):
+            helpers.extend(_begin(place) for place in range(min(MOST, _cores() - 1)))
 
     try:
-        with event.install_listener("numba:compile", Listener()):
+        with compilations_heard(help_with):
             yield
     finally:
         for helper in helpers:
