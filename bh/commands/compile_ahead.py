@@ -34,6 +34,8 @@ KERNELS = (
     "bh.mechanics.consistent.membrane_kernels:edge_tangent d2 q2 q2 ?2 d3 d1 q1 d3 q1 i2 d1",
     "bh.mechanics.consistent.kernels:bending_tangent d2 q2 q3 d3 q3 q2 q2 q1 d3 d2 q2 q1 d3 i2 d1",
     "bh.mechanics.consistent.kernels:spring_tangent d2 q2 d1 d1 q2 q1 d3 i2 d1",
+    "bh.solvers.envelope:_factorise d2 q1 d1 d2 q1 i1 d1",
+    "bh.solvers.envelope:_solve d2 q1 d2",
     "bh.mechanics.consistent.membrane_kernels:bar_rates d2 d2 q2 d1",
     "bh.mechanics.consistent.kernels:bending_rates d2 d2 d1 q2 q3 d3 d2 q2 d3 d2",
     "bh.mechanics.consistent.kernels:spring_rates d2 d2 d1 q2 d1 d1 d1 q2 d1 d1",

@@ -73,6 +73,7 @@ def kernel(module: str) -> Callable[[float], float]:
     return njit(double)  # type: ignore[no-any-return]
 
 
+@pytest.mark.slow  # compiles everything anew
 def test_the_table_is_what_a_run_compiles(tmp_path: Path) -> None:
     """Of the scene that `bh init` writes, on narrow meshes and on wide ones."""
     done = subprocess.run(
