@@ -8,16 +8,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import KERNEL
 from bh.solvers.matrices import Storage, reverse_cuthill_mckee
 from bh.solvers.sparse import SparsePattern, band_is_cheaper
-from fem.points import OPTIONS
 from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def turn_blocks(K, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
     """Rows and columns of nodes with local axes into those axes; K (t, w, w)."""
     row = np.empty(3)
@@ -43,7 +43,7 @@ def turn_blocks(K, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
                     K[e, j, 3 * i + a] = row[a]
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def scatter(K, sides, slots, data):  # type: ignore[no-untyped-def]
     """Add element matrices (t, w, w) by positions and gamma = +-alpha + beta / 2 to `data`; sides (t, 3 r)."""
     width, turns = K.shape[1], sides.shape[1]
@@ -151,7 +151,7 @@ def _rows(components: Ints, number: Ints, order: Ints) -> Ints:
     return position[np.where(components >= 0, number[components], -1)]
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def _sparse_slots(rows, indptr, indices):  # type: ignore[no-untyped-def]
     """Slots of the lower entries of all elements in compressed columns, by bisection."""
     width = rows.shape[1]

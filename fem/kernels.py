@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import INNER, KERNEL
 from fem.points import (
-    OPTIONS,
     combine,
     cross,
     curvature_hessian,
@@ -60,7 +60,7 @@ class Loops(NamedTuple):
     turn: Array
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _gather(x, nodes, out):  # type: ignore[no-untyped-def]
     """Positions of an element relative to its first node, which keeps rounding off large coordinates."""
     for i in range(len(nodes)):
@@ -68,7 +68,7 @@ def _gather(x, nodes, out):  # type: ignore[no-untyped-def]
             out[i, c] = x[nodes[i], c] - x[nodes[0], c]
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _edge_point(xe, loops, frames, e, j, q, tau, c, t, d):  # type: ignore[no-untyped-def]
     """Tangent, transversal and frame of point q on edge j of element e, as this side of the edge sees them."""
     sign, edge = loops.sides[e, j], loops.edges[e, j]
@@ -80,7 +80,7 @@ def _edge_point(xe, loops, frames, e, j, q, tau, c, t, d):  # type: ignore[no-un
         d[i] = frames.d0[edge, at, i]
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def measures(x, gamma, loops, frames, strain, curvature):  # type: ignore[no-untyped-def]
     """Generalised strains (t, 3 m) and curvatures (t, 3 m) of all elements; see `fem.shell` for the arguments."""
     n, own, turns = loops.nodes.shape[1], loops.factors.shape[2], len(loops.turn)
@@ -123,7 +123,7 @@ def measures(x, gamma, loops, frames, strain, curvature):  # type: ignore[no-unt
                     curvature[e, own * j + k] -= loops.rim[e, j, q] * loops.turn[k, q] * turn
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
     """B (t, 6 m, 3 n + 3 r): derivatives of strains, then curvatures, by positions and side rotations gamma."""
     n, own, turns = loops.nodes.shape[1], loops.factors.shape[2], len(loops.turn)
@@ -188,7 +188,7 @@ def gradients(x, loops, frames, B):  # type: ignore[no-untyped-def]
                         B[e, first + own * j + k, 3 * n + turns * j + m] += part * loops.turn[m, q]
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _add_form(block, D, H, scale, half):  # type: ignore[no-untyped-def]
     """Add scale D^T H D to the lower half of `block` (n, n, 9): the Hessian of a function of m vectors.
 
@@ -213,7 +213,7 @@ def _add_form(block, D, H, scale, half):  # type: ignore[no-untyped-def]
                         block[i, j, k] += weight * half[a, k]
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _add_halves(block, K):  # type: ignore[no-untyped-def]
     """K (w, w) += the symmetric matrix whose lower half are the 3 x 3 blocks of `block` (n, n, 9)."""
     for i in range(len(block)):
@@ -226,7 +226,7 @@ def _add_halves(block, K):  # type: ignore[no-untyped-def]
                 K[3 * i + k, 3 * i + m] += block[i, i, 3 * k + m]
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
     """K += sum over the element forces (t, 6 m) of force times second derivatives of its measure by positions."""
     n, own, turns = loops.nodes.shape[1], loops.factors.shape[2], len(loops.turn)
@@ -276,7 +276,7 @@ def add_geometric(x, forces, loops, frames, K):  # type: ignore[no-untyped-def]
         _add_halves(block, K[e])
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def add_material(B, membrane, bending, K):  # type: ignore[no-untyped-def]
     """K += B^T diag(membrane, bending) B with (t, 3 m, 3 m) stiffness of either kind."""
     count, width = membrane.shape[1], K.shape[1]

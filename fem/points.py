@@ -27,11 +27,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import INNER, KERNEL
+
 Array = NDArray[np.float64]
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def cross(a, b, out):  # type: ignore[no-untyped-def]
     """Write the cross product a x b of two vectors (3,) into `out`."""
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -39,13 +40,13 @@ def cross(a, b, out):  # type: ignore[no-untyped-def]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Scalar product a . b of two vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def combine(weights, x, out):  # type: ignore[no-untyped-def]
     """Write sum_i weights[i] x[i] into `out` (3,); weights (n,), x (n, 3)."""
     for c in range(3):
@@ -55,7 +56,7 @@ def combine(weights, x, out):  # type: ignore[no-untyped-def]
         out[c] = total
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def skew_times(v, A, sign, out):  # type: ignore[no-untyped-def]
     """Write sign A [v]x into `out`, with ([v]x w) = v x w, so that row i of it is sign (row i of A) x v."""
     for i in range(3):
@@ -64,7 +65,7 @@ def skew_times(v, A, sign, out):  # type: ignore[no-untyped-def]
         out[i, 2] = sign * (A[i, 0] * v[1] - A[i, 1] * v[0])
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def edge_rise(tau, c, t0, d0):  # type: ignore[no-untyped-def]
     """Angle theta of one edge point alone; in scalars, since an array that is made here costs more than the angle."""
     N0 = tau[1] * c[2] - tau[2] * c[1]
@@ -79,7 +80,7 @@ def edge_rise(tau, c, t0, d0):  # type: ignore[no-untyped-def]
     return math.atan2((x * m0 + y * m1 + z * m2) / length, x * N0 + y * N1 + z * N2)
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def edge_slopes(tau, c, t0, g):  # type: ignore[no-untyped-def]
     """Write d theta / d tau and d theta / d c of one edge point into the rows of `g` (2, 3)."""
     N0 = tau[1] * c[2] - tau[2] * c[1]
@@ -95,14 +96,14 @@ def edge_slopes(tau, c, t0, g):  # type: ignore[no-untyped-def]
     g[1, 0], g[1, 1], g[1, 2] = fall * N0, fall * N1, fall * N2
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def edge_angle(tau, c, t0, d0, g):  # type: ignore[no-untyped-def]
     """Angle theta of one edge point; writes d theta / d tau and d theta / d c into the rows of `g` (2, 3)."""
     edge_slopes(tau, c, t0, g)
     return edge_rise(tau, c, t0, d0)
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def edge_angle_hessian(tau, c, t0, H):  # type: ignore[no-untyped-def]
     """Second derivatives of theta with respect to (tau, c) into H (2, 2, 3, 3)."""
     room = np.empty((5, 3))  # made at once: it costs as much as the arithmetic
@@ -147,7 +148,7 @@ def edge_angle_hessian(tau, c, t0, H):  # type: ignore[no-untyped-def]
             H[0, 1, j, i] = H[1, 0, i, j]
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def curvature_hessian(p, r, y, H):  # type: ignore[no-untyped-def]
     """Second derivatives of nu . y with respect to (p, r, y) into H (3, 3, 3, 3), y linear."""
     room = np.empty((12, 3))

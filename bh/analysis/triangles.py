@@ -18,12 +18,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import INNER, KERNEL
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _arrange(points, one, two, A, B):  # type: ignore[no-untyped-def]
     """Copy the corners of two triangles to A and B (3, 3), relative to A[0]: shared nodes first, and exactly alike."""
     shared = 0
@@ -51,7 +52,7 @@ def _arrange(points, one, two, A, B):  # type: ignore[no-untyped-def]
             B[i, c] -= origin
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _normal(T, n):  # type: ignore[no-untyped-def]
     """Unit normal of a triangle into n (3,)."""
     a0, a1, a2 = T[1, 0] - T[0, 0], T[1, 1] - T[0, 1], T[1, 2] - T[0, 2]
@@ -62,7 +63,7 @@ def _normal(T, n):  # type: ignore[no-untyped-def]
         n[c] /= size
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _distances(T, base, n, tolerance, d):  # type: ignore[no-untyped-def]
     """Signed distances of T's corners to the plane through `base` into d (3,), small ones as zero.
 
@@ -83,7 +84,7 @@ def _distances(T, base, n, tolerance, d):  # type: ignore[no-untyped-def]
     return -1 if above == 3 or below == 3 else zeros
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _interval(T, d, direction):  # type: ignore[no-untyped-def]
     """Where a triangle meets the other's plane, along `direction`: from and to, mm."""
     low, high = math.inf, -math.inf
@@ -102,7 +103,7 @@ def _interval(T, d, direction):  # type: ignore[no-untyped-def]
     return low, high
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def _overlap_in_plane(A, B, n, tolerance):  # type: ignore[no-untyped-def]
     """Whether two triangles in the plane of normal n overlap by more than the tolerance (separating axis theorem)."""
     axis = np.empty(3)
@@ -122,7 +123,7 @@ def _overlap_in_plane(A, B, n, tolerance):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(**OPTIONS)  # type: ignore[untyped-decorator]
+@njit(**KERNEL)  # type: ignore[untyped-decorator]
 def intersecting(points: Array, triangles: Ints, pairs: Ints, tolerance: float) -> NDArray[np.bool_]:
     """(k,) whether the two triangles of each pair (k, 2) intersect.
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from bh.analysis.contact import Contact, first_contact
 from bh.analysis.yielding import Yielding, yielding
+from bh.commands.compile_ahead import compiled_ahead
 from bh.commands.occupied import FINISHED, UNFINISHED, changed, check_folder
 from bh.commands.result import result
 from bh.errors import InputError, ModelError
@@ -131,18 +132,19 @@ def _solved(
     solved = _solved_meshes(file)
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
         (folder / names[1]).unlink(missing_ok=True)
-    path = trace(
-        scene.model,
-        progress=progress,
-        file=file,
-        resume=resume,
-        accuracy=scene.accuracy,
-        symmetry=scene.symmetry,
-        strategy=strategy or scene.strategy,
-        estimate=estimate and scene.accuracy is None,
-        neighbours=neighbours,
-        warn=False,  # the command says it in a line of its own
-    )
+    with compiled_ahead():
+        path = trace(
+            scene.model,
+            progress=progress,
+            file=file,
+            resume=resume,
+            accuracy=scene.accuracy,
+            symmetry=scene.symmetry,
+            strategy=strategy or scene.strategy,
+            estimate=estimate and scene.accuracy is None,
+            neighbours=neighbours,
+            warn=False,  # the command says it in a line of its own
+        )
     _keep_scene(scene, file)
     clear = not resume or names == UNFINISHED  # what another run has begun beside a finished one stays
     if path.reached:

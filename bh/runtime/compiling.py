@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -34,16 +34,31 @@ def compilation_told(report: ProgressMeter) -> Iterator[None]:
     if _told:
         yield
         return
+
+    def tell(module: str) -> None:
+        global _told
+        if not _told:
+            _told = True
+            words = WORDS.format(_part(module))
+            _log.info(words)
+            note(report, words)
+
+    with compilations_heard(tell):
+        yield
+
+
+@contextmanager
+def compilations_heard(heard: Callable[[str], None]) -> Iterator[None]:
+    """Inside, `heard` is called with the module of each kernel that is compiled, when that begins.
+
+    Args:
+        heard: is called.
+    """
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
-            global _told
-            if not _told:
-                _told = True
-                words = WORDS.format(_part(str(event.data["dispatcher"].py_func.__module__)))
-                _log.info(words)
-                note(report, words)
+            heard(str(event.data["dispatcher"].py_func.__module__))
 
         def on_end(self, event: Any) -> None:
             """Nothing to say."""

@@ -61,7 +61,12 @@ def constants() -> tuple[NDArray[np.int32], NDArray[np.float64]]:
 @njit(inline="always")
 def subtract_product(blas, whole, real, m, n, k, a, lda, b, ldb, c, ldc):  # type: ignore[no-untyped-def]
     """C -= A B^T with A (m, k), B (n, k), C (m, n); a, b, c are the addresses of their first entries."""
-    whole[8], whole[9], whole[10], whole[11], whole[12], whole[13] = m, n, k, lda, ldb, ldc
+    whole[8] = m
+    whole[9] = n
+    whole[10] = k
+    whole[11] = lda
+    whole[12] = ldb
+    whole[13] = ldc
     w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
     _call(
         blas[0],
@@ -72,7 +77,10 @@ def subtract_product(blas, whole, real, m, n, k, a, lda, b, ldb, c, ldc):  # typ
 @njit(inline="always")
 def solve_right(blas, whole, real, m, n, a, lda, b, ldb):  # type: ignore[no-untyped-def]
     """B <- B L^-T with L (n, n) the unit lower triangle at address a, B (m, n) at address b."""
-    whole[8], whole[9], whole[10], whole[11] = m, n, lda, ldb
+    whole[8] = m
+    whole[9] = n
+    whole[10] = lda
+    whole[11] = ldb
     w, r = np.int64(whole.ctypes.data), np.int64(real.ctypes.data)
     _call(
         blas[1],

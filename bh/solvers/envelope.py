@@ -16,12 +16,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import KERNEL
 from bh.solvers.blas import addresses, cholesky, constants, solve_right_scaled, subtract_square
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 BLOCK = 16  # columns eliminated at once; 12 to 32 take the same time within 5 %
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 def factor_of(ab: Array, reach: Ints, shift: float) -> Array | None:
@@ -57,7 +57,7 @@ def solve(L: Array, reach: Ints, b: Array) -> Array:
     return rows[0] if b.ndim == 1 else rows.T
 
 
-@njit(**OPTIONS)
+@njit(**KERNEL)
 def _factorise(columns, reach, added, L, blas, whole, real):  # type: ignore[no-untyped-def]
     """Write the factor into L; whether there is one. Of L only what a column's block reaches is written."""
     n, width = columns.shape
@@ -88,7 +88,7 @@ def _factorise(columns, reach, added, L, blas, whole, real):  # type: ignore[no-
     return True
 
 
-@njit(fastmath={"reassoc", "contract"}, **OPTIONS)
+@njit(fastmath={"reassoc", "contract"}, **KERNEL)
 def _solve(L, reach, rows):  # type: ignore[no-untyped-def]
     """Solve in place for every row of `rows` (k, n)."""
     n = len(L)

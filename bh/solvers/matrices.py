@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from bh.runtime.kernel_options import KERNEL
 from bh.solvers import envelope
 from bh.solvers.factor import Descent, unpermuted
 from bh.solvers.factor import Factor as Factor
@@ -90,7 +91,7 @@ class BandFactor(Factor):
         return unpermuted(envelope.solve(self.L, self.reach, b[self.order]), self.order)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**KERNEL)
 def band_ldl(ab):  # type: ignore[no-untyped-def]
     """L D L^T of a symmetric band in place (unit L below, D in the first row), without pivoting.
 

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import INNER, KERNEL
 from bh.solvers.blas import (
     add_times,
     addresses,
@@ -84,7 +85,12 @@ def fronts(tree: Dissection, indptr: Ints, indices: Ints, first: Ints, lower: tu
     """
     place = np.empty(len(tree.order), dtype=np.int64)
     place[tree.order] = np.arange(len(tree.order))
-    border_start, nodes = _borders(tree.order, place, tree.start, tree.parent, indptr, indices)
+    count = len(tree.parent)
+    border_start = np.zeros(count + 1, dtype=np.int64)
+    unseen, none = np.full(len(place), -1, dtype=np.int64), np.full((2, count), -1, dtype=np.int64)
+    nodes = _borders(
+        tree.order, place, tree.start, tree.parent, indptr, indices, border_start, unseen, none[0], none[1]
+    )
     nodes = nodes[: border_start[-1]]
     sizes = np.diff(first)[nodes]
     bounds = np.concatenate(([0], np.cumsum(sizes)))
@@ -93,22 +99,29 @@ def fronts(tree: Dissection, indptr: Ints, indices: Ints, first: Ints, lower: tu
     start = first[tree.start]
     columns = np.diff(start)
     panel = np.concatenate(([0], np.cumsum(columns * (columns + np.diff(border_start)))))
-    to_parent = _rows_in_parent(start, border_start, border, tree.parent)
+    to_parent = np.zeros(len(border), dtype=np.int32)
+    _rows_in_parent(start, border_start, border, tree.parent, to_parent)
     children = np.bincount(tree.parent[tree.parent >= 0], minlength=len(tree.parent))
     entries = _entry_places(lower[0], lower[1], start, border_start, border, panel)
-    updates, stack = _update_places(np.diff(border_start), tree.parent)
-    return Fronts(start, border_start, border, to_parent, panel, children, entries, updates, int(stack))
+    updates = np.zeros(count, dtype=np.int64)
+    room = _update_places(
+        np.diff(border_start),
+        tree.parent,
+        updates,
+        np.zeros((2, count), dtype=np.int64),
+        np.zeros((2, 2), np.int64),
+    )
+    return Fronts(start, border_start, border, to_parent, panel, children, entries, updates, int(room))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _borders(order, place, start, parent, indptr, indices):  # type: ignore[no-untyped-def]
-    """Places of the nodes in the border of every front: neighbours and children's borders that come later."""
-    count = len(parent)
-    bounds = np.zeros(count + 1, dtype=np.int64)
-    found = np.empty(max(16 * len(order), 16), dtype=np.int64)
-    seen = np.full(len(order), -1, dtype=np.int64)
-    head, following = np.full(count, -1, dtype=np.int64), np.full(count, -1, dtype=np.int64)
-    for k in range(count):
+@njit(**KERNEL)
+def _borders(order, place, start, parent, indptr, indices, bounds, seen, head, following):  # type: ignore[no-untyped-def]
+    """Places of the nodes in the border of every front: neighbours and children's borders that come later.
+
+    Writes their `bounds` (f + 1,), which are zero on entry; `seen` (v,), `head` and `following` (f,) are -1.
+    """
+    found = np.empty(16 * len(order) + 16, dtype=np.int64)
+    for k in range(len(parent)):
         at = begin = bounds[k]
         end = start[k + 1]
         room = len(order) - end
@@ -139,10 +152,10 @@ def _borders(order, place, start, parent, indptr, indices):  # type: ignore[no-u
         if parent[k] >= 0:
             following[k] = head[parent[k]]
             head[parent[k]] = k
-    return bounds, found
+    return found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**INNER)
 def _sort(values, begin, end):  # type: ignore[no-untyped-def]
     """Sort values[begin:end], whole numbers, in place (Shell 1959); numba's own sort takes long to compile."""
     gap = 1
@@ -158,9 +171,8 @@ def _sort(values, begin, end):  # type: ignore[no-untyped-def]
         gap //= 3
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _rows_in_parent(start, border_start, border, parent):  # type: ignore[no-untyped-def]
-    rows = np.zeros(len(border), dtype=np.int32)
+@njit(**KERNEL)
+def _rows_in_parent(start, border_start, border, parent, rows):  # type: ignore[no-untyped-def]
     for k in range(len(parent)):
         up = parent[k]
         if up < 0:
@@ -174,10 +186,9 @@ def _rows_in_parent(start, border_start, border, parent):  # type: ignore[no-unt
                 while border[at] != border[e]:
                     at += 1
                 rows[e] = own_end - start[up] + at - border_start[up]
-    return rows
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**KERNEL)
 def _entry_places(indptr, indices, start, border_start, border, panel):  # type: ignore[no-untyped-def]
     places = np.empty(len(indices), dtype=np.int64)
     for k in range(len(start) - 1):
@@ -197,34 +208,36 @@ def _entry_places(indptr, indices, start, border_start, border, panel):  # type:
     return places
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _update_places(borders, parent):  # type: ignore[no-untyped-def]
-    """Where the update of every front is kept, and how much room all of them need.
+@njit(**KERNEL)
+def _update_places(borders, parent, places, room, sizes):  # type: ignore[no-untyped-def]
+    """Write to `places` (f,) where the update of every front is kept; returns how much room all of them need.
 
-    Fronts at even and at odd depth have a stack each, one growing up and one growing down: a front is made on one while
-    its children are taken off the other, so that nothing needs to be moved.
+    `room` (2, f) and `sizes` (2, 2), zero on entry, hold what is needed on the way. Fronts at even and at odd depth
+    have a stack each, one growing up and one growing down: a front is made on one while its children are taken off the
+    other, so that nothing needs to be moved.
     """
     count = len(borders)
-    odd = np.zeros(count, dtype=np.bool_)
+    odd, freed = room[0], room[1]  # at odd depth; what the children of a front take
+    used, most = sizes[0], sizes[1]
     for k in range(count - 1, -1, -1):
-        odd[k] = parent[k] >= 0 and not odd[parent[k]]
-    places, used, most = np.zeros(count, dtype=np.int64), np.zeros(2, np.int64), np.zeros(2, np.int64)
-    freed = np.zeros(count, dtype=np.int64)  # what the children of a front take
+        if parent[k] >= 0:
+            odd[k] = 1 - odd[parent[k]]
     for k in range(count):
-        own, mine = borders[k] * borders[k], int(odd[k])
+        own, mine = borders[k] * borders[k], odd[k]
         places[k] = used[mine]
         used[mine] += own
-        most[mine] = max(most[mine], used[mine])
+        if used[mine] > most[mine]:
+            most[mine] = used[mine]
         used[1 - mine] -= freed[k]
         if parent[k] >= 0:
             freed[parent[k]] += own
     for k in range(count):
-        if odd[k]:
+        if odd[k] == 1:
             places[k] += most[0]
-    return places, most[0] + most[1]
+    return most[0] + most[1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**INNER)
 def _eliminate_block(L, at, rows, size):  # type: ignore[no-untyped-def]
     """L D L^T in place of the (size, size) block at `at`; the number of negative pivots, -1 if one is zero."""
     negative = 0
@@ -245,7 +258,7 @@ def _eliminate_block(L, at, rows, size):  # type: ignore[no-untyped-def]
     return negative
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**INNER)
 def _eliminate(L, at, rows, columns, U, u_at, W, blas, whole, real):  # type: ignore[no-untyped-def]
     """Eliminate the columns of one front; U has its border's update at `u_at`. Negative pivots, -1 if one is zero."""
     negative = 0
@@ -286,7 +299,7 @@ def _eliminate(L, at, rows, columns, U, u_at, W, blas, whole, real):  # type: ig
     return negative
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**INNER)
 def _add_child(child, to_parent, runs, L, at, rows, columns, U, u_at):  # type: ignore[no-untyped-def]
     """Add a child's update, at `child` of U, to its parent's front, by runs of rows that stay neighbours there."""
     size, border, count = len(to_parent), rows - columns, 0
@@ -310,7 +323,7 @@ def _add_child(child, to_parent, runs, L, at, rows, columns, U, u_at):  # type: 
                     V[shift + i] += U[source + i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**KERNEL)
 def _factorise(  # type: ignore[no-untyped-def]
     data,
     start,
@@ -358,7 +371,7 @@ def _factorise(  # type: ignore[no-untyped-def]
     return negative
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**KERNEL)
 def _solve(L, start, border_start, border, panel, x, y, blas, whole, real):  # type: ignore[no-untyped-def]
     """Solve in place, x <- (L D L^T)^-1 x, in the order; y is room for the tallest border."""
     base, at_x, at_y = np.int64(L.ctypes.data), np.int64(x.ctypes.data), np.int64(y.ctypes.data)

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import KERNEL
 from bh.solvers.factor import Descent, Factor, IndefiniteError
 from bh.solvers.matrices import BandMatrix, FreeBodyMatrix, SparseMatrix
 
@@ -22,7 +23,7 @@ MOST_BRISK = (
 MOST_DENSE = 1500  # constraints whose Schur complement is still formed as a dense matrix
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**KERNEL)
 def _times(values, columns, x, out):  # type: ignore[no-untyped-def]
     for i in range(len(values)):
         total = 0.0
@@ -32,7 +33,7 @@ def _times(values, columns, x, out):  # type: ignore[no-untyped-def]
         out[i] = total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**KERNEL)
 def _transpose_times(values, columns, y, out):  # type: ignore[no-untyped-def]
     for i in range(len(values)):
         for j in range(values.shape[1]):

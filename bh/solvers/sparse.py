@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import KERNEL
 from bh.solvers import multifrontal, pardiso
 from bh.solvers.dissection import Dissection, dissect
 from bh.solvers.factor import Factor, IndefiniteError, SignedFactor, unpermuted
@@ -189,7 +190,7 @@ class MultifrontalFactor(SignedFactor):
         return unpermuted(multifrontal.solve(self.L, self.pattern.fronts, b[order]), order)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**KERNEL)
 def _multiply(indptr, indices, data, x, out):  # type: ignore[no-untyped-def]
     for j in range(len(x)):
         at = indptr[j]
@@ -201,7 +202,7 @@ def _multiply(indptr, indices, data, x, out):  # type: ignore[no-untyped-def]
         out[j] += total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**KERNEL)
 def _lower(indptr, indices, first):  # type: ignore[no-untyped-def]
     """Compressed columns of the lower triangle, unknown by unknown, of a graph of places with ascending neighbours."""
     count = len(first) - 1

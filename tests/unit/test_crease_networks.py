@@ -11,7 +11,7 @@ import pytest
 import bh
 import meshes
 from bh.analysis.contact import first_contact
-from bh.mechanics.shared.kinematics import hinge_geometry
+from bh.mechanics.shared import kinematics
 from meshes import structured, unstructured
 from meshes.io import read_drawn, read_fold, read_pattern
 from meshes.topology import dihedral_angles
@@ -108,10 +108,8 @@ def test_springs_of_a_folded_sheet_begin_at_its_angles() -> None:
     mesh = meshes.SheetMesh(
         points, triangles, {"crease:ridge": np.array([(2, 3)])}, folds={"ridge": "mountain"}
     )
-    angles = [
-        hinge_geometry(np.array(mesh.points), *hinge, np.empty(12))[0] for hinge in mesh.topology.hinges
-    ]
-    assert dihedral_angles(mesh.points, mesh.topology.hinges) == pytest.approx(np.array(angles), abs=1e-14)
+    angles = kinematics.dihedral_angles(mesh.points, mesh.topology.hinges)
+    assert dihedral_angles(mesh.points, mesh.topology.hinges) == pytest.approx(angles, abs=1e-14)
     path = bh.trace(bh.Model(mesh, SHEET).fold("ridge", by=0.8, Lstar=10.0))
     assert path.outcome == "reached"
     assert path[-1].energy.total < 1e-20

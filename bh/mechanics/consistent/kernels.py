@@ -25,7 +25,7 @@ from numba import njit
 
 from bh.mechanics.shared.assembly import add_lower, rotate
 from bh.mechanics.shared.hinge_lock import in_zone
-from bh.mechanics.shared.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
+from bh.mechanics.shared.kinematics import INNER_OPTIONS, OPTIONS, add_hinge_hessian, hinge_geometry
 
 NONE, OWN, TURN = 0, 1, 2
 
@@ -33,7 +33,7 @@ NONE, OWN, TURN = 0, 1, 2
 # ------------------------------------------------------------------------------------------- bending
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def _clear(matrix):  # type: ignore[no-untyped-def]
     """Set all entries to zero; an assignment to a slice takes longer to compile."""
     for i in range(matrix.shape[0]):
@@ -41,7 +41,7 @@ def _clear(matrix):  # type: ignore[no-untyped-def]
             matrix[i, j] = 0.0
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def _turn_geometry(x, quad, ghost, xl, g):  # type: ignore[no-untyped-def]
     """`hinge_geometry` of a TURN edge; writes its gradient (12,), the ghost of a clamp moving with its edge."""
     for p in range(4):
@@ -122,7 +122,7 @@ def bending_gradient(x, kind, quad, ghost, rotation, M, f, r):  # type: ignore[n
     return size
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def _add_placed(H, small, place):  # type: ignore[no-untyped-def]
     """Add the lower triangle of `small` (12, 12) to that of H; `place` may name a row twice (a clamp's ghost)."""
     for p in range(12):
@@ -147,8 +147,8 @@ def bending_tangent(  # type: ignore[no-untyped-def]
     """
     closing = False
     angles, most = kind.shape[1], 3 * nodes.shape[1]
-    H, small = np.empty((most, most)), np.zeros((12, 12))
-    G, W = np.zeros((angles, most)), np.empty((angles, most))
+    H, small = np.empty((most, most)), np.empty((12, 12))
+    G, W = np.empty((angles, most)), np.empty((angles, most))
     xl, g = np.empty((4, 3)), np.empty(12)
     for c in range(len(kind)):
         n = width[c]
@@ -234,7 +234,7 @@ def spring_forces(x, alpha, hinges, stiffness, rest, couple, rotation, f, r, S, 
     return energy, size, closing
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def _spring_matrix(x, hinge, stiffness, s, H, small, g):  # type: ignore[no-untyped-def]
     """Tangent of a spring crease for its four nodes and two rotations into the lower triangle of H (14, 14).
 
@@ -255,7 +255,7 @@ def _spring_matrix(x, hinge, stiffness, s, H, small, g):  # type: ignore[no-unty
 @njit(**OPTIONS)
 def spring_tangent(x, hinges, stiffness, S, nodes, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]
     """Add the tangent of spring creases with moments S to `data`; `nodes` (h, 5) are their nodes, then -1."""
-    H, small, g = np.empty((15, 15)), np.zeros((12, 12)), np.empty(12)
+    H, small, g = np.empty((15, 15)), np.empty((12, 12)), np.empty(12)
     closing = False
     for h in range(len(hinges)):
         closing = _spring_matrix(x, hinges[h], stiffness[h], S[h], H, small, g) or closing
@@ -287,7 +287,7 @@ def bending_force_rates(x, v, kind, quad, ghost, rotation, M, dM, f, r):  # type
 
     Rates dM at these positions, M where they move by v.
     """
-    xl, g, small = np.empty((4, 3)), np.empty(12), np.zeros((12, 12))
+    xl, g, small = np.empty((4, 3)), np.empty(12), np.empty((12, 12))
     for c in range(len(kind)):
         for a in range(kind.shape[1]):
             if rotation[c, a] >= 0:
@@ -302,7 +302,7 @@ def bending_force_rates(x, v, kind, quad, ghost, rotation, M, dM, f, r):  # type
 @njit(**OPTIONS)
 def spring_force_rates(x, v, hinges, rotation, S, dS, f, r):  # type: ignore[no-untyped-def]
     """The same for spring creases."""
-    g, small = np.empty(12), np.zeros((12, 12))
+    g, small = np.empty(12), np.empty((12, 12))
     for h in range(len(hinges)):
         r[rotation[h, 0]] -= dS[h]
         r[rotation[h, 1]] -= dS[h]
@@ -313,7 +313,7 @@ def spring_force_rates(x, v, hinges, rotation, S, dS, f, r):  # type: ignore[no-
         _add_hinge_rate(small, g, dS[h], hinges[h], v, f)
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def _add_hinge_rate(small, g, rate, nodes, v, f):  # type: ignore[no-untyped-def]
     for p in range(12):
         value = rate * g[p]

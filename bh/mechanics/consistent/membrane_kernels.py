@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from bh.mechanics.shared.assembly import add_lower, rotate
-from bh.mechanics.shared.kinematics import OPTIONS
+from bh.mechanics.shared.kinematics import INNER_OPTIONS, OPTIONS
+from meshes.topology import Ints
+
+Array = NDArray[np.float64]
 
 # ------------------------------------------------------------------------------------------- once a step
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def _add_strain_map(d, part, second, out):  # type: ignore[no-untyped-def]
     """Add to out (3, k) a part of the strain (xx, yy, 2 xy) that bars 0, 1, 2 with plane vectors d (k, 2) measure.
 
@@ -32,7 +36,7 @@ def _add_strain_map(d, part, second, out):  # type: ignore[no-untyped-def]
         out[2, K] -= scale * (d[i, 0] * d[j, 1] + d[i, 1] * d[j, 0])
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def _beside(x, tail, head, wing, out):  # type: ignore[no-untyped-def]
     """Writes the place (2,) of a wing from the tail, along the edge and off it; returns the edge's length."""
     edge2 = arm2 = along = 0.0
@@ -52,10 +56,20 @@ def _beside(x, tail, head, wing, out):  # type: ignore[no-untyped-def]
     return length
 
 
-@njit(**OPTIONS)
-def triangle_strains(x, triangles):  # type: ignore[no-untyped-def]
-    """(c, 3, 3) maps from gamma of the bars opposite the corners to the strain, x along bar 0; areas (c,), mm^2."""
+def triangle_strains(x: Array, triangles: Ints) -> tuple[Array, Array]:
+    """(c, 3, 3) maps from gamma of the bars opposite the corners to the strain, x along bar 0; areas (c,), mm^2.
+
+    Args:
+        x: (n, 3) stress-free positions, mm.
+        triangles: (c, 3) corners.
+    """
     strain, areas = np.zeros((len(triangles), 3, 3)), np.empty(len(triangles))
+    _triangle_strains(x, triangles, strain, areas)
+    return strain, areas
+
+
+@njit(**OPTIONS)
+def _triangle_strains(x, triangles, strain, areas):  # type: ignore[no-untyped-def]
     d, wing = np.empty((3, 2)), np.empty(2)
     for c in range(len(triangles)):
         length = _beside(x, triangles[c, 1], triangles[c, 2], triangles[c, 0], wing)
@@ -64,16 +78,24 @@ def triangle_strains(x, triangles):  # type: ignore[no-untyped-def]
         d[1, 0], d[1, 1] = wing[0] - length, wing[1]
         d[2, 0], d[2, 1] = wing[0], wing[1]
         _add_strain_map(d, 1.0, np.int64(0), strain[c])
+
+
+def edge_strains(x: Array, hinges: Ints) -> tuple[Array, Array]:
+    """(c, 3, 5) maps from gamma of five bars to the mean strain, x along the edge; areas (c, 2) of the triangles, mm^2.
+
+    Both triangles lie in one plane, unfolded about the edge: the first wing above it, the other one below.
+
+    Args:
+        x: (n, 3) stress-free positions, mm.
+        hinges: (c, 4) wing, edge, edge, wing.
+    """
+    strain, areas = np.zeros((len(hinges), 3, 5)), np.empty((len(hinges), 2))
+    _edge_strains(x, hinges, strain, areas)
     return strain, areas
 
 
 @njit(**OPTIONS)
-def edge_strains(x, hinges):  # type: ignore[no-untyped-def]
-    """(c, 3, 5) maps from gamma of five bars to the mean strain, x along the edge; areas (c, 2) of the triangles, mm^2.
-
-    Both triangles lie in one plane, unfolded about the edge: the first wing above it, the other one below.
-    """
-    strain, areas = np.zeros((len(hinges), 3, 5)), np.empty((len(hinges), 2))
+def _edge_strains(x, hinges, strain, areas):  # type: ignore[no-untyped-def]
     d, one, two = np.empty((5, 2)), np.empty(2), np.empty(2)
     for c in range(len(hinges)):
         length = _beside(x, hinges[c, 1], hinges[c, 2], hinges[c, 0], one)
@@ -87,7 +109,6 @@ def edge_strains(x, hinges):  # type: ignore[no-untyped-def]
         part = one[1] / (one[1] + two[1])
         _add_strain_map(d, part, np.int64(0), strain[c])
         _add_strain_map(d, 1.0 - part, np.int64(1), strain[c])
-    return strain, areas
 
 
 # ------------------------------------------------------------------------------------------- every iteration
@@ -187,39 +208,49 @@ def edge_tangent(x, nodes, bars, owned, K, N, frame_of, frames, source, slots, d
     H, d, own = np.empty((12, 12)), np.empty((5, 3)), np.empty(5)
     W = np.empty((5, 12))  # K G
     for c in range(len(nodes)):
-        a, j, k, b = nodes[c, 0], nodes[c, 1], nodes[c, 2], nodes[c, 3]
+        a, j = nodes[c, 0], nodes[c, 1]
+        k, b = nodes[c, 2], nodes[c, 3]
         for i in range(3):
-            d[0, i] = x[k, i] - x[j, i]
-            d[1, i] = x[a, i] - x[j, i]
-            d[2, i] = x[a, i] - x[k, i]
-            d[3, i] = x[b, i] - x[j, i]
-            d[4, i] = x[b, i] - x[k, i]
+            xa, xj, xk = x[a, i], x[j, i], x[k, i]
+            xb = x[b, i]
+            d[0, i] = xk - xj
+            d[1, i] = xa - xj
+            d[2, i] = xa - xk
+            d[3, i] = xb - xj
+            d[4, i] = xb - xk
         for m in range(5):
             own[m] = N[bars[c, m]] if owned[c, m] else 0.0
-            k0, k1, k2, k3, k4 = K[c, m, 0], K[c, m, 1], K[c, m, 2], K[c, m, 3], K[c, m, 4]
+            k0, k1, k2 = K[c, m, 0], K[c, m, 1], K[c, m, 2]
+            k3, k4 = K[c, m, 3], K[c, m, 4]
             for i in range(3):
-                W[m, i] = k1 * d[1, i] + k2 * d[2, i]
-                W[m, 3 + i] = -k0 * d[0, i] - k1 * d[1, i] - k3 * d[3, i]
-                W[m, 6 + i] = k0 * d[0, i] - k2 * d[2, i] - k4 * d[4, i]
-                W[m, 9 + i] = k3 * d[3, i] + k4 * d[4, i]
+                kd0, kd1, kd2 = k0 * d[0, i], k1 * d[1, i], k2 * d[2, i]
+                kd3, kd4 = k3 * d[3, i], k4 * d[4, i]
+                W[m, i] = kd1 + kd2
+                W[m, 3 + i] = -kd0 - kd1 - kd3
+                W[m, 6 + i] = kd0 - kd2 - kd4
+                W[m, 9 + i] = kd3 + kd4
+        own0, own1, own2 = own[0], own[1], own[2]
+        own3, own4 = own[3], own[4]
         for i in range(3):
+            d0, d1, d2 = d[0, i], d[1, i], d[2, i]
+            d3, d4 = d[3, i], d[4, i]
             for q in range(i + 1):
-                H[i, q] = d[1, i] * W[1, q] + d[2, i] * W[2, q]
+                H[i, q] = d1 * W[1, q] + d2 * W[2, q]
             for q in range(4 + i):
-                H[3 + i, q] = -d[0, i] * W[0, q] - d[1, i] * W[1, q] - d[3, i] * W[3, q]
+                H[3 + i, q] = -d0 * W[0, q] - d1 * W[1, q] - d3 * W[3, q]
             for q in range(7 + i):
-                H[6 + i, q] = d[0, i] * W[0, q] - d[2, i] * W[2, q] - d[4, i] * W[4, q]
+                H[6 + i, q] = d0 * W[0, q] - d2 * W[2, q] - d4 * W[4, q]
             for q in range(10 + i):
-                H[9 + i, q] = d[3, i] * W[3, q] + d[4, i] * W[4, q]
-            H[i, i] += own[1] + own[2]
-            H[3 + i, 3 + i] += own[0] + own[1] + own[3]
-            H[6 + i, 6 + i] += own[0] + own[2] + own[4]
-            H[9 + i, 9 + i] += own[3] + own[4]
-            H[3 + i, i] -= own[1]
-            H[6 + i, i] -= own[2]
-            H[6 + i, 3 + i] -= own[0]
-            H[9 + i, 3 + i] -= own[3]
-            H[9 + i, 6 + i] -= own[4]
+                H[9 + i, q] = d3 * W[3, q] + d4 * W[4, q]
+            H[i, i] += own1 + own2
+            H[3 + i, 3 + i] += own0 + own1 + own3
+            H[6 + i, 6 + i] += own0 + own2 + own4
+            H[9 + i, 9 + i] += own3 + own4
+            H[3 + i, i] -= own1
+            H[6 + i, i] -= own2
+            H[6 + i, 3 + i] -= own0
+            H[9 + i, 3 + i] -= own3
+            H[9 + i, 6 + i] -= own4
         if len(frames) > 0:
             rotate(H, nodes[c], frame_of, frames)
         add_lower(H, np.int64(12), slots[source[c]], data)

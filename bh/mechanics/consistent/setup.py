@@ -6,31 +6,43 @@ import numpy as np
 from numba import njit
 
 from bh.mechanics.shared.kinematics import OPTIONS
+from meshes.topology import Ints
+
+
+def join_pairs(sides: Ints, order: Ints, patch_of: Ints, patches: int) -> tuple[Ints, int]:
+    """Join patches by twos across hinges.
+
+    Args:
+        sides: (m, 2) triangles of the hinges.
+        order: (k,) hinges that are tried, in this order.
+        patch_of: (t,) patches of the triangles.
+        patches: number of patches.
+
+    Returns:
+        the new patch of every triangle, and the number of patches.
+    """
+    partner, new = np.full((2, patches), -1, dtype=np.int64)
+    out = np.empty_like(patch_of)
+    return out, int(_join(sides, order, patch_of, partner, new, out))
 
 
 @njit(**OPTIONS)
-def join_pairs(sides, order, patch_of, patches):  # type: ignore[no-untyped-def]
-    """Join patches by twos across hinges, tried in the given order; returns the new patch of every triangle.
-
-    `sides` (m, 2) are the triangles of the hinges, `patch_of` (t,) their patches.
-    """
-    partner = np.full(patches, -1, dtype=np.int64)
-    for h in order:
+def _join(sides, order, patch_of, partner, new, out):  # type: ignore[no-untyped-def]
+    for i in range(len(order)):
+        h = order[i]
         one, two = patch_of[sides[h, 0]], patch_of[sides[h, 1]]
         if one != two and partner[one] < 0 and partner[two] < 0:
             partner[one], partner[two] = two, one
-    new = np.full(patches, -1, dtype=np.int64)
     count = 0
-    for patch in range(patches):
+    for patch in range(len(partner)):
         if new[patch] < 0:
             new[patch] = count
             if partner[patch] >= 0:
                 new[partner[patch]] = count
             count += 1
-    out = np.empty_like(patch_of)
     for t in range(len(patch_of)):
         out[t] = new[patch_of[t]]
-    return out, count
+    return count
 
 
 @njit(**OPTIONS)

@@ -10,7 +10,7 @@ from numba import njit
 from bh.mechanics.consistent.elements import ConsistentElements
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import OPTIONS
-from bh.mechanics.shared.sparsity import Pattern, build_pattern
+from bh.mechanics.shared.sparsity import Pattern, Slots, build_pattern
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -76,15 +76,19 @@ def rotation_pattern(
     return replace(pattern, slots=slots)
 
 
-@njit(**OPTIONS)
-def _some_rows(slots, rows, width):  # type: ignore[no-untyped-def]
+def _some_rows(slots: Slots, rows: Ints, width: Ints) -> Slots:
     """Slots of the lower entries of every element between `width` (e,) rising rows (e, w) of its matrix alone."""
     most = rows.shape[1]
     out = np.full((len(rows), most * (most + 1) // 2), -1, dtype=slots.dtype)
+    _pick(slots, rows, width, out)
+    return out
+
+
+@njit(**OPTIONS)
+def _pick(slots, rows, width, out):  # type: ignore[no-untyped-def]
     for e in range(len(rows)):
         at = 0
         for i in range(width[e]):
             for j in range(i + 1):
                 out[e, at] = slots[e, rows[e, i] * (rows[e, i] + 1) // 2 + rows[e, j]]
                 at += 1
-    return out

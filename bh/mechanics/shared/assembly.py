@@ -9,14 +9,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from bh.mechanics.shared.hinge_lock import in_zone, lock
-from bh.mechanics.shared.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
+from bh.mechanics.shared.kinematics import INNER_OPTIONS, OPTIONS, add_hinge_hessian, hinge_geometry
 from bh.mechanics.shared.sparsity import Pattern as Pattern
 from bh.mechanics.shared.sparsity import build_pattern as build_pattern
 
 Array = NDArray[np.float64]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always", **INNER_OPTIONS)
 def elongation(length, rest_length, green):  # type: ignore[no-untyped-def]
     """Elongation l - L (Eq. 3.1), or with Green's strain (l^2 - L^2) / (2 L); both in mm, alike to first order."""
     if green:
@@ -73,7 +73,7 @@ def nodal_forces(  # type: ignore[no-untyped-def]
     return energy, math.sqrt(size / max(count, 1))
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def rotate(H, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
     """Turn the rows and columns of nodes with local axes; H (3 p, 3 p) with its lower triangle filled."""
     n = 3 * len(nodes)
@@ -90,23 +90,22 @@ def rotate(H, nodes, frame_of, frames):  # type: ignore[no-untyped-def]
         frame = frame_of[nodes[p]]
         if frame < 0:
             continue
-        for j in range(n):
-            for i in range(3):
-                row[i] = 0.0
-                for c in range(3):
-                    row[i] += frames[frame, i, c] * H[3 * p + c, j]
-            for i in range(3):
-                H[3 * p + i, j] = row[i]
-        for j in range(n):
-            for i in range(3):
-                row[i] = 0.0
-                for c in range(3):
-                    row[i] += frames[frame, i, c] * H[j, 3 * p + c]
-            for i in range(3):
-                H[j, 3 * p + i] = row[i]
+        for of_columns in range(2):  # rows, then columns
+            for j in range(n):
+                for i in range(3):
+                    value = 0.0
+                    for c in range(3):
+                        k = 3 * p + c
+                        value += frames[frame, i, c] * (H[j, k] if of_columns else H[k, j])
+                    row[i] = value
+                for i in range(3):
+                    if of_columns:
+                        H[j, 3 * p + i] = row[i]
+                    else:
+                        H[3 * p + i, j] = row[i]
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def add_lower(H, n, slots, data):  # type: ignore[no-untyped-def]
     """Add the lower triangle of an element matrix H (n, n) to the values `data`; see `Pattern.slots`."""
     at = 0
@@ -120,7 +119,7 @@ def add_lower(H, n, slots, data):  # type: ignore[no-untyped-def]
             at += 1
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def _bar_matrix(x, a, b, rest_length, k, s, green, H):  # type: ignore[no-untyped-def]
     """Write k g g^T + s Hessian of one bar into the lower half of H (6, 6); returns the gradient g of its elongation.
 
@@ -169,8 +168,7 @@ def tangent_values(  # type: ignore[no-untyped-def]
 
     Writes the gradients of all measures, and the stiffness of every hinge with that of its lock to `k_tangent`.
     """
-    H = np.zeros((12, 12))
-    B = np.zeros((6, 6))
+    H, B = np.empty((12, 12)), np.empty((6, 6))  # of which the lower triangles are used
     turned = len(frames) > 0
     for i in range(len(bars)):
         d = _bar_matrix(x, bars[i, 0], bars[i, 1], rest_length[i], k_bar[i], s_bar[i], green, B)
@@ -197,8 +195,7 @@ def tangent_values(  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge, k_lock, s_hinge, out):  # type: ignore[no-untyped-def]
     """Add tangent times v (n, 3) to out (n, 3), all in global axes and with no support left out."""
-    H = np.zeros((12, 12))
-    B = np.zeros((6, 6))
+    H, B = np.empty((12, 12)), np.empty((6, 6))  # of which the lower triangles are used
     g = np.empty(12)
     for i in range(len(bars)):
         _bar_matrix(x, bars[i, 0], bars[i, 1], rest_length[i], k_bar[i], s_bar[i], green, B)
@@ -215,7 +212,7 @@ def tangent_times(x, v, bars, rest_length, k_bar, green, s_bar, hinges, k_hinge,
         add_product(H, hinges[i], v, out)
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def add_product(H, nodes, v, out):  # type: ignore[no-untyped-def]
     """Add a symmetric element matrix, whose lower triangle is in H, times v (n, 3) to out (n, 3)."""
     n = 3 * len(nodes)

@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.mechanics.shared.kinematics import OPTIONS, compiled
+from bh.mechanics.shared.kinematics import INNER_OPTIONS, compiled
 
 Array = NDArray[np.float64]
 ZONE = math.radians(2.0)  # rad next to 0 and 2 pi
@@ -38,13 +38,13 @@ def until_closed(phi: Array) -> Array:
     return np.minimum(phi, 2.0 * math.pi - phi)
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always", **INNER_OPTIONS)
 def in_zone(phi):  # type: ignore[no-untyped-def]
     """True for a dihedral angle (rad) that is so near to 0 or 2 pi that the lock acts."""
     return phi < ZONE or phi > _OPEN
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def lock(phi, k):  # type: ignore[no-untyped-def]
     """Energy (N mm), its derivative (N mm) and second derivative (N mm / rad) at an angle in the zone (`in_zone`)."""
     left = phi if phi < math.pi else 2.0 * math.pi - phi
@@ -67,9 +67,10 @@ def lock_terms(phi: Array, k: Array) -> Array:
         phi: (h,) dihedral angles, rad.
         k: (h,) stiffness of the locks, N mm / rad.
     """
-    out = np.zeros((len(phi), 3))
+    out = np.empty((len(phi), 3))
     for i in range(len(phi)):
+        energy = moment = stiffness = 0.0
         if in_zone(phi[i]):
             energy, moment, stiffness = lock(phi[i], k[i])
-            out[i, 0], out[i, 1], out[i, 2] = energy, moment, stiffness
+        out[i, 0], out[i, 1], out[i, 2] = energy, moment, stiffness
     return out

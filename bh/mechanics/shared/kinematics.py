@@ -35,8 +35,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import INNER, KERNEL
+
 Array = NDArray[np.float64]
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
+FAST = {"contract", "nsz", "arcp"}
+OPTIONS = {**KERNEL, "fastmath": FAST}  # of what Python calls
+INNER_OPTIONS = {**INNER, "fastmath": FAST}  # of what only kernels call
 F = TypeVar("F", bound=Callable[..., object])
 
 
@@ -54,7 +58,7 @@ def compiled(function: F) -> F:
     return cast(F, call)
 
 
-@njit(inline="never", **OPTIONS)
+@njit(inline="never", **INNER_OPTIONS)
 def triangle_frame(x, wing, j, k, side):  # type: ignore[no-untyped-def]
     """(m, u, h, s) of one triangle of a hinge; `side` is +1 for the wing left of j -> k and -1 for the right one."""
     ex, ey, ez = x[k, 0] - x[j, 0], x[k, 1] - x[j, 1], x[k, 2] - x[j, 2]
@@ -69,7 +73,7 @@ def triangle_frame(x, wing, j, k, side):  # type: ignore[no-untyped-def]
     return mx, my, mz, ux, uy, uz, h, s
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def hinge_geometry(x, a, j, k, b, g):  # type: ignore[no-untyped-def]
     """Dihedral angle of hinge (a, j, k, b); writes its gradient (12,) into `g` and returns what the Hessian needs."""
     ex, ey, ez = x[k, 0] - x[j, 0], x[k, 1] - x[j, 1], x[k, 2] - x[j, 2]
@@ -89,7 +93,7 @@ def hinge_geometry(x, a, j, k, b, g):  # type: ignore[no-untyped-def]
         u2x, u2y, u2z), h2, s2  # fmt: skip
 
 
-@njit(**OPTIONS)
+@njit(**INNER_OPTIONS)
 def add_hinge_hessian(geometry, factor, H):  # type: ignore[no-untyped-def]
     """Add factor times the Hessian of the dihedral angle to the lower triangle of H (12, 12)."""
     _, length, e, m1, u1, h1, s1, m2, u2, h2, s2 = geometry

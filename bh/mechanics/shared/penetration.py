@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bh.loading.load_step import hinge_name
 from bh.mechanics.shared.assembly import add_lower, add_product, rotate
 from bh.mechanics.shared.hinge_lock import ZONE, in_zone, lock, until_closed
-from bh.mechanics.shared.kinematics import OPTIONS, add_hinge_hessian, hinge_geometry
+from bh.mechanics.shared.kinematics import INNER_OPTIONS, OPTIONS, add_hinge_hessian, hinge_geometry
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def lock_forces(x, hinges, k, f, L):  # type: ignore[no-untyped-def]
     return energy
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always", **INNER_OPTIONS)
 def _lock_matrix(x, hinge, k, moment, g, H):  # type: ignore[no-untyped-def]
     """Tangent of one lock into the lower triangle of H (12, 12); False where there is nothing."""
     geometry = hinge_geometry(x, hinge[0], hinge[1], hinge[2], hinge[3], g)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.mechanics.shared.assembly import add_lower, rotate
-from bh.mechanics.shared.kinematics import OPTIONS
+from bh.mechanics.shared.kinematics import INNER_OPTIONS, OPTIONS
 from bh.mechanics.shared.sparsity import Slots
 from bh.model.actuations import Indenter, Pull, Tether
 from bh.model.step import Body
@@ -225,7 +225,7 @@ def _anchors(items: tuple[Body, ...], start: Array, spring: Array) -> tuple[Arra
     return anchor, pulled
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always", **INNER_OPTIONS)
 def _measure(p, centre, axes, shape, n, H):  # type: ignore[no-untyped-def]
     """Distance g of a point from the surface of an indenter, its gradient n (3,) and Hessian H (3, 3)."""
     s = z = 0.0
@@ -262,7 +262,7 @@ def _measure(p, centre, axes, shape, n, H):  # type: ignore[no-untyped-def]
     return qz - shape[2]
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always", **INNER_OPTIONS)
 def _law(g, k, d):  # type: ignore[no-untyped-def]
     """Energy a length and its derivatives by g."""
     if g > 0.0:
@@ -271,7 +271,7 @@ def _law(g, k, d):  # type: ignore[no-untyped-def]
     return k * (d * d / 6.0 - 0.5 * d * g + 0.5 * g * g), -k * (0.5 * d - g), k
 
 
-@njit(inline="always", **OPTIONS)
+@njit(inline="always", **INNER_OPTIONS)
 def _place(x, corners, weights, p):  # type: ignore[no-untyped-def]
     for c in range(3):
         p[c] = 0.0

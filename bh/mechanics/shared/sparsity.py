@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import INNER, KERNEL
 from bh.solvers.matrices import Storage, reverse_cuthill_mckee
 from bh.solvers.sparse import SparsePattern, band_is_cheaper
 
@@ -53,7 +54,7 @@ def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None =
     bandwidth = int(max(wide.max(initial=0), sizes.max(initial=0))) - 1 if n else 0
     if band_is_cheaper(n, bandwidth):
         starts = np.arange(n, dtype=np.int64) * (bandwidth + 1)
-        slots = tuple(_band_slots(group, number, place, first, starts) for group in groups)
+        slots = tuple(_band_slots(group, number, place, first, starts, *_room(group)) for group in groups)
         last = np.arange(len(order))
         np.maximum.at(last, before, behind)
         reach = np.repeat(first[np.maximum.accumulate(last) + 1] - 1, np.diff(first))
@@ -63,7 +64,8 @@ def build_pattern(number: Ints, groups: tuple[Ints, ...], places: Array | None =
     )
     place, first = _places(tree_order, sizes)
     slots = tuple(
-        _sparse_slots(group, number, place, first, sparse.indptr, sparse.indices) for group in groups
+        _sparse_slots(group, number, place, first, sparse.indptr, sparse.indices, *_room(group))
+        for group in groups
     )
     return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, None, slots)
 
@@ -95,7 +97,7 @@ def _node_pairs(vertex: Ints, groups: tuple[Ints, ...]) -> tuple[Ints, Ints]:
     return unique // len(vertex), unique % len(vertex)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**INNER)
 def _rows(nodes, number, place, first, rows):  # type: ignore[no-untyped-def]
     """Rows (3 p,) of the unknowns of an element, -1 if prescribed."""
     for p in range(len(nodes)):
@@ -109,11 +111,15 @@ def _rows(nodes, number, place, first, rows):  # type: ignore[no-untyped-def]
                 rows[3 * p + c] = -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _band_slots(group, number, place, first, starts):  # type: ignore[no-untyped-def]
+def _room(group: Ints) -> tuple[Slots, Ints]:
+    """Room for the slots (elements, entries) of a group, and for the rows (3 p,) of an element."""
     width = 3 * group.shape[1]
-    slots = np.empty((len(group), width * (width + 1) // 2), dtype=np.int32)
-    rows = np.empty(width, dtype=np.int64)
+    return np.empty((len(group), width * (width + 1) // 2), dtype=np.int32), np.empty(width, dtype=np.int64)
+
+
+@njit(**KERNEL)
+def _band_slots(group, number, place, first, starts, slots, rows):  # type: ignore[no-untyped-def]
+    width = len(rows)
     for e in range(len(group)):
         _rows(group[e], number, place, first, rows)
         at = 0
@@ -130,12 +136,9 @@ def _band_slots(group, number, place, first, starts):  # type: ignore[no-untyped
     return slots
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _sparse_slots(group, number, place, first, indptr, indices):  # type: ignore[no-untyped-def]
+@njit(**KERNEL)
+def _sparse_slots(group, number, place, first, indptr, indices, slots, rows):  # type: ignore[no-untyped-def]
     nodes = group.shape[1]
-    width = 3 * nodes
-    slots = np.empty((len(group), width * (width + 1) // 2), dtype=np.int32)
-    rows = np.empty(width, dtype=np.int64)
     for e in range(len(group)):
         _rows(group[e], number, place, first, rows)
         for p in range(nodes):
@@ -160,7 +163,7 @@ def _sparse_slots(group, number, place, first, indptr, indices):  # type: ignore
     return slots
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**INNER)
 def _find(indices, low, high, row):  # type: ignore[no-untyped-def]
     while high - low > 1:
         middle = (low + high) // 2
