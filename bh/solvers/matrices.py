@@ -242,8 +242,9 @@ def reverse_cuthill_mckee(rows: Ints, columns: Ints, n: int) -> tuple[Ints, int]
     """
     from scipy.sparse.csgraph import reverse_cuthill_mckee as rcm
 
-    pattern = sp.coo_array((np.ones(len(rows)), (rows, columns)), shape=(n, n)).tocsr()
-    order = rcm(sp.csr_matrix(pattern + pattern.T), symmetric_mode=True).astype(np.int64)
+    both = np.concatenate((rows, columns)), np.concatenate((columns, rows))
+    pattern = sp.csr_matrix((np.ones(2 * len(rows)), both), shape=(n, n))
+    order = rcm(pattern, symmetric_mode=True).astype(np.int64)
     position = np.empty(n, dtype=np.int64)
     position[order] = np.arange(n)
     bandwidth = int(np.abs(position[rows] - position[columns]).max(initial=0))

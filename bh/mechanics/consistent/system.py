@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
 
 Array = NDArray[np.float64]
+GROUND = np.tril_indices(9)
 ROUNDING = 8.0 * np.finfo(float).eps
 
 
@@ -249,7 +250,7 @@ class ConsistentSystem(TurningEdges):
         Z = np.vstack((rigid, np.zeros((self.size - self.moving, rigid.shape[1]))))
         block = self.displacements.grounding(rigid, self._scale)
         slots, number = pattern.slots[4][0], self.displacements.ground_numbers
-        np.add.at(data, slots[slots >= 0], block[np.tril_indices(9)][slots >= 0])
+        np.add.at(data, slots[slots >= 0], block[GROUND][slots >= 0])
         inside = number >= 0
         weight = self.displacements.weight
         if weight is not None:

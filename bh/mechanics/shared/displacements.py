@@ -170,7 +170,7 @@ class Displacements:
             stiffness: N/mm.
         """
         rows = np.where(self.ground_numbers[:, None] >= 0, Z[np.maximum(self.ground_numbers, 0)], 0.0)
-        Q = np.linalg.qr(rows)[0] if Z.shape[1] else rows
+        Q = orthonormal(rows)
         return np.asarray(stiffness * (Q @ Q.T))
 
     def unbalanced(self, x: Array, force: Array) -> float:

@@ -87,13 +87,12 @@ def _node_pairs(vertex: Ints, groups: tuple[Ints, ...]) -> tuple[Ints, Ints]:
     """Every pair of nodes that share an element, once, as (high, low)."""
     keys = []
     for group in groups:
+        first, second = np.tril_indices(group.shape[1], -1)
         nodes = vertex[group]
-        for i in range(group.shape[1]):
-            for j in range(i):
-                a, b = nodes[:, i], nodes[:, j]
-                both = (a >= 0) & (b >= 0) & (a != b)
-                a, b = a[both], b[both]
-                keys.append(np.maximum(a, b) * len(vertex) + np.minimum(a, b))
+        a, b = nodes[:, first], nodes[:, second]
+        both = (a >= 0) & (b >= 0) & (a != b)
+        a, b = a[both], b[both]
+        keys.append(np.maximum(a, b) * len(vertex) + np.minimum(a, b))
     unique = np.unique(np.concatenate(keys)) if keys else np.zeros(0, dtype=np.int64)
     return unique // len(vertex), unique % len(vertex)
 
