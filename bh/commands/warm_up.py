@@ -1,4 +1,7 @@
-"""Compile (or load from the cache) every kernel, so that a first run does not wait: `python -m bh.commands.warm_up`."""
+"""Compile (or load from the cache) the kernels of every formulation: `python -m bh.commands.warm_up`.
+
+A first run then does not wait; kernels of contact, of presses and of laws of the sheet are compiled when they are used.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import math
 import meshes
 from bh.analysis.contact import candidates
 from bh.analysis.triangles import intersecting
+from bh.commands.compile_ahead import compiled_ahead
 from bh.formulations.registry import names
 from bh.model.model import Model
 from bh.model.sheet import Sheet
@@ -50,5 +54,6 @@ def _fold(sheet: Model) -> Path:
 
 
 if __name__ == "__main__":
-    warm_up()
+    with compiled_ahead():
+        warm_up()
     print("kernels are compiled and cached")

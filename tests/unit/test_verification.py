@@ -489,18 +489,18 @@ def test_strips_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp
 
 
 @pytest.fixture
-def played_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scenes of the campaign are played in this process: its workers have tests of their own, and start slowly."""
+def played_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes of the campaign are reached at once, in this process: how they are played has tests of its own."""
     monkeypatch.setattr(campaign, "Workers", lambda _: ThreadPoolExecutor(1))
-
-
-@pytest.mark.usefixtures("played_here")
-def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Results that are stored are not played again; a half-written line and those of other versions are."""
-    monkeypatch.setattr(campaign, "environment", lambda: {"python": "x"})
     monkeypatch.setattr(
         campaign, "play", lambda scene: campaign.Result(scene, "reached", "", 0.0, 7, 99, 0.1)
     )
+
+
+@pytest.mark.usefixtures("played_at_once")
+def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Results that are stored are not played again; a half-written line and those of other versions are."""
+    monkeypatch.setattr(campaign, "environment", lambda: {"python": "x"})
     few = campaign.scenes(3)
     store = tmp_path / "campaign.jsonl"
     told: list[str] = []
@@ -520,7 +520,7 @@ def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytes
     assert [r.iterations for r in anew] == [r.iterations for r in whole]
 
 
-@pytest.mark.usefixtures("played_here")
+@pytest.mark.usefixtures("played_at_once")
 def test_long_cases_come_from_the_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run without them shows the kept run, with its own date; a run of them replaces it."""
     few = campaign.scenes(1)
