@@ -35,6 +35,11 @@ FALL = 1e-9  # part of the energy that a step has to gain to show it
 NO_STEP = 1e-10  # of the unknowns: a step that changes nothing
 ENDLESS = 1e100  # size of a step that a singular tangent has made
 NEAR_SADDLE = 1e-3  # imbalance below which an indefinite tangent is that of a saddle
+CREEPS = "creeps"  # why the globalised way gave up
+CREEPING = (
+    8,
+    1e-6,
+)  # steps, and the part of the energy that all of them together gain where nothing but creeping is left
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,8 @@ class Newton:
         hasty: give full Newton up where its steps contract too slowly; for increments that are cheaper cut than saved.
         held: (primal,) a neutral mode that full steps leave alone (`bh.solvers.modes.neutral_mode`), None without one.
         unstable: take indefinite tangents as they are and take full steps only, to stay on a branch that is not stable.
+        impatient: give the globalised way up where it creeps next to a state: what is left is along a mode that hardly
+            resists, and `bh.solvers.phase.settle` may go there at once.
         keep: hand on the tangent and the factor of the state that is found (`Solution.factorised`); they take memory.
     """
 
@@ -89,6 +96,7 @@ class Newton:
     hasty: bool = False
     held: Array | None = None
     unstable: bool = False
+    impatient: bool = False
     keep: bool = False
 
     def solve(
@@ -234,9 +242,13 @@ class Newton:
         """
         now = system.evaluate(q, lam)
         shift, least, before = 0.0, ROUNDED, np.inf
+        merits: list[float] = []
         for iteration in range(self.globalised):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, globalised=True)
+            merits.append(now.merit)
+            if self.impatient and now.imbalance < NEAR_SADDLE and creeping(merits):
+                return Solution(q, now, iteration, False, CREEPS, globalised=True)
             matrix = system.tangent(q, lam, now.forces).matrix
             if shift < 1e-9 and 0.5 * before < now.imbalance < 0.1:
                 least = NEUTRAL  # modes as soft as the shift converge no better than linearly with it
@@ -334,6 +346,16 @@ def slow(sizes: Sequence[float]) -> bool:
     the linear prediction is taken out.
     """
     return len(sizes) > 4 and sizes[-1] > 0.5 * sizes[-3]
+
+
+def creeping(merits: Sequence[float]) -> bool:
+    """Have the last steps together gained next to nothing?
+
+    Args:
+        merits: of the states so far, N mm.
+    """
+    steps, least = CREEPING
+    return len(merits) > steps and merits[-1 - steps] - merits[-1] < least * abs(merits[-1])
 
 
 def roll_off(
