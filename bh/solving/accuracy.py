@@ -171,7 +171,8 @@ def _chosen(goal: Goal, found: Sequence[_Found], trials: list[Trial], notes: lis
     if not math.isfinite(best.error):
         best = found[-1]
     path, met = best.path, best.error <= goal.within
-    look_beside(path)
+    before = [item.path for item in found[: found.index(best)] if item.formulation == best.formulation]
+    look_beside(path, before[-1] if before and path.reached and before[-1].reached else None)
     path.accuracy = Accuracy(
         goal,
         best.error,

@@ -231,16 +231,18 @@ def _beside(path: Path, step: int, asked: bool, item: Increment | None) -> str:
         return look_around(system, here, doubtful, Newton())
 
 
-def look_beside(path: Path) -> None:
+def look_beside(path: Path, coarser: Path | None = None) -> None:
     """Look for other stable states beside the ends of steps that were followed with `neighbours=False`.
 
     Args:
         path: its reached steps are told what lies beside their ends, as `follow` does where there is reason to look.
+        coarser: the same steps on a coarser mesh, where a look takes a fraction of the time; None to look on its own.
     """
+    on, where = (path, "") if coarser is None else (coarser, ", on the coarser mesh before this one")
     with one_blas_thread():
         for step, end in enumerate(path.steps):
-            if end.reached:
-                path.steps[step] = replace(end, reason=_beside(path, step, False, None))
+            if end.reached and (seen := _beside(on, step, False, None)):
+                path.steps[step] = replace(end, reason=seen + where)
 
 
 def _stable_end(path: Path, strategy: Strategy) -> StepOutcome:

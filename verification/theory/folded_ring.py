@@ -80,8 +80,9 @@ def release(theta: float, radius: float, width: float, thickness: float) -> floa
     """
     wide = 3.0**0.25 * width / math.sqrt(radius * math.tan(0.5 * theta) * thickness)
     if wide > 300.0:  # cosh overflows
-        return 2.0 / wide
-    return 2.0 / wide * (math.cosh(wide) - math.cos(wide)) / (math.sinh(wide) + math.sin(wide))
+        return float(2.0 / wide)
+    ends = (math.cosh(wide) - math.cos(wide)) / (math.sinh(wide) + math.sin(wide))
+    return float(2.0 / wide * ends)
 
 
 @lru_cache(maxsize=16)
