@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.branching import NO_BRANCH, Branch, onto_stable_branch
+from bh.solvers.creeping import CREEPS
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import GAP, KNOWN_GAP, count_negative, neutral_mode
-from bh.solvers.newton import ALONG, CREEPS, INDEFINITE, Newton, Solution
+from bh.solvers.newton import ALONG, INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
 from bh.solvers.phase import settle
 from bh.solvers.points import (

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.creeping import CREEPS, creeping
 from bh.solvers.factor import Descent, Factor, IndefiniteError, Matrix
 from bh.solvers.modes import (
     GAP,
@@ -35,11 +36,6 @@ FALL = 1e-9  # part of the energy that a step has to gain to show it
 NO_STEP = 1e-10  # of the unknowns: a step that changes nothing
 ENDLESS = 1e100  # size of a step that a singular tangent has made
 NEAR_SADDLE = 1e-3  # imbalance below which an indefinite tangent is that of a saddle
-CREEPS = "creeps"  # why the globalised way gave up
-CREEPING = (
-    8,
-    1e-6,
-)  # steps, and the part of the energy that all of them together gain where nothing but creeping is left
 
 
 @dataclass(frozen=True)
@@ -346,16 +342,6 @@ def slow(sizes: Sequence[float]) -> bool:
     the linear prediction is taken out.
     """
     return len(sizes) > 4 and sizes[-1] > 0.5 * sizes[-3]
-
-
-def creeping(merits: Sequence[float]) -> bool:
-    """Have the last steps together gained next to nothing?
-
-    Args:
-        merits: of the states so far, N mm.
-    """
-    steps, least = CREEPING
-    return len(merits) > steps and merits[-1 - steps] - merits[-1] < least * abs(merits[-1])
 
 
 def roll_off(

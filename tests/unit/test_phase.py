@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bh.solvers.creeping import CREEPS, creeping
 from bh.solvers.load_control import downhill
 from bh.solvers.matrices import BandMatrix
-from bh.solvers.newton import ALONG, CREEPS, Newton, creeping
+from bh.solvers.newton import ALONG, Newton
 from bh.solvers.phase import settle
 from bh.solvers.system import Evaluation, Tangent
 from verification.studies.solver.benchmark_systems import Silent
