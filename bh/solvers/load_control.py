@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.branching import NO_BRANCH, Branch, onto_stable_branch
+from bh.solvers.creeping import CREEPS
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import GAP, KNOWN_GAP, count_negative, neutral_mode
-from bh.solvers.newton import INDEFINITE, Newton, Solution
+from bh.solvers.newton import ALONG, INDEFINITE, Newton, Solution
 from bh.solvers.outcome import Outcome
 from bh.solvers.phase import settle
 from bh.solvers.points import (
@@ -215,23 +216,22 @@ class LoadControl:
         found = method.solve(system, q, lam, forces, tangent)
         primary = found = found if held is None else settle(system, found, lam, newton)
         iterations, note, branch = found.iterations, "", NO_BRANCH
-        downhill = look and not brisk and not found.converged
-        if downhill and self.guess is not None and (near := self.guess(system, lam)) is not None:
+        lost = look and not brisk and not found.converged
+        if lost and self.guess is not None and (near := self.guess(system, lam)) is not None:
             # no element forces go with it: the strain of interpolated positions is large, and none of the sheet's
             found = newton.solve_full(system, near, lam, np.zeros_like(here.forces))
             primary = found = settle(system, found, lam, newton)
             iterations += found.iterations
-        if downhill and not found.converged:
-            found = replace(newton, full=0, transient=None).solve(system, q, lam)
-            primary = found = settle(system, found, lam, newton)
+        if lost and not found.converged:
+            primary = found = downhill(system, q, lam, newton)
             iterations += found.iterations
         # with one state only the increments are still large, and cutting them costs less than looking
-        if look and (not found.converged if downhill else _lost(found) and len(points) > 1):
+        if look and (not found.converged if lost else _lost(found) and len(points) > 1):
             branch = onto_stable_branch(system, here, lam, self.newton)
             iterations += branch.iterations
             if branch.points:
                 return _Trial(here, found, primary, "", "", iterations, branch)
-        if downhill and not found.converged:
+        if lost and not found.converged:
             primary = found = replace(newton, full=0, globalised=1).solve(system, found.q, lam)
             iterations += found.iterations
         if not found.converged:  # it may hold anything; nothing is asked of it
@@ -384,6 +384,26 @@ def _clear_guess(
 
     part = 1.0 if part >= 1.0 else 0.9 * part
     return here.q + part * (guess[0] - here.q), here.forces + part * (guess[1] - here.forces)
+
+
+def downhill(system: System, q: Array, lam: float, newton: Newton) -> Solution:
+    """By minimising the energy; where that creeps, along the mode that hardly resists, and else on as before.
+
+    Args:
+        system: whose equilibrium is sought.
+        q: (n,) where to begin.
+        lam: load parameter of the step, 0 to 1.
+        newton: settings.
+    """
+    method = replace(newton, full=0, transient=None)
+    found = replace(method, impatient=True).solve(system, q, lam)
+    creeps = found.reason == CREEPS
+    settled = settle(system, replace(found, reason=ALONG) if creeps else found, lam, newton)
+    if settled.converged or not creeps:
+        return settled
+    left = replace(method, globalised=max(1, method.globalised - found.iterations))
+    onward = settle(system, left.solve(system, found.q, lam), lam, newton)
+    return replace(onward, iterations=settled.iterations + onward.iterations)
 
 
 def _lost(found: Solution) -> bool:

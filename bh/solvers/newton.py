@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.creeping import CREEPS, creeping
 from bh.solvers.factor import Descent, Factor, IndefiniteError, Matrix
 from bh.solvers.modes import (
     GAP,
@@ -78,6 +79,8 @@ class Newton:
         hasty: give full Newton up where its steps contract too slowly; for increments that are cheaper cut than saved.
         held: (primal,) a neutral mode that full steps leave alone (`bh.solvers.modes.neutral_mode`), None without one.
         unstable: take indefinite tangents as they are and take full steps only, to stay on a branch that is not stable.
+        impatient: give the globalised way up where it creeps next to a state: what is left is along a mode that hardly
+            resists, and `bh.solvers.phase.settle` may go there at once.
         keep: hand on the tangent and the factor of the state that is found (`Solution.factorised`); they take memory.
     """
 
@@ -89,6 +92,7 @@ class Newton:
     hasty: bool = False
     held: Array | None = None
     unstable: bool = False
+    impatient: bool = False
     keep: bool = False
 
     def solve(
@@ -234,9 +238,13 @@ class Newton:
         """
         now = system.evaluate(q, lam)
         shift, least, before = 0.0, ROUNDED, np.inf
+        merits: list[float] = []
         for iteration in range(self.globalised):
             if now.imbalance <= self.tolerance:
                 return self._finish(system, q, lam, now, iteration, globalised=True)
+            merits.append(now.merit)
+            if self.impatient and now.imbalance < NEAR_SADDLE and creeping(merits):
+                return Solution(q, now, iteration, False, CREEPS, globalised=True)
             matrix = system.tangent(q, lam, now.forces).matrix
             if shift < 1e-9 and 0.5 * before < now.imbalance < 0.1:
                 least = NEUTRAL  # modes as soft as the shift converge no better than linearly with it

@@ -35,7 +35,7 @@ from bh.paths.path import Path
 from bh.runtime.progress import ProgressMeter, meter, stage
 from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.walk import Strategy
-from bh.solving.follow import follow
+from bh.solving.follow import follow, look_beside
 from bh.solving.levels import Levels
 from bh.solving.mesh_choice import Ladder
 from bh.solving.race import Race
@@ -143,6 +143,7 @@ class _Task:
                 file=file,
                 resume=file is not None and file.exists(),
                 coarser=coarser if self.symmetry is None else None,
+                neighbours=False,  # only that of the mesh that is taken is shown
             )
 
         path, cells = ladder.solve(step, on_mesh)
@@ -170,6 +171,8 @@ def _chosen(goal: Goal, found: Sequence[_Found], trials: list[Trial], notes: lis
     if not math.isfinite(best.error):
         best = found[-1]
     path, met = best.path, best.error <= goal.within
+    before = [item.path for item in found[: found.index(best)] if item.formulation == best.formulation]
+    look_beside(path, before[-1] if before and path.reached and before[-1].reached else None)
     path.accuracy = Accuracy(
         goal,
         best.error,

@@ -28,7 +28,7 @@ from bh.solvers.neighbours import look_around
 from bh.solvers.newton import Newton
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import LOAD, Increment, Point, point
-from bh.solvers.system import Remembering
+from bh.solvers.system import Remembering, remembering
 from bh.solvers.walk import Strategy, Walk, walk
 from bh.solving.coarser import Coarser
 from meshes.mesh import count
@@ -219,14 +219,30 @@ def _beside(path: Path, step: int, asked: bool, item: Increment | None) -> str:
     """
     half = path.half(step)
     system = path.system(step) if half is None else half.system
-    doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in path.records)
+    done = [record for record in path.records if record.step <= step]
+    doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in done)
     if not asked and path.model.stops_itself:
         return ""  # pushed states would have to find ways round all that presses, which takes longer than the path
     if item is not None:
         return look_around(system, item.point, doubtful, Newton(), item.factorised)
-    record = path.records[-1] if half is None else path.records[-1].of_half(half)
-    here = point(system, record.q, record.lam, negative=record.negative)
-    return look_around(system, here, doubtful, Newton())
+    record = done[-1] if half is None else done[-1].of_half(half)
+    with remembering(system, record.history):
+        here = point(system, record.q, record.lam, negative=record.negative)
+        return look_around(system, here, doubtful, Newton())
+
+
+def look_beside(path: Path, coarser: Path | None = None) -> None:
+    """Look for other stable states beside the ends of steps that were followed with `neighbours=False`.
+
+    Args:
+        path: its reached steps are told what lies beside their ends, as `follow` does where there is reason to look.
+        coarser: the same steps on a coarser mesh, where a look takes a fraction of the time; None to look on its own.
+    """
+    on, where = (path, "") if coarser is None else (coarser, ", on the coarser mesh before this one")
+    with one_blas_thread():
+        for step, end in enumerate(path.steps):
+            if end.reached and (seen := _beside(on, step, False, None)):
+                path.steps[step] = replace(end, reason=seen + where)
 
 
 def _stable_end(path: Path, strategy: Strategy) -> StepOutcome:

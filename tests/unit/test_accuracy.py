@@ -13,6 +13,7 @@ import pytest
 
 import bh
 import bh.solving.accuracy
+import bh.solving.follow
 import meshes
 from bh.commands.cli import main
 from bh.errors import ModelError, SceneError
@@ -137,6 +138,22 @@ def test_trace_to_an_accuracy() -> None:
     assert 1e-5 < error < 1.5 * told.estimate
     assert "energy to" in str(told)
     assert json.loads(json.dumps(told.as_dict()))["met"] is True
+
+
+def test_it_looks_once_for_other_states_on_the_mesh_before_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[int] = []
+
+    def beside(path: bh.Path, *_: object) -> str:
+        looked.append(path.unknowns)
+        return "another stable state is within reach"
+
+    monkeypatch.setattr(bh.solving.follow, "_beside", beside)
+    path = bh.trace(model().fold("crease", to=1.571), accuracy=0.05)
+    assert path.accuracy is not None
+    assert looked == [path.accuracy.trials[-2].unknowns]
+    assert (
+        path.steps[-1].reason == "another stable state is within reach, on the coarser mesh before this one"
+    )
 
 
 def test_a_finer_accuracy_costs_more() -> None:

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bh.solvers.creeping import CREEPS, creeping
+from bh.solvers.load_control import downhill
 from bh.solvers.matrices import BandMatrix
 from bh.solvers.newton import ALONG, Newton
 from bh.solvers.phase import settle
@@ -76,3 +78,29 @@ def test_what_is_far_off_or_found_is_left_as_it_is() -> None:
     assert settle(system, near, 0.0, newton) is near
     done = replace(near, converged=True)
     assert settle(system, done, 0.0, newton) is done
+
+
+class High(Ring):
+    """The same valley, whose hollows are nothing beside its energy."""
+
+    def evaluate(self, q: Array, lam: float) -> Evaluation:
+        found = super().evaluate(q, lam)
+        return Evaluation(found.energy + 1.0, found.residual, found.imbalance, found.forces)
+
+
+def test_creeping_along_the_valley_is_given_up_and_settled() -> None:
+    system, start = High(), 1.3 * at(0.9)
+    newton = Newton(tolerance=1e-13, transient=None)
+    alone = newton.solve_globalised(system, start, 0.0)
+    given_up = replace(newton, impatient=True).solve_globalised(system, start, 0.0)
+    assert given_up.reason == CREEPS
+    assert given_up.iterations < 0.5 * alone.iterations
+    found = downhill(system, start, 0.0, newton)
+    assert found.converged
+    assert found.stable
+
+
+def test_creeping_is_to_gain_nothing_in_many_steps() -> None:
+    assert creeping([1.0 + 1e-9 * k for k in range(9, 0, -1)])
+    assert not creeping([1.0 + 1e-9 * k for k in range(8, 0, -1)])  # too few
+    assert not creeping([1.0 + 1e-6 * k for k in range(9, 0, -1)])

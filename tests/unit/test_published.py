@@ -74,6 +74,27 @@ def test_the_folded_ring_keeps_its_length_and_has_more_energy_than_a_plane_circl
     assert folded_ring.curvature(math.pi) == 1.0
 
 
+def test_layers_take_a_small_part_of_thin_panels_and_all_of_thick_ones() -> None:
+    theta = math.radians(90.0)
+    thin, thick = (folded_ring.release(theta, 100.0, 5.0, t) for t in (1e-5, 50.0))
+    wide = 3.0**0.25 * 5.0 / math.sqrt(100.0 * 1e-5)
+    assert thin == pytest.approx(2.0 / wide, rel=1e-12)
+    assert thick == pytest.approx(1.0, abs=1e-3)
+    assert folded_ring.release(theta, 100.0, 5.0, 1e-9) == pytest.approx(
+        2.0 / (3.0**0.25 * 5.0 / math.sqrt(1e-7))
+    )
+    narrow = folded_ring.release(theta, 100.0, 2.5, 0.25 * 0.02)  # the thickness with the square of the width
+    assert narrow == pytest.approx(folded_ring.release(theta, 100.0, 5.0, 0.02))
+
+
+@pytest.mark.slow
+def test_a_ring_with_layers_has_less_energy_and_nearly_the_height() -> None:
+    theta = math.radians(90.0)
+    isometric, layered = folded_ring.folded_ring(theta), folded_ring.folded_ring(theta, 0.4387)
+    assert layered.energy == pytest.approx(0.806 * isometric.energy, rel=1e-3)
+    assert layered.height == pytest.approx(1.00063 * isometric.height, rel=2e-5)
+
+
 def test_the_snapping_strip_has_its_known_values() -> None:
     assert clamped_arch.second_mode() == pytest.approx(8.98682, rel=1e-6)
     mu, tau = clamped_arch.snap()

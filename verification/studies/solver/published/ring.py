@@ -1,25 +1,26 @@
 """A closed ring folded along its circle: a saddle of constant crease curvature (`verification.theory.folded_ring`).
 
-A quarter of it, from a crest to a trough, between two mirror planes. Energies are reported only: rulings
-lean, so the isometric state would need a moment at the free edges, which a layer of width sqrt(t R) takes off
-slowly with t. Height and curvature miss the 0.1 % that was set before the first run, and the checks say so;
-the note has the figures.
+A quarter of it, from a crest to a trough, between two mirror planes. The closed form is that of an infinitely
+narrow ring of isometric panels, so rings are made narrower, their thickness with the square of the width: then
+the layers at their edges stay the same part of the width, w / R and t / w go to zero together, and the ring to
+the rod of `folded_ring` with these layers. That limit is judged, by the rod and by the closed form. A ring of
+finite width is shown, and judged by the shell.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 import meshes
 from bh import Model, Path, Sheet, trace
+from bh.analysis.richardson import judged
 from bh.formulations.state import State
-from verification.framework.checks import CaseResult, Context
-from verification.studies.solver.published.common import Claim, Level, by_shell, converged
+from verification.framework.checks import CaseResult, Context, Cost
 from verification.theory import folded_ring as theory
 
 Array = NDArray[np.float64]
@@ -27,30 +28,53 @@ SOURCE = (
     "Dias, Dudte, Mahadevan and Santangelo (2012), Dias and Audoly (2014); the rod solved in "
     "verification.theory.folded_ring"
 )
-RADIUS, WIDTH = 100.0, 5.0  # mm
-SHEET = Sheet(E=4000.0, nu=0.0, t=0.02)
+LAYERS = "the rod with layers at the edges of its panels, verification.theory.folded_ring"
+RADIUS = 100.0  # mm
 ANGLES = (120.0, 90.0)  # dihedral, degrees
-LEVELS = ((24, 1), (48, 2), (96, 4))  # cells along a quarter, rows a panel
-SHELL = (48, 2)
+ROWS = 4
 HEIGHT = CURVATURE = 1e-3  # relative tolerances, set before the first run
 APART = 1e-3  # relative, of the heights by the two models; asked after first results
+ENERGY = 0.02  # relative, of the limit by the rod with layers; set after first energies had been seen
 
 
-def ring_model(angle: float, formulation: str, along: int, rows: int) -> Model:
+@dataclass(frozen=True)
+class Ring:
+    """A ring, and the cells along a quarter of it.
+
+    Attributes:
+        width: of each panel, mm.
+        along: cells along a quarter; cells keep their shape where the width halves.
+    """
+
+    width: float
+    along: int
+
+    @property
+    def sheet(self) -> Sheet:
+        """Paper whose edge layers are the same part of any width."""
+        return Sheet(E=4000.0, nu=0.0, t=8e-4 * self.width**2)
+
+
+RINGS = (Ring(10.0, 48), Ring(5.0, 96), Ring(2.5, 192))
+SHELL, SHELL_MESH = RINGS[1], (48, 2)
+
+
+def ring_model(angle: float, ring: Ring, formulation: str, along: int, rows: int) -> Model:
     """A quarter of the ring, folded to a dihedral angle.
 
     Args:
         angle: degrees.
+        ring: which.
         formulation: by name.
         along: cells along the quarter.
         rows: of cells in each panel.
     """
-    pattern = meshes.annulus_sector(RADIUS, WIDTH, 0.5 * math.pi)
+    pattern = meshes.annulus_sector(RADIUS, ring.width, 0.5 * math.pi)
     model = Model(
         meshes.structured(
             pattern, along=along, rows=rows, kind="mirrored" if formulation == "shell" else "staggered"
         ),
-        SHEET,
+        ring.sheet,
         formulation=formulation,
     )
     model = model.support("edge:start", "y", clamp=True).support("edge:end", "x", clamp=True)
@@ -71,13 +95,14 @@ def crease_curvature(state: State) -> Array:
 
 
 NOTE = (
-    "Closed ring: asked was 0.1 % of height and crease curvature. Heights are 0.4 % (120 degrees) and 0.2 % "
-    "(90 degrees) off by the consistent formulation, 0.3 % and 0.2 % by the shell; mean curvatures 0.1 % and "
-    "0.05 % (no order), 0.1 % and 0.2 % by the shell. Heights of the consistent formulation show no "
-    "order on three meshes. That both models are "
-    "on the same side and within 0.06 % of each other suggests the closed form's narrow isometric ring, not "
-    "the meshes (its energy is 0.67 to 0.85 of that ring's); a narrower or thinner ring was not tried. That "
-    "they are judged against each other as well was added after first results."
+    "Closed ring: asked was 0.1 % of height and crease curvature, and a ring of w / R = 0.05 misses both (height by "
+    "0.39 % at 120 degrees, 0.23 % at 90 degrees; mean curvature by 0.11 % and 0.21 %). The miss is of the width: it "
+    "falls with its square, and the limit of narrow rings is within 0.1 % of the closed form. What is left there at "
+    "90 degrees, 0.06 % in height, is what the layers at the edges of the panels make of the rod; they take a third "
+    "and a fifth of its energy. At w / R = 0.05 a quarter of the thickness leaves the height at 120 degrees where it "
+    "was (-0.39 %, 128 x 8 cells graded to the edges, run once), so thinner paper alone does not help. Why a ring of "
+    "finite width has less crease curvature than its angle asks for, where the closed form holds at every point, is "
+    "not known. The tolerance of the energy was set after first energies had been seen."
 )
 
 
@@ -85,61 +110,107 @@ def closed_ring(result: CaseResult, _context: Context) -> None:
     """Two dihedral angles."""
     result.notes.append(NOTE)
     for angle in ANGLES:
-        exact = theory.folded_ring(math.radians(angle))
+        theta = math.radians(angle)
+        first = RINGS[0]
+        released = theory.release(theta, RADIUS, first.width, first.sheet.t)
+        layered, exact = theory.folded_ring(theta, released), theory.folded_ring(theta)
         params = {"sheet": "ring", "dihedral angle": angle}
-        high = Claim("height of the crease over R", exact.height, SOURCE, HEIGHT, params)
-        bent = Claim("mean of kappa R sin(theta / 2) along the crease", 1.0, SOURCE, CURVATURE, params)
-        found = [(n, rows, _solved(angle, "consistent", n, rows)) for n, rows in LEVELS]
-        sine = math.sin(0.5 * math.radians(angle))
-        converged(result, high, [_level(n, rows, path, height) for n, rows, path in found])
-        converged(result, bent, [_level(n, rows, path, _turn(sine)) for n, rows, path in found])
-        path = _solved(angle, "shell", *SHELL)
-        by_shell(result, high, _level(*SHELL, path, height))
-        by_shell(result, bent, _level(*SHELL, path, _turn(sine)))
+        paths = [_solved(angle, ring, "consistent", ring.along, ROWS) for ring in RINGS]
+        narrow = _Narrow(result, paths, params)
+        high = narrow.limit("height of the crease over R", lambda path: height(path[-1]), exact.height)
+        narrow.judge(high, exact.height, SOURCE, HEIGHT)
+        narrow.judge(high, layered.height, LAYERS, HEIGHT)
+        turned = narrow.limit("mean of kappa R sin(theta / 2) along the crease", _turn(theta), 1.0)
+        narrow.judge(turned, 1.0, SOURCE, CURVATURE)
+        energy = narrow.limit("energy over that of the narrow isometric ring", _share(exact.energy), None)
+        narrow.judge(energy, layered.energy / exact.energy, LAYERS, ENERGY)
+        shell = _solved(angle, SHELL, "shell", *SHELL_MESH)
         result.check(
             "height of the crease over that by the shell",
-            height(found[-1][2][-1]) / height(path[-1]),
+            height(paths[RINGS.index(SHELL)][-1]) / height(shell[-1]),
             reference=1.0,
             source="the shell",
             tolerance=APART,
-            params=params,
-            path=found[-1][2],
+            params={**params, "width": SHELL.width},
+            path=shell,
         )
-        for formulation, last in (("consistent", found[-1][2]), ("shell", path)):
-            _reported(result, {**params, "formulation": formulation}, last, exact.energy)
+        for ring, path in zip((*RINGS, SHELL), (*paths, shell), strict=True):
+            result.check(
+                "the state is stable",
+                path.stable is True,
+                reference=1.0,
+                source="asked",
+                tolerance=0.0,
+                params={**params, "width": ring.width, "formulation": path.model.formulation},
+                path=path,
+            )
 
 
-def _solved(angle: float, formulation: str, along: int, rows: int) -> Path:
-    return trace(ring_model(angle, formulation, along, rows), neighbours=False)
+@dataclass(frozen=True)
+class _Limit:
+    """Of one quantity where the width goes to zero."""
+
+    quantity: str
+    value: float
+    unknown: float
+    seen: str
 
 
-def _turn(sine: float) -> Callable[[State], float]:
-    return lambda state: float(crease_curvature(state).mean()) * RADIUS * sine
+@dataclass(frozen=True)
+class _Narrow:
+    """Narrower and narrower rings at one angle."""
+
+    result: CaseResult
+    paths: Sequence[Path]
+    params: dict[str, object]
+
+    def limit(self, quantity: str, read: Callable[[Path], float], reference: float | None) -> _Limit:
+        """Where a quantity goes; each ring's own value and the order in w are told, beside what they go to."""
+        values = [read(path) for path in self.paths]
+        for ring, value, path in zip(RINGS, values, self.paths, strict=True):
+            self.result.check(
+                f"{quantity}, ring of finite width",
+                value,
+                reference=reference,
+                source=SOURCE,
+                params={**self.params, "width": ring.width, "t": ring.sheet.t},
+                path=path,
+            )
+        seen = judged(values, [ring.width for ring in RINGS])
+        order = seen.limit.rate if math.isfinite(seen.limit.rate) else 0.0
+        self.result.check(
+            f"{quantity}, order in the width", order, params={**self.params, "seen": seen.verdict}
+        )
+        return _Limit(quantity, seen.limit.value, seen.limit.bar, seen.verdict)
+
+    def judge(self, limit: _Limit, reference: float, source: str, tolerance: float) -> None:
+        """The limit against what it should be, relative to that."""
+        self.result.check(
+            f"{limit.quantity}, width and thickness to zero",
+            limit.value,
+            reference=reference,
+            source=source,
+            tolerance=tolerance,
+            params={**self.params, "left unknown": limit.unknown, "seen": limit.seen},
+            path=Cost.of(self.paths[-1]),
+        )
 
 
-def _level(along: int, rows: int, path: Path, read: Callable[[State], float]) -> Level:
-    return Level(f"{along} x {rows}", 1.0 / rows, read(path[-1]), path)
+def _solved(angle: float, ring: Ring, formulation: str, along: int, rows: int) -> Path:
+    return trace(ring_model(angle, ring, formulation, along, rows), neighbours=False)
 
 
-def _reported(result: CaseResult, params: dict[str, Any], path: Path, energy: float) -> None:
-    """Energy over that of a narrow isometric ring, and how much the curvature varies."""
-    state, sine = path[-1], math.sin(0.5 * math.radians(params["dihedral angle"]))
-    bent = crease_curvature(state) * RADIUS * sine
-    scale = SHEET.bending_stiffness() * WIDTH / RADIUS * energy
-    result.check(
-        "energy over that of the narrow isometric ring",
-        4.0 * state.energy.total / scale,
-        params=params,
-        path=path,
-    )
-    result.check("least kappa R sin(theta / 2)", float(bent.min()), params=params, path=path)
-    result.check("largest kappa R sin(theta / 2)", float(bent.max()), params=params, path=path)
-    result.check(
-        "the state is stable",
-        path.stable is True,
-        reference=1.0,
-        source="asked",
-        tolerance=0.0,
-        params=params,
-        path=path,
-    )
+def _turn(theta: float) -> Callable[[Path], float]:
+    sine = math.sin(0.5 * theta)
+    return lambda path: float(crease_curvature(path[-1]).mean()) * RADIUS * sine
+
+
+def _share(energy: float) -> Callable[[Path], float]:
+    """Of the whole ring, over the closed form E R / (B w)."""
+
+    def read(path: Path) -> float:
+        width = 0.5 * float(np.ptp(np.linalg.norm(path.model.mesh.points[:, :2], axis=1)))
+        scale = path.model.sheet.bending_stiffness() * width / RADIUS * energy
+        return 4.0 * path[-1].energy.total / scale
+
+    return read

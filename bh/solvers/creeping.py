@@ -1,0 +1,17 @@
+"""When a way downhill has come next to its state, and only creeps along a mode that hardly resists."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+CREEPS = "creeps"  # why the globalised way of Newton's method gave up
+STEPS, LEAST = 8, 1e-6  # steps, and the part of the energy that all of them together gain where they creep
+
+
+def creeping(merits: Sequence[float]) -> bool:
+    """Have the last steps together gained next to nothing?
+
+    Args:
+        merits: of the states so far, N mm.
+    """
+    return len(merits) > STEPS and merits[-1 - STEPS] - merits[-1] < LEAST * abs(merits[-1])
