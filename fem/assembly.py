@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import KERNEL
 from bh.solvers.matrices import Storage, reverse_cuthill_mckee
 from bh.solvers.sparse import SparsePattern, band_is_cheaper
-from fem.points import KERNEL
 from meshes.curved import ElementMesh
 from meshes.topology import Ints
 

@@ -9,9 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from bh.runtime.kernel_options import INNER, KERNEL
 from fem.points import (
-    INNER,
-    KERNEL,
     combine,
     cross,
     curvature_hessian,

@@ -27,12 +27,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.runtime import kernel_options
+from bh.runtime.kernel_options import INNER, KERNEL
 
 Array = NDArray[np.float64]
-LOOSE = {"fastmath": {"contract", "nsz", "arcp"}}  # sums keep their order, nan and inf are heeded
-KERNEL = {**kernel_options.KERNEL, **LOOSE}
-INNER = {**kernel_options.INNER, **LOOSE}
 
 
 @njit(**INNER)
