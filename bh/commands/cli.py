@@ -19,6 +19,7 @@ from typing import Annotated
 
 import typer
 
+from bh.commands.bend import bend
 from bh.commands.compare import compare
 from bh.commands.flat import export
 from bh.commands.fold_options import fold
@@ -252,6 +253,7 @@ def run(
 app.command()(fold)
 app.command()(compare)
 app.command()(response)
+app.command()(bend)
 
 
 @app.command()
