@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-import bh
 from bh.applications.corrugation import Rig, fold, report, three_point
 from bh.applications.corrugation.report import folded_by
 from bh.commands.cli import main
@@ -86,9 +85,3 @@ def test_what_cannot_be_is_one_line(
     error = capsys.readouterr().err
     assert told in error
     assert error.count("\n") == 1
-
-
-def test_a_sheet_that_is_held_is_refused(scene: Path) -> None:
-    model = load_scene(scene).model.support("edge:inner", "xyz")
-    with pytest.raises(bh.ModelError, match="only a free sheet can be laid down"):
-        folded_by(model)
