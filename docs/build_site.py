@@ -44,10 +44,17 @@ PAGES = {
 # (EXTENSION; extending.md), and all modules of `fem` and `meshes`.
 PUBLIC = ("bh", "meshes")
 USE = (
-    "meshes.io", "bh.testing", "bh.applications.response", "bh.applications.comparison",
-    "bh.applications.corrugation.design", "bh.applications.inverse.reach", "bh.applications.inverse.tolerances",
-    "bh.analysis.richardson", "bh.analysis.shapes", "bh.paths.export",
-)  # fmt: skip
+    "meshes.io",
+    "bh.testing",
+    "bh.applications.response",
+    "bh.applications.comparison",
+    "bh.applications.corrugation.design",
+    "bh.applications.inverse.reach",
+    "bh.applications.inverse.tolerances",
+    "bh.analysis.richardson",
+    "bh.analysis.shapes",
+    "bh.paths.export",
+)
 EXTENSION = (
     "bh.model.step", "bh.model.supports", "bh.model.actuations", "bh.loading.builder", "bh.loading.load_step",
     "bh.formulations.protocols", "bh.formulations.registry", "bh.solvers.system",

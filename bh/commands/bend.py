@@ -53,7 +53,7 @@ def bend(  # noqa: PLR0913 - the options of a command line
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
-    """Bend a folded corrugation over two supports, and show its stiffness."""
+    """Bend a folded corrugation over supports; show its stiffness."""
     from bh.applications.corrugation import Rig, report
     from meshes.quantities import spoken
 

@@ -17,7 +17,7 @@ def legs(
     at: str | Sequence[int],
     along: Sequence[Sequence[float]],
     support: tuple[Constraint, ...] = (),
-    release: tuple[str | tuple[int, ...] | Constraint, ...] = (),
+    release: tuple[str | Sequence[int] | Constraint, ...] = (),
 ) -> tuple[Step, ...]:
     """The steps that move all nodes of a place alike from corner to corner of a path, in all three directions.
 

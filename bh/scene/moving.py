@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -28,7 +29,7 @@ def moved(
     step: dict[str, object],
     at: str,
     support: tuple[Constraint, ...],
-    release: tuple[str | tuple[int, ...], ...],
+    release: tuple[str | Sequence[int], ...],
 ) -> tuple[Step, ...]:
     """The steps of a table with the key `move`.
 
@@ -37,6 +38,9 @@ def moved(
         at: where it is in the scene.
         support: that comes in with it.
         release: places that it lets go of.
+
+    Returns:
+        a step a leg, in their order.
 
     Raises:
         SceneError: another actuation beside it, or a path that cannot be.

@@ -50,6 +50,9 @@ def tests(source: str | Model, depth: float, azimuths: Sequence[float], rig: Rig
         azimuths: of the bar from the x axis, rad.
         rig: supports and bar.
 
+    Returns:
+        a test a direction, in their order.
+
     Raises:
         ModelError: see `folded_by` and `three_point`.
     """
@@ -96,6 +99,9 @@ def as_dict(found: Sequence[BendingTest]) -> dict[str, object]:
 
     Args:
         found: tests of one corrugation.
+
+    Returns:
+        plain data.
     """
     return {
         "tests": [
