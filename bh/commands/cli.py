@@ -15,16 +15,20 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
 from types import FrameType
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bh.commands.bend import bend
 from bh.commands.compare import compare
 from bh.commands.flat import export
 from bh.commands.fold_options import fold
 from bh.commands.response import response
 from bh.runtime.consent import take_options
 from bh.runtime.terminal import say
+
+if TYPE_CHECKING:
+    from bh.paths.path import Path as Trace
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
@@ -105,6 +109,9 @@ def _run(words: list[str], debug: bool) -> int:
         take_back()
 
 
+LEFT_OUT = ("gmsh", "matplotlib", "plotly", "pyvista")  # by a light installation (docs/installation.md)
+
+
 def _was_interrupted(error: BaseException | None) -> bool:
     """Whether an interrupt is behind an error; Python 3.11 makes a RuntimeError of one while a class is made."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
@@ -124,6 +131,8 @@ def _explain(error: Exception, debug: bool) -> int:
     if hasattr(error, "format_message"):  # how typer tells a wrong command line
         command = getattr(getattr(error, "ctx", None), "command_path", "bh")
         return _fail(f"{error.format_message().rstrip('.')}; see '{command} --help'", 2, debug)
+    if isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] in LEFT_OUT:
+        return _fail(f"this needs {error.name}, which is not installed; pip install {error.name}", 2, debug)
     what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     return _fail(f"{what} (a fault of the program, please report it; --debug shows where)", 3, debug)
 
@@ -252,6 +261,7 @@ def run(
 app.command()(fold)
 app.command()(compare)
 app.command()(response)
+app.command()(bend)
 
 
 @app.command()
@@ -272,6 +282,10 @@ def view(
         typer.Option("--html", metavar="FILE.html", help="All states to turn in a browser; no window."),
     ] = None,
     state: Annotated[int, typer.Option("--state", help="Which state, from 0; -1 is the last.")] = -1,
+    frames: Annotated[
+        int | None, typer.Option("--frames", metavar="N", help="Of the animation; two seconds of them.")
+    ] = None,
+    fps: Annotated[int, typer.Option("--fps", metavar="N", help="Frames a second.")] = 24,
 ) -> None:
     """Show a state of a solved path, or draw it to a file."""
     from bh.commands.occupied import path_file
@@ -290,17 +304,29 @@ def view(
         bh.plotting.picture(solved[state], picture)
         say(f"wrote {picture}")
     if animation is not None:
-        say(f"wrote {bh.plotting.animation(solved, animation)}")
+        say(f"wrote {bh.plotting.animation(solved, animation, fps=fps, frames=frames)}")
     if html is not None:
         import bh.plotting.interactive
 
         say(f"wrote {bh.plotting.interactive.view(solved, title=path.name).save(html)}")
     if picture is vtu is animation is html is None:
-        try:
+        if bh.plotting.has_display():
             bh.plotting.show(solved[state])
-        except InputError as error:
-            again = shlex.join(["bh", "view", str(path), "--picture", "sheet.png"])
-            raise InputError(f"{error}, or {again}") from error
+        else:
+            _in_browser(solved, path)
+
+
+def _in_browser(solved: Trace, path: Path) -> None:
+    """Write the page that turns in a browser beside the path, and open it where $BROWSER says by what."""
+    import webbrowser
+
+    import bh.plotting.interactive
+
+    page = (path if path.is_dir() else path.parent) / "view.html"
+    page = bh.plotting.interactive.view(solved, title=path.name).save(page)
+    say(f"no display for a window; wrote {page}, to turn in a browser")
+    if os.environ.get("BROWSER"):  # else Python would take one that draws in the terminal
+        webbrowser.open(page.as_uri())
 
 
 app.command()(export)

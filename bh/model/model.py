@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from bh.errors import ModelError
 from bh.model.actuations import Displace, Fold, Force, Moment
 from bh.model.crease_law import CreaseLaw
+from bh.model.moving import legs
 from bh.model.pinch import Pinch
 from bh.model.sheet import ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
@@ -287,6 +288,15 @@ class Model:
             further: the same from where the node is when the step begins, mm; in place of `by`.
         """
         return self.step(Displace(at, direction, by, further))
+
+    def move(self, at: str | Sequence[int], along: Sequence[Sequence[float]]) -> Model:
+        """Add steps that move a place along a path of straight legs, all its nodes alike; see `bh.model.moving.legs`.
+
+        Args:
+            at: name of a place, or node indices.
+            along: (k, 3) corners of the path, mm from where each node is when it begins.
+        """
+        return replace(self, steps=(*self.steps, *legs(at, along)))
 
 
 def _places(given: Place | Sequence[Place | Constraint]) -> tuple[Place | Constraint, ...]:

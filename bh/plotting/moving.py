@@ -12,14 +12,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.plotting.frames import evenly
 from bh.plotting.offscreen import PlotError
+from bh.plotting.pictures import moving_pictures
 from meshes.io.export import replacing
 
 if TYPE_CHECKING:
     from bh.paths.path import Path
 
 ENDINGS = (".gif", ".mp4")
-HOLD = 8  # frames that the last one is shown for
+HOLD = 1.0  # s that the last frame is shown for
+MOST = 5000  # frames
 
 
 def animation(
@@ -28,24 +31,29 @@ def animation(
     colour: str | None = "bending",
     size: tuple[int, int] = (800, 600),
     *,
-    fps: int = 10,
+    fps: int = 24,
     states: Sequence[int] | None = None,
+    frames: int | None = None,
 ) -> FilePath:
-    """Write the states of a path as a moving picture, seen from one place and on one scale of colours.
+    """Write a path as a moving picture, seen from one place and on one scale of colours.
+
+    Frames are at even distances along the motion; those between two states of the path are solved
+    (`bh.plotting.frames.evenly`).
 
     Args:
         path: solved, as far as it goes.
         file: to write, .gif or .mp4; appears whole or not at all.
         colour: as for `picture`.
         size: width and height, pixels.
-        fps: states a second, 1 to 50.
-        states: which states, all by default.
+        fps: frames a second, 1 to 50.
+        states: show just these states of the path, a frame each, in place of even frames.
+        frames: how many, 2 to 5000; two seconds of them unless given.
 
     Returns:
         The absolute path of the file.
 
     Raises:
-        PlotError: no states, a size or rate that cannot be, or no ffmpeg for .mp4.
+        PlotError: no states, a size, rate or number of frames that cannot be, or no ffmpeg for .mp4.
         FileFormatError: the file cannot be written.
     """
     target = FilePath(file)
@@ -54,28 +62,21 @@ def animation(
         raise PlotError(f"animation '{target}' is neither .gif nor .mp4; name it so")
     if not 1 <= fps <= 50:
         raise PlotError(f"fps = {fps} cannot be; give 1 to 50")
-    chosen = list(range(len(path))) if states is None else list(states)
-    if not chosen:
+    if frames is not None and (states is not None or not 2 <= frames <= MOST):
+        raise PlotError(f"frames = {frames} cannot be; give 2 to {MOST}, and no states beside them")
+    if len(path) == 0 or (states is not None and not states):
         raise PlotError("the path has no states to show; trace the model first")
     program = _ffmpeg() if ending == ".mp4" else ""
-    pictures = _pictures(path, chosen, colour, size)
-    pictures += [pictures[-1]] * HOLD
+    shown = evenly(path, frames or 2 * fps) if states is None else [path[index] for index in states]
+    # an even number of pixels, as video takes no other
+    pictures = moving_pictures(shown, colour, (size[0] // 2 * 2, size[1] // 2 * 2))
+    pictures += [pictures[-1]] * round(HOLD * fps)
     with replacing(target) as temporary:
         if ending == ".gif":
             _gif(pictures, temporary, fps)
         else:
             _mp4(pictures, temporary, fps, program)
     return target.resolve()
-
-
-def _pictures(
-    path: Path, chosen: Sequence[int], colour: str | None, size: tuple[int, int]
-) -> list[NDArray[np.uint8]]:
-    """(height, width, 3) of every state."""
-    from bh.plotting.pictures import moving_pictures
-
-    # an even number of pixels, as video takes no other
-    return moving_pictures([path[index] for index in chosen], colour, (size[0] // 2 * 2, size[1] // 2 * 2))
 
 
 def _gif(pictures: Sequence[NDArray[np.uint8]], file: FilePath, fps: int) -> None:

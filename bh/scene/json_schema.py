@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from bh.scene import tables
 from bh.scene.bodies import BODIES
+from bh.scene.moving import MoveTable
 from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import Table
 
@@ -44,6 +45,7 @@ def schema() -> Schema:
     acting = {**tables.ACTUATIONS, **BODIES}
     steps = {key: _one_or_more(_table(found, kind)) for key, kind in acting.items()}
     steps["until"] = _table(found, tables.UntilTable)
+    steps["move"] = _table(found, MoveTable)
     support: Schema = {"anyOf": [_table(found, tables.SupportTable), OWN]}
     steps |= {"support": _one_or_more(support), "hold": PLACES, "release": PLACES}
     scene = {

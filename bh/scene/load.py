@@ -30,6 +30,7 @@ from bh.scene.changes import set_keys
 from bh.scene.contact import contact_of
 from bh.scene.crease_tables import crease_law
 from bh.scene.meshing import Drawn, mesh_of
+from bh.scene.moving import moved
 from bh.scene.reading import (
     arguments,
     as_table,
@@ -217,19 +218,21 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
+    asked = [_steps(item, f"steps[{i}]") for i, item in enumerate(steps)]
+    numbers = [i for i, legs in enumerate(asked) for _ in legs]
     drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data)
     model = Model(
         mesh=drawn.mesh,
         sheet=_sheet(sheet),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
-        steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(steps)),
+        steps=tuple(step for legs in asked for step in legs),
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
         hinge_lock=how.hinge_lock,
         contact=contact_of(data.get("contact", False)),
     )
-    _check_names(model)
-    _check_steps(model)
+    _check_names(model, numbers)
+    _check_steps(model, numbers)
     return Scene(
         model,
         Outputs(**arguments(outputs)),
@@ -321,11 +324,18 @@ def _crease(item: object, at: str) -> CreaseLaw:
         return CreaseLaw(table.Lstar, table.stiffness, table.rest, law)
 
 
-def _step(item: object, at: str) -> Step:
+def _steps(item: object, at: str) -> tuple[Step, ...]:
+    """The step of a table, or those of its move."""
     step = as_table(item, at)
-    check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTING, "until", *CHANGES))
+    check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTING, "move", "until", *CHANGES))
     if not set(step) - {"until"}:
-        raise SceneError(f"{at} is empty; add one of {', '.join((*ACTING, *CHANGES))}")
+        raise SceneError(f"{at} is empty; add one of {', '.join((*ACTING, 'move', *CHANGES))}")
+    if "move" in step:
+        return moved(step, at, *_changes(step, at))
+    return (_step(step, at),)
+
+
+def _step(step: dict[str, object], at: str) -> Step:
     found: list[Actuation] = []
     until = None
     support, release = _changes(step, at)
@@ -393,15 +403,15 @@ def _check_place(model: Model, support: Constraint, at: str) -> None:
             select(model.mesh, support.at)
 
 
-def _check_names(model: Model) -> None:
-    """Are all places and creases there? Errors tell where in the scene it is."""
+def _check_names(model: Model, numbers: Sequence[int]) -> None:
+    """Are all places and creases there? Errors tell where in the scene it is, by the `numbers` of its steps."""
     mesh = model.mesh
     for name in model.creases:
         with within(f"creases.{name}"):
             mesh.crease_edges(name)
     for i, support in enumerate(model.supports):
         _check_place(model, support, f"supports[{i}].at")
-    for i, asked in enumerate(model.steps):
+    for i, asked in zip(numbers, model.steps, strict=True):
         for support in asked.support:
             _check_place(
                 model, support, f"steps[{i}].{'hold' if isinstance(support, Hold) else 'support.at'}"
@@ -417,18 +427,18 @@ def _check_names(model: Model) -> None:
                     select(mesh, item.at)
 
 
-def _check_steps(model: Model) -> None:
-    """Can the steps be programmed?"""
+def _check_steps(model: Model, numbers: Sequence[int]) -> None:
+    """Can the steps be programmed? Errors tell which of the scene cannot, by the `numbers` of its steps."""
     try:
         steps = load_steps(model)
     except InputError:
         for i in range(len(model.steps)):  # the first step that the sheet cannot take
-            with within(f"steps[{i}]"):
+            with within(f"steps[{numbers[i]}]"):
                 load_steps(replace(model, steps=model.steps[: i + 1]))
         raise
     for i, step in enumerate(steps):
         if any(each.looks_back for each in model.steps[1 : i + 1]):
             break  # what is held in these is known when it has been solved
         if step.constraints.rigid_body and step.force.end.any():  # forces on a free sheet have to balance
-            with within(f"steps[{i}]"):
+            with within(f"steps[{numbers[i]}]"):
                 formulation(model.formulation).system(model, step, None)

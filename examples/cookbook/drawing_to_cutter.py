@@ -9,10 +9,9 @@ import numpy as np
 
 import bh
 import meshes.io
-from bh.commands.cli import main
 
 drawing = Path(__file__).parent.parent / "wave.svg"
-assert main(["export", str(drawing), "drawing_to_cutter.dxf"]) == 0
+meshes.io.write_pattern("drawing_to_cutter.dxf", meshes.io.drawn_lines(drawing))
 drawn, cut = (meshes.io.read_pattern(file) for file in (drawing, "drawing_to_cutter.dxf"))
 assert [crease.name for crease in drawn.creases] == [crease.name for crease in cut.creases]
 found = np.abs(drawn.rings[0] - cut.rings[0]).max()  # mm

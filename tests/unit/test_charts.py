@@ -15,7 +15,7 @@ import bh
 import meshes
 from bh import plotting
 from bh.model.actuations import Displace
-from bh.plotting import moving, offscreen
+from bh.plotting import frames, moving, offscreen
 from meshes.errors import InputError
 from tests.unit.test_plotting import needs_opengl
 
@@ -110,7 +110,10 @@ def test_pattern_shows_creases_and_supports() -> None:
         (lambda path: plotting.animation(path, "a.avi"), "neither .gif nor .mp4"),
         (lambda path: plotting.animation(path, "a.gif", fps=0), "fps = 0 cannot be"),
         (lambda path: plotting.animation(bh.Path(path.model), "a.gif"), "no states to show"),
-        (lambda path: plotting.animation(path, "a.gif", size=(10, 10)), "size 10 x 10 cannot be"),
+        (lambda path: plotting.animation(path, "a.gif", size=(10, 10), frames=2), "size 10 x 10 cannot be"),
+        (lambda path: plotting.animation(path, "a.gif", frames=1), "frames = 1 cannot be; give 2 to 5000"),
+        (lambda path: plotting.animation(path, "a.gif", frames=9, states=[0]), "and no states beside them"),
+        (lambda path: plotting.animation(path, "a.gif", states=[]), "no states to show"),
     ],
 )
 def test_bad_requests_are_refused_in_one_line(path: bh.Path, draw: Any, message: str) -> None:
@@ -151,3 +154,33 @@ def test_mp4_is_written(path: bh.Path, tmp_path: Path) -> None:
         pytest.skip(str(error))
     file = plotting.animation(path, tmp_path / "lift.mp4", size=(320, 240), states=[0, -1])
     assert file.read_bytes()[4:8] == b"ftyp"
+
+
+@pytest.mark.parametrize("formulation", ["bars-and-hinges", "consistent"])
+def test_frames_are_even_and_in_balance(formulation: str) -> None:
+    """Two states 90 degrees apart and back by 60: what is between them is solved, and moves on by equal steps."""
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.785), along=12, rows=1)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, nu=0.3, t=0.2), formulation=formulation)
+    path = bh.trace(model.fold("crease", by=1.57).fold("crease", by=0.5), estimate=False)
+    assert len(path) < 12
+    shown = frames.evenly(path, 25)
+    assert len(shown) == 25
+    assert shown[0].energy.total == path[0].energy.total
+    assert shown[-1].energy.total == path[-1].energy.total
+    moved = [float(np.sqrt(np.mean((b.points - a.points) ** 2))) for a, b in itertools.pairwise(shown)]
+    assert max(moved) < 3.0 * float(np.median(moved))
+    energies = [state.energy.total for state in shown]
+    turn = energies.index(max(energies))
+    assert energies[: turn + 1] == sorted(energies[: turn + 1])  # no frame is stretched by blending
+    assert energies[turn:] == sorted(energies[turn:], reverse=True)
+    assert max(energies) <= max(state.energy.total for state in path) * (1.0 + 1e-9)
+
+
+def test_frames_where_nothing_can_be_solved_between() -> None:
+    """A path that goes on to another state at a snap shows its states, as often as there are frames."""
+    mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 0.785), along=6, rows=1)
+    path = bh.trace(bh.Model(mesh, bh.Sheet(E=4000.0, t=0.2)).fold("crease", by=0.5), estimate=False)
+    path.records[1:] = [dataclasses.replace(record, jumped=True) for record in path.records[1:]]
+    shown = frames.evenly(path, 9)
+    assert len(shown) == 9
+    assert {state.lam for state in shown} <= {state.lam for state in path}

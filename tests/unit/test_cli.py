@@ -481,6 +481,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> Any:
         lambda path, folder, *name: calls.append(("series", str(folder))),
     )
     monkeypatch.setattr(bh.plotting, "show", lambda state, **_: calls.append(("show", state.lam)))
+    monkeypatch.setattr(bh.plotting, "has_display", lambda: True)
     return calls
 
 
@@ -527,6 +528,44 @@ def test_view(here: Any, drawn: Any, capsys: pytest.CaptureFixture[str]) -> None
     assert main(["view", "out", "--animation", "folding.avi"]) == 2
     assert "neither .gif nor .mp4" in capsys.readouterr().err
     assert len(drawn) == 3  # no window was opened for these
+
+
+def test_view_without_a_display_is_a_page(here: Any, capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    import webbrowser
+
+    import bh.plotting
+
+    opened: list[str] = []
+    monkeypatch.setattr(bh.plotting, "has_display", lambda: False)
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
+    for browser, times in (("", 0), ("some-browser", 1)):
+        monkeypatch.setenv("BROWSER", browser)
+        assert main(["view", "out"]) == 0
+        assert "no display for a window; wrote" in capsys.readouterr().out
+        assert opened == [Path("out/view.html").resolve().as_uri()] * times
+    assert '<div class="sheet3d"' in Path("out/view.html").read_text(encoding="utf-8")
+    assert main(["view", "out", "--animation", "a.gif", "--frames", "1"]) == 2
+    assert "frames = 1 cannot be; give 2 to 5000" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["matplotlib", "pyvista"])
+def test_what_a_light_installation_leaves_out_is_one_line(
+    name: str, here: Any, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And a module of our own that is missing stays a fault of the program."""
+    import bh.plotting
+
+    def missing(*_: object, **__: object) -> None:
+        raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+
+    assert main(["run", "good.toml", "-o", "out", "-q"]) == 0
+    monkeypatch.setattr(bh.plotting, "picture", missing)
+    assert main(["view", "out", "--picture", "a.png"]) == 2
+    told = capsys.readouterr().err
+    assert told == f"bh: this needs {name}, which is not installed; pip install {name}\n"
+    monkeypatch.setattr(bh.plotting, "picture", lambda *_: __import__("bh.nothing"))
+    assert main(["view", "out", "--picture", "a.png"]) == 3
 
 
 # --- the command itself ------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bh.scene import bodies as scene_bodies
-from bh.scene import crease_tables
+from bh.scene import crease_tables, moving
 from bh.scene import patterns as scene_patterns
 from bh.scene import reading as scene_tables
 from bh.scene import tables as schema
@@ -39,6 +39,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: moment": schema.MomentTable,
     "steps: force": schema.ForceTable,
     "steps: displace": schema.DisplaceTable,
+    "steps: move": moving.MoveTable,
     "steps: pull": schema.PullTable,
     "steps: weight": schema.WeightTable,
     "steps: press": scene_bodies.PressTable,
@@ -77,7 +78,7 @@ def test_tables_are_those_of_the_schema(title: str) -> None:
 def test_nothing_is_left_out() -> None:
     every = {
         kind
-        for kind in (vars(schema) | vars(scene_patterns) | vars(scene_bodies)).values()
+        for kind in (vars(schema) | vars(scene_patterns) | vars(scene_bodies) | vars(moving)).values()
         if isinstance(kind, type) and issubclass(kind, scene_tables.Table)
     }
     assert set(TABLES.values()) == every - {scene_tables.Table, scene_patterns.PatternTable}
