@@ -380,3 +380,14 @@ def test_what_draws_no_line_is_not_read(tmp_path: Path) -> None:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 99 99">{inside}</svg>', encoding="utf-8"
     )
     assert [stroke.colour for stroke in svg.read_svg(file).strokes] == [(0, 0, 255)] * 2
+
+
+def test_references_to_blocks_count_as_what_ezdxf_makes_of_them(tmp_path: Path) -> None:
+    """Refused before ezdxf reads them; 19,000 of them took 11 s of processor time."""
+    references = "0\nINSERT\n2\nB\n10\n0\n20\n0\n" * 7_000
+    file = tmp_path / "bomb.dxf"
+    file.write_text(f"0\nSECTION\n2\nENTITIES\n{references}0\nENDSEC\n0\nEOF\n", encoding="utf-8")
+    began = time.process_time()
+    with pytest.raises(FileFormatError, match=r"this drawing has 21,\d* entities, more than 20,000"):
+        read_pattern(file)
+    assert time.process_time() - began < 1.0
