@@ -26,6 +26,12 @@ class Limits:
         triangles: of a mesh; gmsh makes some twenty thousand a second, a million take gigabytes to solve.
         entities: of a drawing's file, every <use> and block written out; rows of a .cp file; vertices, edges or
             faces of a frame of a FOLD file.
+        attributes: of an SVG file, those of groups counted again for every element in them, since they are handed down.
+        transforms: of an SVG file in the same way; some 50 microseconds each to read.
+        style_characters: of the style sheets of an SVG file.
+        attribute_characters: of one attribute of an SVG file that is no path, and no editor's own.
+        clips: elements of an SVG file that are clipped, some 3 ms each.
+        clip_vertices: of clip paths, counted again for every line that they cut; up to 30 microseconds each.
         lines: of a drawing, without those that are ignored.
         vertices: of a drawing's lines, once curves are chords; numbers of its paths, values of a DXF file.
         crossings: of a drawing's lines where none has a node.
@@ -39,6 +45,12 @@ class Limits:
     entries: int = 100_000
     triangles: int = 250_000
     entities: int = 20_000
+    attributes: int = 1_000_000
+    transforms: int = 60_000
+    style_characters: int = 100_000
+    attribute_characters: int = 10_000
+    clips: int = 1_000
+    clip_vertices: int = 50_000
     lines: int = 5_000
     vertices: int = 100_000
     crossings: int = 5_000

@@ -21,10 +21,16 @@ from meshes.errors import FileFormatError
 from meshes.io.files import drawing_bytes
 from meshes.io.strokes import Colour, Dash, Stroke, Strokes, always, dash_kind, drawn_curve
 from meshes.io.svg_tree import CLIP, CLIP_SHAPE, svg_tree
+from meshes.limits import check_limit
 
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 PIXELS = 96.0  # an inch, as CSS has it
 FINE = 2e-5  # of the size of what is clipped
+MOST_CROSSINGS, MOST_CROSSED = (
+    50,
+    2_000,
+)  # crossings of a clip path with itself, and points of one that has any
+LONGEST_COLOUR = 100  # characters
 
 
 def read_svg(path: str | os.PathLike[str]) -> Strokes:
@@ -71,7 +77,7 @@ def read_svg(path: str | os.PathLike[str]) -> Strokes:
 
 
 def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
-    number = 0
+    number, clipping = 0, 0
     for shape, layer, clips in _shapes(se, picture, "", ()):
         colour, unknown = _colour(shape)
         if (colour is None and not unknown) or _hidden(shape):
@@ -94,7 +100,15 @@ def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
                 f"id:{shape.id}" if shape.id else "",
                 curve,
             )
-            yield from _clipped(stroke, clips)
+            cutting = _cutting(stroke, clips)
+            clipping += sum(_vertices(region) for region in cutting)
+            check_limit(
+                "clip_vertices",
+                clipping,
+                "this drawing, counted for every line that is cut,",
+                FileFormatError,
+            )
+            yield from _clipped(stroke, cutting)
 
 
 def _segments(se: Any, shape: Any) -> Iterator[tuple[int, list[Any]]]:
@@ -158,8 +172,47 @@ def _region(se: Any, group: Any) -> Any:
         for _, segments in _parts(se, path):
             points = drawn_curve(_curve(se, segments), "a clip path")(max(FINE * size, 1e-12))
             if len(points) > 2:
-                areas.append(shapely.make_valid(shapely.Polygon(points)))
-    return shapely.union_all(areas)
+                areas.append(_area(points))
+    region = shapely.union_all(areas)
+    shapely.prepare(region)
+    return region
+
+
+def _cutting(stroke: Stroke, clips: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The regions that do not hold the whole stroke."""
+    return tuple(region for region in clips if not region.covers(_fine(stroke)[0]))
+
+
+def _fine(stroke: Stroke) -> tuple[Any, float]:
+    """A stroke as a line of shapely, and its size, in units of the drawing."""
+    import shapely
+
+    size = float(np.ptp(stroke.sample(np.inf), axis=0).max()) or 1.0
+    return shapely.LineString(stroke.sample(FINE * size)), size
+
+
+def _vertices(region: Any) -> int:
+    import shapely
+
+    return int(shapely.get_num_coordinates(region))
+
+
+def _area(points: np.ndarray) -> Any:
+    """The area in a closed line of points, (n, 2), also where it crosses itself."""
+    import shapely
+
+    area = shapely.Polygon(points)
+    if area.is_valid:
+        return area
+    ring = np.vstack([points, points[:1]])
+    pieces = shapely.linestrings(np.stack([ring[:-1], ring[1:]], axis=1))
+    if len(pieces) <= MOST_CROSSED:
+        first, second = shapely.STRtree(pieces).query(pieces, predicate="intersects")
+        if np.count_nonzero(second - first > 1) <= MOST_CROSSINGS:
+            return shapely.make_valid(area)
+    raise FileFormatError(  # shapely took 29 s for a star of 300 points
+        f"a clip path crosses itself more than {MOST_CROSSINGS} times; release the clipping in the drawing program"
+    )
 
 
 def _clipped(stroke: Stroke, clips: tuple[Any, ...]) -> Iterator[Stroke]:
@@ -169,9 +222,7 @@ def _clipped(stroke: Stroke, clips: tuple[Any, ...]) -> Iterator[Stroke]:
     if not clips:
         yield stroke
         return
-    rough = stroke.sample(np.inf)
-    size = float(np.ptp(rough, axis=0).max()) or 1.0
-    whole = shapely.LineString(stroke.sample(FINE * size))
+    whole, size = _fine(stroke)
     left = whole
     for region in clips:
         left = left.intersection(region.buffer(1e-6 * size))
@@ -204,6 +255,8 @@ def _colour(shape: Any) -> tuple[Colour | None, str]:
 def _colour_of(word: str) -> tuple[Colour | None, str]:
     from tinycss2 import color5
 
+    if len(word) > LONGEST_COLOUR:
+        return None, word[:LONGEST_COLOUR] + "..."
     found = color5.parse_color(word)
     try:
         red, green, blue, alpha = found.to("srgb")

@@ -7,13 +7,12 @@ percentages become lengths, clip paths are laid beside what they clip, and names
 from __future__ import annotations
 
 import copy
-import io
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from meshes.errors import FileFormatError
+from meshes.io.svg_counts import NOTHING, Counter, Load, style_rules
 from meshes.limits import check_limit
 
 Element = ElementTree.Element
@@ -28,6 +27,8 @@ _PERCENT = {
     "r": 2,
 }  # fmt: skip
 _SIZED = {"rect", "circle", "ellipse", "line", "use", "svg", "image"}
+_NO_LINES = {"symbol", "clipPath", "marker", "pattern", "mask", "image"}
+_SHAPES = {"d": {"path"}, "points": {"polyline", "polygon"}}  # what has them by right
 _UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "cm": 96.0 / 2.54, "mm": 96.0 / 25.4, "pt": 96.0 / 72.0, "pc": 16.0}
 
 
@@ -61,14 +62,19 @@ def svg_tree(data: bytes) -> Tree:
     # an element has one or two angle brackets
     check_limit("entities", data.count(b"<") / 2.0, "this drawing", FileFormatError)
     try:
-        root = ElementTree.parse(io.BytesIO(data)).getroot()
+        root = ElementTree.fromstring(
+            data
+        )  # at once: in pieces, a long attribute is read again with each of them
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise FileFormatError(f"this is not XML ({error}); save the drawing as SVG again") from error
     if _tag(root) != "svg":
         raise FileFormatError("the file has no <svg> element; save the drawing as SVG")
-    numbers = sum(_separators(e.get(key, "")) for e in root.iter() for key in ("d", "points"))
-    check_limit("vertices", numbers, "this drawing", FileFormatError)
-    writer = _Writer({e.get("id", ""): e for e in root.iter() if e.get("id")}, _clip_classes(root))
+    sheets = _styles(root)
+    rules = style_rules([sheet.text or "" for sheet in sheets])
+    for sheet, text in zip(sheets, rules.text, strict=True):
+        sheet.text = text
+    by_id = {e.get("id", ""): e for e in root.iter() if e.get("id")}
+    writer = _Writer(by_id, Counter(rules))
     width, height = root.get("width", ""), root.get("height", "")
     out = writer.write(root, _viewport(root, None), ())
     pixels = all(re.fullmatch(r"\s*[\d.]+\s*(px)?\s*", value) for value in (width, height))
@@ -119,35 +125,32 @@ def _frame(element: Element, around: Viewport) -> _Frame:
 @dataclass
 class _Writer:
     by_id: dict[str, Element]
-    clip_of_class: dict[str, str]
+    counter: Counter
     written: int = 0
     clips: int = 0
 
-    def write(self, element: Element, view: Viewport, inside: tuple[str, ...], deep: int = 0) -> Element:
+    def write(
+        self, element: Element, view: Viewport, inside: tuple[str, ...], deep: int = 0, above: Load = NOTHING
+    ) -> Element:
         """A copy of an element with everything in it; `inside` are the ids that are being written out around it."""
         self.written += 1
         check_limit("entities", self.written, "this drawing, every <use> written out,", FileFormatError)
         if deep > DEEPEST:
             raise FileFormatError(f"the drawing has groups in groups, more than {DEEPEST} deep; ungroup it")
+        above = self.counter.carried(element, _tag(element), above)
         if _tag(element) == "use":
-            return self._used(element, view, inside, deep)
+            return self._used(element, view, inside, deep, above)
         out = self._copied(element, view)
         frame = None
         if _tag(element) == "svg" and deep:
             frame = _frame(out, view)
             view = _viewport(out, view)
         for child in element:
-            if isinstance(child.tag, str) and _tag(child) not in (
-                "symbol",
-                "clipPath",
-                "marker",
-                "pattern",
-                "mask",
-            ):
-                out.append(self.write(child, view, inside, deep + 1))
+            if isinstance(child.tag, str) and _tag(child) not in _NO_LINES:
+                out.append(self.write(child, view, inside, deep + 1, above))
         if frame is not None:
             out = self._framed(out, frame)
-        return self._clipped(element, out, view, inside, deep)
+        return self._clipped(element, out, view, inside, deep, above)
 
     def _framed(self, inner: Element, frame: _Frame) -> Element:
         """An svg within another as a group, placed by its viewBox and clipped to its frame."""
@@ -168,7 +171,13 @@ class _Writer:
 
     def _copied(self, element: Element, view: Viewport) -> Element:
         out = Element(element.tag, dict(element.attrib))
-        out.text, out.tail = element.text, element.tail
+        if _tag(element) == "style":  # other texts are no lines
+            out.text = element.text
+        for key, tags in _SHAPES.items():  # svgelements would hand them down
+            if _tag(element) not in tags:
+                out.attrib.pop(key, None)
+        if _tag(element) == "path":
+            out.attrib.setdefault("d", "")
         if _tag(element) in _SIZED:
             for key, axis in _PERCENT.items():
                 value = out.get(key, "").strip()
@@ -179,7 +188,9 @@ class _Writer:
                         out.set(key, repr(share / 100.0 * length))
         return out
 
-    def _used(self, element: Element, view: Viewport, inside: tuple[str, ...], deep: int) -> Element:
+    def _used(
+        self, element: Element, view: Viewport, inside: tuple[str, ...], deep: int, above: Load
+    ) -> Element:
         """`use` as a group; a symbol or an svg in it as an svg of the size that is asked for."""
         name = (element.get("href") or element.get(XLINK) or "").removeprefix("#")
         if name in inside:
@@ -194,11 +205,17 @@ class _Writer:
         if target is not None:
             if _tag(target) in ("symbol", "svg"):
                 target = _as_svg(target, wanted)
-            group.append(self.write(target, view, (*inside, name), deep + 1))
-        return self._clipped(element, group, view, inside, deep)
+            group.append(self.write(target, view, (*inside, name), deep + 1, above))
+        return self._clipped(element, group, view, inside, deep, above)
 
     def _clipped(
-        self, element: Element, out: Element, view: Viewport, inside: tuple[str, ...], deep: int
+        self,
+        element: Element,
+        out: Element,
+        view: Viewport,
+        inside: tuple[str, ...],
+        deep: int,
+        above: Load,
     ) -> Element:
         """The element beside what clips it, in a group that a reader can tell (`CLIP`)."""
         name = self._clip_of(element)
@@ -206,6 +223,7 @@ class _Writer:
         if region is None or name in inside or _tag(region) != "clipPath":
             return out
         self.clips += 1
+        check_limit("clips", self.clips, "this drawing", FileFormatError)
         group = Element(f"{SVG}g", {CLIP: str(self.clips)})
         if out.get("transform"):  # a clip path is in the coordinates of what it clips
             group.set("transform", out.attrib.pop("transform"))
@@ -214,7 +232,7 @@ class _Writer:
             shapes.set("transform", str(region.get("transform")))
         for child in region:
             if isinstance(child.tag, str):
-                shapes.append(self.write(child, view, (*inside, str(name)), deep + 1))
+                shapes.append(self.write(child, view, (*inside, str(name)), deep + 1, above))
         group.extend([shapes, out])
         return group
 
@@ -222,31 +240,13 @@ class _Writer:
         style = re.search(r"clip-path\s*:\s*([^;]+)", element.get("style", ""))
         value = style.group(1) if style else element.get("clip-path")
         for word in element.get("class", "").split():
-            value = value or self.clip_of_class.get(word)
+            value = value or self.counter.rules.clips.get(word)
         found = re.match(r"""url\(\s*['"]?#([^)'"]+)""", (value or "").strip())
         return found.group(1) if found else None
 
 
-def _clip_classes(root: Element) -> dict[str, str]:
-    """Clip paths of classes in style sheets, as Illustrator writes them."""
-    import tinycss2
-
-    found: dict[str, str] = {}
-    for sheet in _styles(root):
-        for rule in tinycss2.parse_stylesheet(sheet, skip_comments=True, skip_whitespace=True):
-            if rule.type != "qualified-rule":
-                continue
-            for item in tinycss2.parse_blocks_contents(rule.content):
-                if item.type == "declaration" and item.lower_name == "clip-path":
-                    for selector in tinycss2.serialize(rule.prelude).split(","):
-                        found[selector.strip().removeprefix(".")] = tinycss2.serialize(item.value)
-    return found
-
-
-def _styles(root: Element) -> Iterator[str]:
-    for element in root.iter():
-        if isinstance(element.tag, str) and _tag(element) == "style" and element.text:
-            yield element.text
+def _styles(root: Element) -> list[Element]:
+    return [e for e in root.iter() if isinstance(e.tag, str) and _tag(e) == "style" and e.text]
 
 
 def _as_svg(target: Element, wanted: Element) -> Element:
@@ -284,11 +284,6 @@ def _number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
-
-
-def _separators(text: str) -> int:
-    """About how many numbers a path has."""
-    return max(text.count(" ") + text.count(","), text.count("."), text.count("-"))
 
 
 def _tag(element: Element) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
 from pathlib import Path
@@ -16,7 +17,7 @@ import bh
 import meshes
 from bh.sweep.file import load_sweep
 from meshes.choices import first_mesh
-from meshes.errors import InputError
+from meshes.errors import FileFormatError, InputError
 from meshes.io import read_fold, read_pattern, svg
 from meshes.limits import Limits, limits
 
@@ -300,3 +301,93 @@ def test_panels_are_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
     first_mesh(pattern)
     monkeypatch.setattr(type(pattern.rails[0]), "length", property(lambda _: 1 / 0))
     assert len(pattern.panel_sizes[0]) == 3
+
+
+LINE = '<line x1="1" y1="1" x2="9" y2="9" stroke="red"/>'
+PATH = '<path id="p" fill="none" stroke="red" d="M 1 1 L 2 2 L 3 3"/>'
+MANY = " ".join(f'a{n}=""' for n in range(200))
+USE = '<use href="#p"/>'
+CLIP = '<clipPath id="c"><path d="{}"/></clipPath>'
+CLIPPED = LINE.replace("/>", ' clip-path="url(#c)"/>')
+ANGLES = [1.01 * n * math.pi for n in range(99)]
+STAR = "M" + " L".join(f"{50 + 40 * math.cos(angle):.3f} {50 + 40 * math.sin(angle):.3f}" for angle in ANGLES)
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "inside", "words"),
+    [
+        (
+            "transforms",
+            100,
+            f'<g transform="{"rotate(1) " * 40}">{3 * LINE}</g>',
+            "120 transforms, more than 100",
+        ),
+        (
+            "transforms",
+            100,
+            f'<g transform="translate(1{" " * 900},1)">{9 * LINE}</g>',
+            "transforms, more than 100",
+        ),
+        (
+            "transforms",
+            100,
+            f"<style>g{{transform:{'rotate(1) ' * 40}}}</style><g>{3 * LINE}</g>",
+            "transforms, more",
+        ),
+        ("attributes", 1000, f"<g {MANY}>{9 * LINE}</g>", "attributes, more than"),
+        ("attributes", 1000, f"<style>{'*{a:b}' * 200}</style>{9 * LINE}", "attributes, more than 1,000"),
+        (
+            "style_characters",
+            50,
+            f"<style>{'a{' * 50}</style>{LINE}",
+            "sheets of this drawing has 100 style char",
+        ),
+        (
+            "attribute_characters",
+            1500,
+            LINE.replace("red", "r" * 2000),
+            "'stroke' of an element has 2,000 attribute",
+        ),
+        ("vertices", 20, f"<defs>{PATH}</defs>{9 * USE}", "vertices, more"),
+        ("clips", 5, CLIP.format("M0 0 L9 0 L9 9 Z") + 9 * CLIPPED, "6 clips, more than 5"),
+        ("clip_vertices", 10, CLIP.format("M0 0 L5 0 L5 5 Z") + 9 * CLIPPED, "clip vertices, more than 10"),
+        ("clips", 5, f"<style>a{{b:{'(' * 5000}{')' * 5000}}}</style>{LINE}", "brackets in brackets"),
+        ("clips", 5, CLIP.format(STAR) + CLIPPED, "crosses itself more than 50 times"),
+    ],
+)
+def test_svg_files_are_counted_before_they_are_read(
+    name: str, most: int, inside: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(f"BH_LIMIT_{name.upper()}", str(most))
+    file = tmp_path / "bomb.svg"
+    file.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 99 99">{inside}</svg>', encoding="utf-8"
+    )
+    with pytest.raises(FileFormatError, match=words):
+        svg.read_svg(file)
+
+
+def test_what_draws_no_line_is_not_read(tmp_path: Path) -> None:
+    """Pictures, long texts of editors, and paths' numbers on a group; style sheets keep their lines' colours."""
+    sheet = "/* made by */ .a , line.b { stroke : #00f !important } @media print { .a { stroke: red } } c{c{"
+    inside = (
+        f'<style>{sheet}</style><image width="1" height="1" href="data:image/png;base64,{"A" * 50_000}"/>'
+        f'<g d="M 1 1 L 2 2" data-editor="{"x" * 50_000}"><path stroke="red"/></g>'
+        '<line class="a" x1="1" y1="1" x2="9" y2="9"/><line class="b" x1="1" y1="1" x2="9" y2="9"/>'
+    )
+    file = tmp_path / "odd.svg"
+    file.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 99 99">{inside}</svg>', encoding="utf-8"
+    )
+    assert [stroke.colour for stroke in svg.read_svg(file).strokes] == [(0, 0, 255)] * 2
+
+
+def test_references_to_blocks_count_as_what_ezdxf_makes_of_them(tmp_path: Path) -> None:
+    """Refused before ezdxf reads them; 19,000 of them took 11 s of processor time."""
+    references = "0\nINSERT\n2\nB\n10\n0\n20\n0\n" * 7_000
+    file = tmp_path / "bomb.dxf"
+    file.write_text(f"0\nSECTION\n2\nENTITIES\n{references}0\nENDSEC\n0\nEOF\n", encoding="utf-8")
+    began = time.process_time()
+    with pytest.raises(FileFormatError, match=r"this drawing has 21,\d* entities, more than 20,000"):
+        read_pattern(file)
+    assert time.process_time() - began < 1.0

@@ -112,6 +112,10 @@ def _pipe(suffix: str) -> Callable[[Path], str]:
     return make
 
 
+LINE = '<line x1="1" y1="1" x2="99" y2="99" stroke="red"{}/>'
+LONG_PATH = f'<defs><path id="p" stroke="red" d="M 1 1{" L 2 2" * 10_000}"/></defs>'
+TURNED = f'<g transform="{"rotate(1) " * 900}">' * 9 + LINE.format("") * 5_000 + "</g>" * 9
+CLIPPED = '<clipPath id="c"><rect width="50" height="50"/></clipPath>'
 BOMBS: dict[str, Callable[[Path], str]] = {
     "5,000 radii": _scene(ANNULUS.format([20.0 + i for i in range(5_000)]) + "[mesh]\nalong = 8\n"),
     "100,000 radii": _scene(ANNULUS.format([20.0 + i for i in range(100_000)])),
@@ -127,6 +131,12 @@ BOMBS: dict[str, Callable[[Path], str]] = {
     "3,000 lines across": _svg(lambda: _lines(3_000, True)),
     "30,000 short lines": _svg(lambda: _lines(30_000, False)),
     "30,000 Beziers": _svg(_beziers),
+    "a path of 10,000 pieces <use>d 5,000 times": _svg(lambda: LONG_PATH + '<use href="#p"/>' * 5_000),
+    "8,100 transforms of 5,000 lines": _svg(lambda: TURNED),
+    "16,000 style rules for 5,000 lines": _svg(
+        lambda: f"<style>{'*{a:b}' * 16_000}</style>{LINE.format('') * 5_000}"
+    ),
+    "5,000 clipped lines": _svg(lambda: CLIPPED + LINE.format(' clip-path="url(#c)"') * 5_000),
     "SVG of 200 MB": _megabytes,
     "blocks doubled 30 times": _blocks(False),
     "cyclic blocks": _blocks(True),
