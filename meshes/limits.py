@@ -37,9 +37,9 @@ class Limits:
     steps: int = 1_000
     triangles: int = 250_000
     entities: int = 20_000
-    lines: int = 5_000
+    lines: int = 10_000
     vertices: int = 100_000
-    crossings: int = 5_000
+    crossings: int = 10_000
     control_points: int = 2_000
     megabytes: int = 32
 

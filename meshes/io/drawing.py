@@ -14,6 +14,7 @@ import numpy as np
 from meshes.curves import Array
 from meshes.drawn_pattern import pattern_of, region_of
 from meshes.errors import FileFormatError, InputError
+from meshes.io.construction import without_construction
 from meshes.io.export import one_line, shown
 from meshes.io.fine_lines import smooth
 from meshes.io.perforation import join_dashes
@@ -265,6 +266,7 @@ def read_graph(
         first = drawn[int(np.argmax(lengths <= gap))].name
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
+    drawn, left_out = without_construction(drawn, gap)
     check_crossings(np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in drawn]))
     drawn, smoothed = smooth(drawn, gap, tolerance or fine * unit, diagonal)
     drawn, joined = join_dashes(drawn, gap)
@@ -274,7 +276,7 @@ def read_graph(
     graph = heal(drawn, gap)
     if sheet is not None:
         graph = one_sheet(graph, sheet, fit, Path(path).suffix.lower() not in UPWARDS or fit is not None)
-    return graph, drawn, [*remarks, *rules.remarks, *joined, *smoothed, *graph.remarks]
+    return graph, drawn, [*remarks, *rules.remarks, *left_out, *joined, *smoothed, *graph.remarks]
 
 
 def _check(lengths: Mapping[str, float | None], outline: str) -> None:
