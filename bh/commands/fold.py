@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 SHARE = 0.6  # of the time that is left goes to each of the scenes but the last
 # s that an evaluation of a system takes, a tangent with its factors, and an unknown of either (one core of 2.5 GHz):
 # time is counted by work, so that the scene that is kept does not hang on the machine, or on what else runs on it
-EVALUATION, TANGENT, UNKNOWN, FACTORED = 1e-4, 3e-4, 3e-7, 7e-6
+EVALUATION, TANGENT, UNKNOWN, FACTORED = 1e-4, 3e-4, 5e-7, 1e-5
 HALFWAY = (
     0.5  # of the way: a scene that has come so far keeps the time, as the next one would have to be faster
 )

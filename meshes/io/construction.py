@@ -43,7 +43,7 @@ def construction(lines: Sequence[Array], kinds: Sequence[str], gap: float) -> li
     inside = shapely.union_all([shapely.Polygon(part.exterior) for part in shapely.get_parts(drawn)])
     if inside.area <= 2.0 * drawn.area:  # no sheet, lines only
         return []
-    return rim[extra[~shapely.covered_by(shapes[extra], inside)]].tolist()
+    return [int(k) for k in rim[extra[~shapely.covered_by(shapes[extra], inside)]]]
 
 
 def _loose(shapes: NDArray[np.object_], gap: float) -> NDArray[np.bool_]:

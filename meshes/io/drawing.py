@@ -242,6 +242,9 @@ def read_lines(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) 
         path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
         **options: as for `read_pattern`.
 
+    Returns:
+        the lines in the order of the file, without those that are ignored or too short to count.
+
     Raises:
         FileFormatError: the file cannot be read, or its lines cannot be understood.
     """

@@ -76,3 +76,48 @@ def test_a_net_of_five_thousand_crossings_is_read_in_seconds(tmp_path: Path) -> 
     read = read_drawing(file)
     assert len(read.graph.points) == 72 * 72 + 4 * 72 + 4
     assert time.process_time() - began < 10.0
+
+
+@pytest.mark.parametrize(
+    ("width", "fine"), [("200mm", True), ("1e2 PX", True), ("100%", True), ("200.5h> 1.8mm", False)]
+)
+def test_a_page_whose_width_is_no_length_is_refused(tmp_path: Path, width: str, fine: bool) -> None:
+    """A browser ignores such a width and fills its window."""
+    file = written(tmp_path, OUTLINE, CREASE)
+    file.write_text(
+        file.read_text(encoding="utf-8").replace("200mm", width.replace(">", "&gt;"), 1), encoding="utf-8"
+    )
+    if fine:
+        read_drawing(file)
+        return
+    with pytest.raises(InputError, match=r"width = '200\.5h> 1\.8mm', which is no length"):
+        read_drawing(file)
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["translate(70, strok0)", "translate(70,0", "turn(3)", "scale(1 2) rotate()", "matrix(1,0,0,1,5,nan)"],
+)
+def test_a_transform_that_a_browser_ignores_is_refused(tmp_path: Path, words: str) -> None:
+    file = written(
+        tmp_path, OUTLINE, CREASE, f'<g transform="{words}">', line(80, 60, 80, 120, colour="blue"), "</g>"
+    )
+    with pytest.raises(InputError, match=r"transform = .* is not understood"):
+        read_drawing(file)
+
+
+@pytest.mark.parametrize(
+    "words", ["translate(2)", " matrix(1-0 0,1 .5e0-.5) , rotate(0 3,4)", "scale(1,1)skewX( 0 )", "none", ""]
+)
+def test_transforms_as_programs_write_them(tmp_path: Path, words: str) -> None:
+    file = written(
+        tmp_path, OUTLINE, CREASE, f'<g transform="{words}">', line(80, 70, 80, 100, colour="blue"), "</g>"
+    )
+    assert len(read_drawing(file).lines) == 3
+
+
+def test_a_dxf_file_that_ends_in_its_header_is_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "short.dxf"
+    file.write_text("0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1032\n9\n$EXTMIN\n10\n0.0\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"short\.dxf: .*ends"):
+        read_drawing(file)
