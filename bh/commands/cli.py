@@ -194,14 +194,12 @@ def run(
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
     from bh.commands.occupied import UNFINISHED
-    from bh.commands.place import marking
+    from bh.commands.place import load_marking
     from bh.commands.run import holds_states, solve, write_extras
     from bh.commands.summary import summary
-    from bh.scene.load import load_scene
 
     asked = [*(changes or ()), *([f"model.formulation={formulation}"] if formulation else [])]
-    with marking(scene, (output or Path()).parent):
-        loaded = load_scene(scene, asked)
+    loaded = load_marking(scene, asked, (output or Path()).parent)
     if formulation is not None and loaded.accuracy is not None:
         from bh.errors import InputError
 

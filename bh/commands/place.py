@@ -18,6 +18,7 @@ from meshes.io.export import replacing
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bh.scene.load import Scene
     from meshes.planar import DrawnLine
 
 NUMBER = r"(-?[0-9][0-9.]*(?:e[-+]?[0-9]+)?)"
@@ -80,6 +81,20 @@ def marking(file: Path, folder: Path, options: Mapping[str, Any] | None = None) 
         if told is error:
             raise
         raise told from error
+
+
+def load_marking(scene: Path, changes: Sequence[str], folder: Path) -> Scene:
+    """A scene, as `bh.load_scene`; its errors name the picture of their places.
+
+    Args:
+        scene: its file.
+        changes: KEY=VALUE.
+        folder: for the picture.
+    """
+    from bh.scene.load import load_scene
+
+    with marking(scene, folder):
+        return load_scene(scene, changes)
 
 
 def _drawing(file: Path, options: Mapping[str, Any]) -> tuple[Path, Mapping[str, Any]]:

@@ -279,13 +279,7 @@ def _drawn(path: str | os.PathLike[str], options: DrawingOptions) -> _Drawn:
     fine = TOLERANCE * float(np.linalg.norm(rough[1] - rough[0])) or 1.0
     sampled = _sampled([stroke for stroke, _ in kept], fine)
     near = GAP * fine / TOLERANCE if gap is None or fit is not None else gap / (scale or unit)
-    if out := construction(sampled, [kind for _, kind in kept], near):
-        remarks.append(
-            f"{len(out)} lines in the outline's colour (first {kept[out[0]][0].name}) end loosely beyond the outline: "
-            "taken as construction lines, left out"
-        )
-        left = np.setdiff1d(np.arange(len(kept)), out).tolist()
-        kept, sampled = [kept[k] for k in left], [sampled[k] for k in left]
+    kept, sampled = _without_construction(kept, sampled, near, remarks)
     rim = [points for points, (_, kind) in zip(sampled, kept, strict=True) if kind in RIM]
     low, high = _box(rim or sampled)
     if fit is not None:
@@ -318,6 +312,21 @@ def _drawn(path: str | os.PathLike[str], options: DrawingOptions) -> _Drawn:
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
     return _Drawn(drawn, gap, tolerance or fine * unit, diagonal, [*remarks, *rules.remarks])
+
+
+def _without_construction(
+    kept: list[tuple[Stroke, str]], sampled: list[Array], near: float, remarks: list[str]
+) -> tuple[list[tuple[Stroke, str]], list[Array]]:
+    """Strokes with their kinds, and their points, without construction lines; these get a remark."""
+    out = construction(sampled, [kind for _, kind in kept], near)
+    if not out:
+        return kept, sampled
+    remarks.append(
+        f"{len(out)} lines in the outline's colour (first {kept[out[0]][0].name}) end loosely beyond the outline: "
+        "taken as construction lines, left out"
+    )
+    left = np.setdiff1d(np.arange(len(kept)), out).tolist()
+    return [kept[k] for k in left], [sampled[k] for k in left]
 
 
 def _check(lengths: Mapping[str, float | None], outline: str) -> None:
