@@ -273,6 +273,8 @@ def _check_orientation(mesh: QuadraticMesh) -> None:
         if (jacobian <= 0.0).any():
             row = int(np.argmin(jacobian))
             nodes = mesh.triangles[row, :3].tolist()
+            at, off = x[row, :3].mean(axis=0)
             raise MeshError(
-                f"triangle {row} (nodes {nodes}) is turned inside out by its curved edge; use a finer mesh there"
+                f"triangle {row} (nodes {nodes}) near ({at:.6g}, {off:.6g}) is turned inside out by its curved edge; "
+                "use a finer mesh there"
             )

@@ -51,9 +51,9 @@ class Limits:
     attribute_characters: int = 10_000
     clips: int = 1_000
     clip_vertices: int = 50_000
-    lines: int = 5_000
+    lines: int = 10_000
     vertices: int = 100_000
-    crossings: int = 5_000
+    crossings: int = 10_000
     control_points: int = 2_000
     megabytes: int = 32
 

@@ -7,6 +7,7 @@ without a node they get one. Nothing moves by much more than `gap`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -27,6 +28,7 @@ ROUNDS = 4  # of crossings that show when lines have been moved
 RANK = ("boundary", "cut", "mountain", "valley", "flat", "facet")
 RIM = ("boundary", "cut")
 FOLDED = ("mountain", "valley")
+STARTS, ENDS = slice(None, -1), slice(1, None)  # of the segments of a line's vertices
 
 
 @dataclass(frozen=True)
@@ -159,6 +161,7 @@ class _Web:
         self.gap = gap
         self.along = [arc_lengths(line.points) for line in self.lines]
         self.marks: list[dict[float, int]] = [{} for _ in self.lines]  # place along the line: node
+        self.on: list[set[int]] = [set() for _ in self.lines]  # nodes of the line
         self.shapes = np.array([shapely.LineString(line.points) for line in self.lines], dtype=object)
         self.nodes: list[tuple[float, float]] = []
         self.moved = 0
@@ -173,9 +176,8 @@ class _Web:
         owner: list[tuple[int, float]] = []
         places: list[Array] = []
         for number, line in enumerate(self.lines):
-            stands = corners(line.points)
-            stands[[0, -1]] = True
-            for k in np.flatnonzero(stands).tolist():
+            turns = np.flatnonzero(corners(line.points)).tolist() if len(line.points) > 2 else []
+            for k in (0, *turns, len(line.points) - 1):
                 owner.append((number, float(self.along[number][k])))
                 places.append(line.points[k])
         points = np.array(places)
@@ -189,10 +191,10 @@ class _Web:
                 first[label] = self._new(point)
             node = first[label]
             self.moved += bool(np.any(point != self.nodes[node]))
-            self.marks[number][at] = node
+            self._mark(number, at, node)
         self._hard = [(point, first[label]) for point, label in zip(points, group.tolist(), strict=True)]
 
-    def _new(self, point: Array) -> int:
+    def _new(self, point: Sequence[float] | Array) -> int:
         self.nodes.append((float(point[0]), float(point[1])))
         return len(self.nodes) - 1
 
@@ -210,15 +212,19 @@ class _Web:
         hosts: dict[int, dict[int, float]] = {}
         for spot, number, place in zip(at.tolist(), on.tolist(), places.tolist(), strict=True):
             node = spots[spot][1]
-            if node not in self.marks[number].values():
+            if node not in self.on[number]:
                 hosts.setdefault(node, {}).setdefault(number, place)
         rims = [k for k, line in enumerate(self.lines) if line.kind in RIM]
-        fixed = {node for k in rims for node in self.marks[k].values()}
+        fixed = set().union(*(self.on[k] for k in rims))
         for node, met in hosts.items():
             self._move(node, met, node in fixed)
             for number, place in met.items():
                 self.moved += 1
-                self.marks[number][self._free(number, place)] = node
+                self._mark(number, self._free(number, place), node)
+
+    def _mark(self, number: int, place: float, node: int) -> None:
+        self.marks[number][place] = node
+        self.on[number].add(node)
 
     def _move(self, node: int, met: dict[int, float], fixed: bool) -> None:
         """A T-junction: the end of a line goes to the line that it meets, so that this one stays straight."""
@@ -241,11 +247,12 @@ class _Web:
         """Vertices (k, 2) of a line, their nodes (-1: none) and places; none shapes the line next to a node."""
         marks = sorted(self.marks[number].items())
         points = self.lines[number].points
-        taken = np.array([place for place, _ in marks])
-        vertices = [(place, node, np.array(self.nodes[node])) for place, node in marks]
-        for place, point in zip(self.along[number].tolist(), points, strict=True):
-            if np.abs(taken - place).min() > self.gap:
-                vertices.append((place, -1, point))
+        taken = np.array([-np.inf, *(place for place, _ in marks), np.inf])
+        along = self.along[number]
+        after = np.searchsorted(taken, along)
+        alone = np.minimum(along - taken[after - 1], taken[after] - along) > self.gap
+        vertices = [(place, node, self.nodes[node]) for place, node in marks]
+        vertices += [(float(along[k]), -1, tuple(points[k].tolist())) for k in np.flatnonzero(alone).tolist()]
         vertices.sort(key=lambda vertex: vertex[0])
         places = [place for place, _, _ in vertices]
         return np.array([p for _, _, p in vertices]), [node for _, node, _ in vertices], places
@@ -254,42 +261,46 @@ class _Web:
         """Give crossings without a node one; returns the new nodes."""
         import shapely
 
-        starts, ends, number, place, ids = [], [], [], [], []
-        for line in range(len(self.lines)):
-            points, nodes, places = self.chain(line)
-            for k in range(len(points) - 1):
-                starts.append(points[k])
-                ends.append(points[k + 1])
-                number.append(line)
-                place.append((places[k], places[k + 1]))
-                ids.append((nodes[k], nodes[k + 1]))
-        a, b = np.array(starts), np.array(ends)
+        chains = [self.chain(number) for number in range(len(self.lines))]
+        a, b = (np.vstack([points[part] for points, _, _ in chains]) for part in (STARTS, ENDS))
+        low, high = (np.concatenate([places[part] for _, _, places in chains]) for part in (STARTS, ENDS))
+        ids = np.array([pair for _, nodes, _ in chains for pair in pairwise(nodes)])
+        number = np.repeat(np.arange(len(chains)), [len(nodes) - 1 for _, nodes, _ in chains])
         tree = shapely.STRtree(shapely.linestrings(np.stack((a, b), axis=1)))
         one, two = tree.query(tree.geometries, predicate="intersects")
-        fresh: list[int] = []
-        for i, j in zip(one[one < two].tolist(), two[one < two].tolist(), strict=True):
-            same = number[i] == number[j] and abs(i - j) == 1
-            if same or ({*ids[i]} & {*ids[j]}) - {-1}:
-                continue
-            s, t = _meeting(a[i], b[i], a[j], b[j])
-            if s is None or t is None:
-                continue
-            point = a[i] + s * (b[i] - a[i])
-            node = self._node_at(point, fresh)
-            for line, part, (low, high) in ((number[i], s, place[i]), (number[j], t, place[j])):
-                if node not in self.marks[line].values():
-                    self.marks[line][self._free(line, low + part * (high - low))] = node
-        return fresh
+        shared = (ids[one][:, :, None] == ids[two][:, None, :]) & (ids[one][:, :, None] >= 0)
+        next_ = (number[one] == number[two]) & (np.abs(one - two) == 1)
+        apart = (one < two) & ~next_ & ~shared.any(axis=(1, 2))
+        one, two = one[apart], two[apart]
+        s, t, meet = _meetings(a[one], b[one], a[two], b[two])
+        one, two, s, t = one[meet], two[meet], s[meet], t[meet]
+        nodes = self._nodes_at(a[one] + s[:, None] * (b[one] - a[one]))
+        for segments, part in ((one, s), (two, t)):
+            places = low[segments] + part * (high - low)[segments]
+            for line, place, node in zip(number[segments].tolist(), places.tolist(), nodes, strict=True):
+                if node not in self.on[line]:
+                    self._mark(line, self._free(line, place), node)
+        return list(dict.fromkeys(nodes))
 
-    def _node_at(self, point: Array, fresh: list[int]) -> int:
-        """The node within the gap of a crossing, or a new one."""
-        away = np.linalg.norm(np.array(self.nodes) - point, axis=1)
-        nearest = int(away.argmin())
-        if away[nearest] > self.gap:
-            nearest = self._new(point)
-        if nearest not in fresh:
-            fresh.append(nearest)
-        return nearest
+    def _nodes_at(self, points: Array) -> list[int]:
+        """Of each of (k, 2) crossings the nearest node within the gap, or a new one."""
+        from scipy.spatial import cKDTree
+
+        away, nearest = cKDTree(np.array(self.nodes)).query(points) if len(points) else ((), ())
+        cells: dict[tuple[int, int], list[int]] = {}  # one gap wide: the new nodes in them
+        found: list[int] = []
+        for point, old, off in zip(points.tolist(), nearest, away, strict=True):
+            x, y = (math.floor(c / self.gap) for c in point)
+            near = [n for i in (x - 1, x, x + 1) for j in (y - 1, y, y + 1) for n in cells.get((i, j), ())]
+            best, distance = int(old), float(off)
+            for node in near:
+                if (d := math.dist(self.nodes[node], point)) < distance:
+                    best, distance = node, d
+            if distance > self.gap:
+                best = self._new(point)
+                cells.setdefault((x, y), []).append(best)
+            found.append(best)
+        return found
 
     def graph(self) -> Graph:
         points: list[tuple[float, float]] = list(self.nodes)
@@ -345,12 +356,12 @@ class _Web:
             found[pair] = kind, number
 
 
-def _meeting(a: Array, b: Array, c: Array, d: Array) -> tuple[float | None, float | None]:
-    """Parameters where segments a-b and c-d meet, None where they are parallel."""
+def _meetings(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Parameters (k,) where segments a-b and c-d meet, (k, 2) each; whether they do, and are not parallel."""
     u, v, w = b - a, d - c, c - a
-    cross = float(u[0] * v[1] - u[1] * v[0])
-    if abs(cross) <= 1e-12 * float(np.linalg.norm(u) * np.linalg.norm(v)):
-        return None, None
-    s = float(w[0] * v[1] - w[1] * v[0]) / cross
-    t = float(w[0] * u[1] - w[1] * u[0]) / cross
-    return min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
+    cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    meet = np.abs(cross) > 1e-12 * np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1)
+    over = np.where(meet, cross, 1.0)
+    s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / over
+    t = (w[:, 0] * u[:, 1] - w[:, 1] * u[:, 0]) / over
+    return np.clip(s, 0.0, 1.0), np.clip(t, 0.0, 1.0), meet

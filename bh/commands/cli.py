@@ -203,12 +203,12 @@ def run(
 ) -> None:
     """Solve a scene into a folder: path.bh and result.json."""
     from bh.commands.occupied import UNFINISHED
+    from bh.commands.place import load_marking
     from bh.commands.run import holds_states, solve, write_extras
     from bh.commands.summary import summary
-    from bh.scene.load import load_scene
 
     asked = [*(changes or ()), *([f"model.formulation={formulation}"] if formulation else [])]
-    loaded = load_scene(scene, asked)
+    loaded = load_marking(scene, asked, (output or Path()).parent)
     if formulation is not None and loaded.accuracy is not None:
         from bh.errors import InputError
 
@@ -367,12 +367,14 @@ def check(
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
 ) -> None:
     """Check a scene, say what it is, and draw its flat pattern."""
+    from bh.commands.place import marking
     from bh.commands.summary import scene_of_drawing
     from bh.scene.load import load_scene
     from bh.scene.report import draw, report
     from meshes.io.drawing import PATTERNS
 
-    loaded = scene_of_drawing(scene) if scene.suffix.lower() in PATTERNS else load_scene(scene)
+    with marking(scene, (picture or Path()).parent):
+        loaded = scene_of_drawing(scene) if scene.suffix.lower() in PATTERNS else load_scene(scene)
     for line in report(loaded):
         say(line)
     if not no_picture:

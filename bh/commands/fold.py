@@ -28,16 +28,19 @@ from bh.scene.folding import Proposal, Wish, proposals
 from bh.scene.load import Scene, parse_scene
 from bh.solvers.automatic import Automatic
 from bh.solvers.points import Increment, Point
-from bh.solvers.system import Evaluation, System
+from bh.solvers.system import Evaluation, System, Tangent
 from bh.solvers.walk import Strategy
 from bh.solving.levels import folder_of, move
 from meshes.io.export import replacing
 
 Array = NDArray[np.float64]
 SHARE = 0.6  # of the time that is left goes to each of the scenes but the last
-# s that an evaluation of a system with its factors takes, and an unknown of it: time is counted by work, so that the
-# scene that is kept does not hang on the machine, or on what else runs on it
-EVALUATION, UNKNOWN = 3e-4, 1e-5
+# s that an evaluation of a system takes, a tangent with its factors, and an unknown of either (one core of 2.5 GHz):
+# time is counted by work, so that the scene that is kept does not hang on the machine, or on what else runs on it
+EVALUATION, TANGENT, UNKNOWN, FACTORED = 1e-4, 3e-4, 5e-7, 1e-5
+HALFWAY = (
+    0.5  # of the way: a scene that has come so far keeps the time, as the next one would have to be faster
+)
 LONG = 60.0  # s, after which a run that is not watched says what it does all the same
 
 
@@ -69,7 +72,8 @@ class Folded:
 class _Clock:
     """A meter that hands on to another one and ends a run whose time, counted by its work, is over.
 
-    A run that would end in time at the pace of the last third of what it took goes on beyond its share.
+    A run that would end in time at the pace of the last third of what it took, or has come beyond half of the way, goes
+    on beyond its share.
 
     Args:
         inner: the meter.
@@ -99,9 +103,9 @@ class _Clock:
         self._states.append((self.spent, way))
         self.check(lam)
 
-    def count(self, unknowns: int) -> None:
-        """Another evaluation of a system of this size."""
-        self.spent += EVALUATION + UNKNOWN * unknowns
+    def count(self, unknowns: int, factored: bool = False) -> None:
+        """Another evaluation of a system of this size, or its tangent, with the factors that it is made for."""
+        self.spent += TANGENT + FACTORED * unknowns if factored else EVALUATION + UNKNOWN * unknowns
 
     def check(self, lam: float) -> None:
         """Raise `TimeUpError` if the time is over."""
@@ -110,7 +114,8 @@ class _Clock:
         third = (self.spent - self._states[0][0]) / 3.0
         way = self._states[-1][1]
         lately = way - next(before for at, before in reversed(self._states) if at <= self.spent - third)
-        if self.spent >= self._most or third * (1.0 - way) >= (self._most - self.spent) * lately:
+        slow = way < HALFWAY and third * (1.0 - way) >= (self._most - self.spent) * lately
+        if self.spent >= self._most or slow:
             raise TimeUpError(f"its {self.spent:.0f} s were over at lambda = {lam:.2f}")
 
     def timed(self, strategy: Strategy) -> Strategy:
@@ -145,7 +150,7 @@ class _Timed:
 
 
 class _TimedSystem:
-    """A system that tells the clock whenever it is evaluated."""
+    """A system that tells the clock whenever it is evaluated, or its tangent is made."""
 
     def __init__(self, system: System, clock: _Clock) -> None:
         self._system, self._clock = system, clock
@@ -157,6 +162,10 @@ class _TimedSystem:
         self._clock.count(len(q))
         self._clock.check(lam)
         return self._system.evaluate(q, lam)
+
+    def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
+        self._clock.count(len(q), factored=True)
+        return self._system.tangent(q, lam, forces)
 
 
 def fold_file(
@@ -174,7 +183,7 @@ def fold_file(
         file: .svg, .dxf, .fold, .cp or .opx.
         folder: for the results; made if need be.
         wish: how to fold.
-        seconds: time for solving, counted by work (`UNKNOWN`); a scene that takes more than its share of it makes
+        seconds: time for solving, counted by work (`FACTORED`); a scene that takes more than its share of it makes
             room for the next.
         progress: as for `bh.trace`.
         force: write over a scene that is there.

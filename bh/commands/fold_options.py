@@ -69,6 +69,7 @@ def fold(  # noqa: PLR0913 - the options of a command line
     """Fold a drawing: picture, result and the scene that did it."""
     from bh.commands.fold import fold_file
     from bh.commands.fold_all import fold_sheets
+    from bh.commands.place import marking
     from bh.scene.folding import Wish
 
     number = int(frame) if frame is not None and frame.isdigit() else frame
@@ -83,7 +84,11 @@ def fold(  # noqa: PLR0913 - the options of a command line
         if not quiet:
             say(f"all sheets: {together.picture}")
     else:
-        done = fold_file(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
+        reading = {"fit": fit, "scale": scale, "frame": number, "sheet": one}
+        with marking(
+            file, folder.parent, {key: value for key, value in reading.items() if value is not None}
+        ):
+            done = fold_file(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
         ended = [_told(done, str(file), quiet)]
     if not all(ended):
         raise typer.Exit(1)

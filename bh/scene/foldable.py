@@ -22,6 +22,8 @@ from meshes.planar import CORNER
 FIT = 200.0  # mm, the longer side of a sheet whose file says no unit and whose numbers make an absurd size
 STRAIGHT = 0.02  # rad that a crease turns between its ends, by which it is still straight
 JOINING = re.compile(r"to join them: gap = ([0-9.e+-]+)")  # as remarks of readers advise
+HEALING = re.compile(r"heal it with gap = ([0-9.e+-]+)")  # as their errors do where an outline is open
+HEALED = 2e-3  # of the sheet's diagonal: a larger opening is no slip of the pen
 SHEETS = re.compile(r"sheet = 1 to ([0-9]+)")  # as their errors do
 KINDS = ("mountain", "valley", "flat")  # names of all creases of a kind
 
@@ -86,10 +88,13 @@ def _rescued(file: Path, found: Found, options: dict[str, object], assumed: list
             f"the drawing holds {sheets[1]} sheets: the first from the top left is folded; --sheet 2 folds another, "
             "--sheet all each of them"
         )
+    elif (miss := HEALING.search(why)) and "gap" not in options:
+        more = {"gap": float(miss[1])}
+        words = f"the outline is open by a little: its ends are joined by gap = {float(miss[1]):g} mm"
     else:
         return found
     again = _read(file, options | more)
-    if again.sheet is None:
+    if again.sheet is None or ("gap" in more and float(str(more["gap"])) > HEALED * _diagonal(again.sheet)):
         return found
     options |= more
     assumed.append(words)
@@ -134,6 +139,12 @@ def _joined(file: Path, found: Found, options: dict[str, object], assumed: list[
     assumed.append(f"lines that end close to others ({len(gaps)}) are joined by gap = {max(gaps):g} mm")
     options["gap"] = max(gaps)
     return joined
+
+
+def _diagonal(sheet: SheetMesh | CreasePattern) -> float:
+    """Of the sheet's bounding box, mm."""
+    points = sheet.points if isinstance(sheet, SheetMesh) else sheet.rings[0]
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def _has_curves(mesh: SheetMesh) -> bool:

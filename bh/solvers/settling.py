@@ -31,6 +31,7 @@ TRIED = 14  # lengths of a step downhill, before the shift is raised
 KEPT = 0.2  # of the way of a hinge to closed that a step leaves
 MISMATCH = 0.2  # of the energy gained in an increment and the work done, behind which there is a jump
 GROWTH = 1.6  # of an increment behind one that Newton's method took
+BOLDER = 2.0  # behind a motion to rest, whose steps hardly hang on how far the springs were turned
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,9 @@ class Settling:
     """
 
     first: float = 0.1
-    largest: float = 0.34
+    largest: float = 0.5
     smallest: float = 5e-3
-    most: int = 1000
+    most: int = 2000
     shift: float = 1e-3
     newton: Newton = field(default_factory=Newton)
 
@@ -85,7 +86,7 @@ class Settling:
                 continue
             there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
             points = [there] if note else [*points[-2:], there]
-            step = min(self.largest, (1.0 if note or cuts else GROWTH) * (lam - here.lam))
+            step = min(self.largest, (1.0 if cuts else BOLDER if note else GROWTH) * (lam - here.lam))
             imbalance = found.evaluation.imbalance
             yield Increment(
                 there,

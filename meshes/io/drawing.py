@@ -14,6 +14,7 @@ import numpy as np
 from meshes.curves import Array
 from meshes.drawn_pattern import pattern_of, region_of
 from meshes.errors import FileFormatError, InputError
+from meshes.io.construction import construction
 from meshes.io.export import one_line, shown
 from meshes.io.fine_lines import smooth
 from meshes.io.perforation import join_dashes
@@ -219,7 +220,50 @@ def read_graph(
             the file.
         PatternError: lines that cannot be healed, see `meshes.planar.heal`.
     """
-    scale, fit, sheet = options.get("scale"), options.get("fit"), options.get("sheet")
+    found = _drawn(path, options)
+    drawn, gap, sheet, fit = found.lines, found.gap, options.get("sheet"), options.get("fit")
+    remarks = list(found.remarks)
+    check_crossings(np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in drawn]))
+    drawn, smoothed = smooth(drawn, gap, found.tolerance, found.diagonal)
+    drawn, joined = join_dashes(drawn, gap)
+    if options.get("outline") == "hull":
+        drawn.append(_hull(drawn))
+        remarks.append("the outline is the convex hull of what is drawn")
+    graph = heal(drawn, gap)
+    if sheet is not None:
+        graph = one_sheet(graph, sheet, fit, Path(path).suffix.lower() not in UPWARDS or fit is not None)
+    return graph, drawn, [*remarks, *joined, *smoothed, *graph.remarks]
+
+
+def read_lines(path: str | os.PathLike[str], **options: Unpack[DrawingOptions]) -> list[DrawnLine]:
+    """The lines of a drawing in mm, as they are drawn, before they are healed.
+
+    Args:
+        path: of an .svg, .svgz, .dxf, .fold, .cp or .opx file.
+        **options: as for `read_pattern`.
+
+    Returns:
+        the lines in the order of the file, without those that are ignored or too short to count.
+
+    Raises:
+        FileFormatError: the file cannot be read, or its lines cannot be understood.
+    """
+    return _naming_the_file(path, lambda: list(_drawn(path, options).lines))
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """Lines as they are drawn, mm, and with which lengths (mm) they are healed."""
+
+    lines: list[DrawnLine]
+    gap: float
+    tolerance: float
+    diagonal: float
+    remarks: list[str]
+
+
+def _drawn(path: str | os.PathLike[str], options: DrawingOptions) -> _Drawn:
+    scale, fit = options.get("scale"), options.get("fit")
     tolerance, gap, outline = options.get("tolerance"), options.get("gap"), options.get("outline", "drawn")
     _check({"scale": scale, "fit": fit, "tolerance": tolerance, "gap": gap}, outline)
     found = _read(path, options.get("frame"))
@@ -234,6 +278,8 @@ def read_graph(
     rough = _box([_finite(stroke, stroke.sample(math.inf)) for stroke, _ in kept])
     fine = TOLERANCE * float(np.linalg.norm(rough[1] - rough[0])) or 1.0
     sampled = _sampled([stroke for stroke, _ in kept], fine)
+    near = GAP * fine / TOLERANCE if gap is None or fit is not None else gap / (scale or unit)
+    kept, sampled = _without_construction(kept, sampled, near, remarks)
     rim = [points for points, (_, kind) in zip(sampled, kept, strict=True) if kind in RIM]
     low, high = _box(rim or sampled)
     if fit is not None:
@@ -265,16 +311,22 @@ def read_graph(
         first = drawn[int(np.argmax(lengths <= gap))].name
         remarks.append(f"{short} lines shorter than gap = {gap:g} mm are left out (first {first})")
         drawn = [line for line, length in zip(drawn, lengths.tolist(), strict=True) if length > gap]
-    check_crossings(np.vstack([np.hstack((line.points[:-1], line.points[1:])) for line in drawn]))
-    drawn, smoothed = smooth(drawn, gap, tolerance or fine * unit, diagonal)
-    drawn, joined = join_dashes(drawn, gap)
-    if outline == "hull":
-        drawn.append(_hull(drawn))
-        remarks.append("the outline is the convex hull of what is drawn")
-    graph = heal(drawn, gap)
-    if sheet is not None:
-        graph = one_sheet(graph, sheet, fit, Path(path).suffix.lower() not in UPWARDS or fit is not None)
-    return graph, drawn, [*remarks, *rules.remarks, *joined, *smoothed, *graph.remarks]
+    return _Drawn(drawn, gap, tolerance or fine * unit, diagonal, [*remarks, *rules.remarks])
+
+
+def _without_construction(
+    kept: list[tuple[Stroke, str]], sampled: list[Array], near: float, remarks: list[str]
+) -> tuple[list[tuple[Stroke, str]], list[Array]]:
+    """Strokes with their kinds, and their points, without construction lines; these get a remark."""
+    out = construction(sampled, [kind for _, kind in kept], near)
+    if not out:
+        return kept, sampled
+    remarks.append(
+        f"{len(out)} lines in the outline's colour (first {kept[out[0]][0].name}) end loosely beyond the outline: "
+        "taken as construction lines, left out"
+    )
+    left = np.setdiff1d(np.arange(len(kept)), out).tolist()
+    return [kept[k] for k in left], [sampled[k] for k in left]
 
 
 def _check(lengths: Mapping[str, float | None], outline: str) -> None:

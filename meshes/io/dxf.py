@@ -131,6 +131,8 @@ def _document(path: str | os.PathLike[str]) -> Any:
     except OSError as error:
         why = getattr(error, "strerror", None) or "it does not begin as a DXF file does"
         raise FileFormatError(f"cannot be read ({why}); check it, and save it as DXF again") from error
+    except StopIteration as error:
+        raise FileFormatError("the DXF file ends in its header; save it as DXF again") from error
     except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise FileFormatError(f"the DXF cannot be understood ({error}); save it as DXF again") from error
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 LEAST = 4  # dashes of a crease
 STRAIGHT = 0.95  # cosine between a dash and the gap after it
 LONGEST_GAP = 2.5  # of the dash before it
+CHUNK = 256  # ends whose gaps are looked for at a time
 ALIKE = 3.0  # most that the gaps of one crease differ from their median
 KINDS = ("mountain", "valley", "flat")
 
@@ -154,16 +155,22 @@ def _links(ends: _Ends, meeting: Ints, near: float) -> Ints:
 
     count = len(ends.points)
     best = np.full(count, -1)
-    off = np.full(count, np.inf)
-    tree = cKDTree(ends.points)
     free = np.setdiff1d(np.arange(count), meeting)
-    for end in free.tolist():
-        for other in tree.query_ball_point(ends.points[end], LONGEST_GAP * ends.lengths[end]):
-            gap = ends.points[other] - ends.points[end]
-            size = float(np.linalg.norm(gap))
-            if other // 2 == end // 2 or size <= near or other in meeting or size >= off[end]:
-                continue
-            if gap @ ends.out[end] > STRAIGHT * size and -gap @ ends.out[other] > STRAIGHT * size:
-                best[end], off[end] = other, size
+    if not len(free):
+        return best
+    tree = cKDTree(ends.points[free])
+    for first in range(0, len(free), CHUNK):  # rows of a scribble see each other: not all pairs at once
+        some = free[first : first + CHUNK]
+        balls = tree.query_ball_point(ends.points[some], LONGEST_GAP * ends.lengths[some])
+        end = np.repeat(some, [len(ball) for ball in balls])
+        other = free[np.concatenate([np.asarray(ball, dtype=np.int64) for ball in balls])]
+        gap = ends.points[other] - ends.points[end]
+        size = np.linalg.norm(gap, axis=1)
+        ahead = np.einsum("ij,ij->i", gap, ends.out[end]) > STRAIGHT * size
+        facing = -np.einsum("ij,ij->i", gap, ends.out[other]) > STRAIGHT * size
+        fits = (other // 2 != end // 2) & (size > near) & ahead & facing
+        end, other, size = end[fits], other[fits], size[fits]
+        order = np.lexsort((size, end))[::-1]  # the nearest is written last
+        best[end[order]] = other[order]
     mutual = (best >= 0) & (best[best] == np.arange(count))
     return np.where(mutual, best, -1)

@@ -20,6 +20,13 @@ SVG = "{http://www.w3.org/2000/svg}"
 XLINK = "{http://www.w3.org/1999/xlink}href"
 DEEPEST = 200  # groups in groups
 CLIP, CLIP_SHAPE = "data-clip", "data-clip-shape"
+# possessive, so that what fails fails at once
+_REAL = r"[-+]?(?:\d++\.?+\d*+|\.\d++)(?:e[-+]?\d++)?+"
+LENGTH = re.compile(_REAL + r"\s*[a-z]*%?", re.IGNORECASE)
+_REALS = rf"{_REAL}[a-z%]*+(?:(?:[\s,]++|(?=[-+.])){_REAL}[a-z%]*+)*+"
+TRANSFORMS = re.compile(
+    rf"(?:(?:matrix|translate|scale|rotate|skewX|skewY)\s*+\(\s*+{_REALS}\s*+\)[\s,]*+)++", re.IGNORECASE
+)
 # which attributes are percentages of what: the viewport's width, its height, or its diagonal / sqrt(2)
 _PERCENT = {
     "x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0,
@@ -76,6 +83,7 @@ def svg_tree(data: bytes) -> Tree:
     by_id = {e.get("id", ""): e for e in root.iter() if e.get("id")}
     writer = _Writer(by_id, Counter(rules))
     width, height = root.get("width", ""), root.get("height", "")
+    _check_placed(root)
     out = writer.write(root, _viewport(root, None), ())
     pixels = all(re.fullmatch(r"\s*[\d.]+\s*(px)?\s*", value) for value in (width, height))
     return Tree(
@@ -83,6 +91,22 @@ def svg_tree(data: bytes) -> Tree:
         unit=any(re.search(r"(mm|cm|in|pt|pc)\s*$", value) for value in (width, height)),
         illustrator=pixels and b"Adobe Illustrator" in data[:2000],
     )
+
+
+def _check_placed(root: Element) -> None:
+    """Refuse sizes of the page and transforms that a browser ignores: nobody knows what was meant."""
+    for key in ("width", "height"):
+        value = root.get(key, "").strip()
+        if value not in ("", "auto") and not LENGTH.fullmatch(value):
+            raise FileFormatError(
+                f"the page has {key} = {value[:40]!r}, which is no length; give one such as 120mm"
+            )
+    for element in root.iter():
+        value = element.get("transform", "").strip()
+        if value not in ("", "none") and not TRANSFORMS.fullmatch(value):
+            raise FileFormatError(
+                f"transform = {value[:60]!r} is not understood; mend it, or draw the lines in place"
+            )
 
 
 Viewport = tuple[float, float]

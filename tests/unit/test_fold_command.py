@@ -201,14 +201,20 @@ class TestOneCommand:
     def test_a_run_that_will_end_in_time_goes_on_beyond_its_share(self) -> None:
         clock = _Clock(Silent(), 10.0, 20.0)
         clock.spent = 5.0
-        clock.update(0, 1, 0.6, 3, 1.0)
+        clock.update(0, 1, 0.05, 3, 1.0)
         clock.spent = 10.5
-        clock.update(0, 1, 0.8, 3, 1.0)
+        clock.update(0, 1, 0.45, 3, 1.0)
         clock.spent = 12.0
-        clock.check(0.9)  # 0.2 in the last 4 s: 4 s more of the 8 s that are left
+        clock.check(0.5)  # 0.4 in the last 4 s: 5.5 s more of the 8 s that are left
         clock.spent = 16.5
-        with pytest.raises(TimeUpError, match=r"its 16 s were over at lambda = 0\.90"):
-            clock.check(0.9)  # nothing in the last 5.5 s
+        with pytest.raises(TimeUpError, match=r"its 16 s were over at lambda = 0\.50"):
+            clock.check(0.5)  # nothing in the last 5.5 s
+        clock.update(0, 1, 0.55, 3, 1.0)
+        clock.spent = 19.9
+        clock.check(0.9)  # beyond half of the way: the next scene would have to be faster than this one
+        clock.spent = 20.0
+        with pytest.raises(TimeUpError, match=r"its 20 s were over at lambda = 0\.90"):
+            clock.check(0.9)
         clock.spent = 8.0
         clock.update(0, 1, 1.0, 3, 1.0)
         clock.update(0, 1, 0.1, 3, 1.0)  # another mesh
@@ -224,9 +230,11 @@ class TestOneCommand:
         assert not done.notes
         assert done.seconds >= 1000.0
         clock = _Clock(Silent(), 1.0, 1.0)
-        clock.count(50_000)
+        clock.count(50_000, factored=True)
         clock.check(0.2)
-        clock.count(50_000)
+        clock.count(50_000)  # a trial of a line search
+        assert clock.spent < 0.6
+        clock.count(50_000, factored=True)
         with pytest.raises(TimeUpError, match=r"its 1 s were over at lambda = 0\.20"):
             clock.check(0.2)
 

@@ -259,19 +259,19 @@ def test_scribbles_are_refused_before_anything_is_made_of_them(
 
     monkeypatch.setattr("meshes.io.drawing.join_dashes", never)
     random = np.random.default_rng(1)
-    ends = random.uniform(1.0, 99.0, (300, 4)).round(3)
+    ends = random.uniform(1.0, 99.0, (400, 4)).round(3)
     drawing = tmp_path / "scribble.svg"
     drawing.write_text(PAGE.format(lines(*map(tuple, ends.tolist()))), encoding="utf-8")
     frame = tmp_path / "scribble.fold"
     points = ends.reshape(-1, 2).tolist()
-    edges = [[2 * i, 2 * i + 1] for i in range(300)]
+    edges = [[2 * i, 2 * i + 1] for i in range(400)]
     frame.write_text(
-        json.dumps({"vertices_coords": points, "edges_vertices": edges, "edges_assignment": ["V"] * 300}),
+        json.dumps({"vertices_coords": points, "edges_vertices": edges, "edges_assignment": ["V"] * 400}),
         encoding="utf-8",
     )
-    with pytest.raises(InputError, match="crossings, more than 5,000"):
+    with pytest.raises(InputError, match="crossings, more than 10,000"):
         read_pattern(drawing)
-    with pytest.raises(InputError, match="crossings, more than 5,000"):
+    with pytest.raises(InputError, match="crossings, more than 10,000"):
         read_fold(frame)
 
 

@@ -95,11 +95,12 @@ def test_a_step_leaves_a_part_of_the_way_to_closed() -> None:
 
 
 def test_the_clock_is_looked_at_within_an_increment() -> None:
-    from bh.commands.fold import EVALUATION, TimeUpError, _Clock, _Timed
+    from bh.commands.fold import EVALUATION, TANGENT, TimeUpError, _Clock, _Timed
 
-    clock = _Clock(Silent(), 3.5 * EVALUATION, 3.5 * EVALUATION)
+    limit = 3.5 * (EVALUATION + TANGENT)
+    clock = _Clock(Silent(), limit, limit)
     timed = _Timed(Settling(), clock)
-    assert timed.limits(VonMisesTruss()) == (0.1, 0.34)
+    assert timed.limits(VonMisesTruss()) == (0.1, 0.5)
     with pytest.raises(TimeUpError):
         walked(VonMisesTruss(), timed)  # type: ignore[arg-type]
-    assert 3.5 * EVALUATION < clock.spent < 5.0 * EVALUATION
+    assert limit < clock.spent < limit + TANGENT + EVALUATION
