@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,7 +35,7 @@ COLOURS = {
 READING = ("fit", "scale", "gap", "tolerance", "lines", "outline", "frame")  # keys of [pattern] that say how
 
 
-def marked(error: InputError, drawing: Path, options: Mapping[str, Any], folder: Path) -> InputError:
+def marked(error: InputError, drawing: Path, options: Mapping[str, object], folder: Path) -> InputError:
     """The error, which names the picture of its places where there is one to draw.
 
     Args:
@@ -48,7 +48,8 @@ def marked(error: InputError, drawing: Path, options: Mapping[str, Any], folder:
     if not len(places) or "sheet" in options or drawing.suffix.lower() not in PATTERNS:
         return error  # a sheet of several is moved to its own origin
     try:
-        lines = read_lines(drawing, **{key: options[key] for key in READING if key in options})
+        how = {key: options[key] for key in READING if key in options}
+        lines = read_lines(drawing, **how)  # type: ignore[arg-type]
     except InputError:
         return error
     every = np.vstack([line.points for line in lines])
@@ -66,7 +67,7 @@ def marked(error: InputError, drawing: Path, options: Mapping[str, Any], folder:
 
 
 @contextmanager
-def marking(file: Path, folder: Path, options: Mapping[str, Any] | None = None) -> Iterator[None]:
+def marking(file: Path, folder: Path, options: Mapping[str, object] | None = None) -> Iterator[None]:
     """Errors within name the picture of their places, if the drawing has them.
 
     Args:
@@ -97,7 +98,7 @@ def load_marking(scene: Path, changes: Sequence[str], folder: Path) -> Scene:
         return load_scene(scene, changes)
 
 
-def _drawing(file: Path, options: Mapping[str, Any]) -> tuple[Path, Mapping[str, Any]]:
+def _drawing(file: Path, options: Mapping[str, object]) -> tuple[Path, Mapping[str, object]]:
     """The file itself, or the drawing that a scene is of, and how that is read."""
     if file.suffix.lower() != ".toml":
         return file, options

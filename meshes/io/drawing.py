@@ -36,6 +36,7 @@ LONGEST = 1e6  # mm
 LETTERS = {"mountain": "M", "valley": "V", "boundary": "B", "cut": "C", "facet": "F", "flat": "U"}
 
 Read = TypeVar("Read")
+Named = TypeVar("Named", bound=str)  # what a line stands for
 
 
 class DrawingOptions(TypedDict, total=False):
@@ -315,8 +316,8 @@ def _drawn(path: str | os.PathLike[str], options: DrawingOptions) -> _Drawn:
 
 
 def _without_construction(
-    kept: list[tuple[Stroke, str]], sampled: list[Array], near: float, remarks: list[str]
-) -> tuple[list[tuple[Stroke, str]], list[Array]]:
+    kept: list[tuple[Stroke, Named]], sampled: list[Array], near: float, remarks: list[str]
+) -> tuple[list[tuple[Stroke, Named]], list[Array]]:
     """Strokes with their kinds, and their points, without construction lines; these get a remark."""
     out = construction(sampled, [kind for _, kind in kept], near)
     if not out:
