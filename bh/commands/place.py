@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bh.errors import InputError
+from bh.errors import InputError, SceneError
+from bh.scene.reading import inside
+from bh.scene.toml_text import read_toml, toml_bytes
 from meshes.io.drawing import PATTERNS, read_lines
 from meshes.io.export import replacing
 
@@ -78,6 +79,8 @@ def marking(file: Path, folder: Path, options: Mapping[str, object] | None = Non
     try:
         yield
     except InputError as error:
+        if not PLACE.search(str(error)):
+            raise
         told = marked(error, *_drawing(file, options or {}), folder)
         if told is error:
             raise
@@ -103,12 +106,12 @@ def _drawing(file: Path, options: Mapping[str, object]) -> tuple[Path, Mapping[s
     if file.suffix.lower() != ".toml":
         return file, options
     try:
-        table = tomllib.loads(file.read_text(encoding="utf-8")).get("pattern", {})
-    except (OSError, ValueError):
-        return file, options
-    if not isinstance(table, dict) or not isinstance(table.get("file"), str):
-        return file, options
-    return file.parent / table["file"], table
+        table = read_toml(toml_bytes(file).decode()).get("pattern", {})
+        if isinstance(table, dict) and isinstance(table.get("file"), str):
+            return inside(file.parent, table["file"], "pattern.file"), table
+    except (OSError, ValueError, SceneError):
+        pass  # what is wrong with the scene has been said
+    return file, options
 
 
 def _draw(lines: Sequence[DrawnLine], places: NDArray[np.float64], words: str, target: Path) -> None:
