@@ -258,9 +258,11 @@ class LoadControl:
             lambda of the state or of the increment to try, the state or None, whether nothing has been met so far,
             and the iterations that led to nothing.
         """
+        here, spent, asked = points[-1], 0, lam
         if not (apart and isinstance(system, Hindered) and system.hindered):
             return lam, None, False, 0
-        here, spent = points[-1], 0
+        if pressing(system, here.q, here.lam):
+            return lam, None, False, 0
         for _ in range(APPROACHES):
             with system.unhindered():
                 tried = self._try(system, points, lam, brisk=True, look=False, held=held)
@@ -270,9 +272,9 @@ class LoadControl:
             clear = system.clear_ways(ways(points, tried.point, WAYS)) / WAYS
             if clear >= 1.0:
                 return lam, tried, True, spent - tried.iterations
+            if clear < LEAST_CLEAR:  # it may be nothing at all
+                return asked, None, False, spent
             lam = here.lam + SHORT_OF * clear * (lam - here.lam)
-            if clear < LEAST_CLEAR:
-                break
         return lam, None, False, spent
 
     def _critical(

@@ -301,3 +301,8 @@ def test_what_never_meets_takes_the_iterations_of_a_model_without_contact(name: 
     assert [r.lam for r in with_contact.records] == [r.lam for r in without.records]
     assert with_contact.steps[0].iterations == without.steps[0].iterations
     assert with_contact[-1].points == pytest.approx(without[-1].points, abs=1e-9)
+
+
+def test_a_way_that_is_not_clear_at_all_is_taken_with_contact(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(SheetBarrier, "clear_ways", lambda *_: 0.0)
+    assert bh.trace(letter(by=1.0)).reached
