@@ -35,6 +35,7 @@ from meshes.io.export import replacing
 
 Array = NDArray[np.float64]
 SHARE = 0.6  # of the time that is left goes to each of the scenes but the last
+RESERVED = 0.2  # of it is left for those that follow, however far a scene has come
 # s that an evaluation of a system takes, a tangent with its factors, and an unknown of either (one core of 2.5 GHz):
 # time is counted by work, so that the scene that is kept does not hang on the machine, or on what else runs on it
 EVALUATION, TANGENT, UNKNOWN, FACTORED = 1e-4, 3e-4, 5e-7, 1e-5
@@ -216,7 +217,8 @@ def fold_file(
             scene = replace(parse_scene(offer.text, folder, file.stem), source=target)
             report = meter(progress)
             stage(report, offer.mesh)
-            clock = _Clock(report, max(share, 1.0), max(left, 1.0))
+            most = left if number == len(offers) - 1 else (1.0 - RESERVED) * left
+            clock = _Clock(report, max(share, 1.0), max(most, 1.0))
             path, why = _solved(scene, place, clock)
         except InputError as error:
             failed = failed or error

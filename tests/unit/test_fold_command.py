@@ -374,3 +374,19 @@ class TestAllSheets:
         assert main(["fold", str(file), "-o", str(tmp_path / "out"), "--sheet", "all"]) == 2
         assert "there is no mountain or valley crease" in capsys.readouterr().err
         assert not (tmp_path / "out").exists()
+
+
+def test_scenes_that_follow_have_a_part_of_the_time_however_far_one_has_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clocks: list[tuple[float, float]] = []
+
+    def refused(scene: object, place: object, clock: _Clock) -> object:
+        clocks.append((clock._share, clock._most))
+        raise InputError("not today")
+
+    monkeypatch.setattr("bh.commands.fold._solved", refused)
+    with pytest.raises(InputError, match="not today"):
+        fold_file(Path("tests/data/ring_pleats.svg"), tmp_path, Wish(), seconds=50.0)
+    assert len(clocks) > 1
+    assert clocks[0] == (30.0, 40.0)
