@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from bh import Automatic, LoadControl, Path, trace
 from bh.errors import InputError
@@ -159,14 +160,31 @@ def part_of(variable: str, most: int, scenes: int) -> range:
     return range(int(first), int(last))
 
 
+def played(
+    context: Context, case: str, runs: str, numbers: range, scenes: int, play: Callable[[int], Any]
+) -> list[dict[str, Any]]:
+    """Play the scenes that are not stored, keep each as it ends, and give all that are stored, by number.
+
+    Args:
+        context: of the run.
+        case: its name, for the progress.
+        runs: file of the store.
+        numbers: scenes to play.
+        scenes: all.
+        play: gives a dataclass for the number of a scene.
+    """
+    store = Store.open(context.folder, runs, context.quick)
+    for number in numbers:
+        if str(number) not in store.runs:
+            context.tell(f"{case}: scene {number}")
+            store.keep(str(number), asdict(play(number)))
+    return [store.runs[str(n)] for n in range(scenes) if str(n) in store.runs]
+
+
 def run(context: Context) -> CaseResult:
     """Play the scenes that are not stored, and count all that are."""
-    store = Store.open(context.folder, RUNS, context.quick)
-    for number in part_of(PART, QUICK if context.quick else SCENES, SCENES):
-        if str(number) not in store.runs:
-            context.tell(f"{CASE}: scene {number}")
-            store.keep(str(number), asdict(play(number)))
-    known = [store.runs[str(n)] for n in range(SCENES) if str(n) in store.runs]
+    numbers = part_of(PART, QUICK if context.quick else SCENES, SCENES)
+    known = played(context, CASE, RUNS, numbers, SCENES, play)
     return judged([Row(**{**row, "told": tuple(row["told"])}) for row in known])
 
 

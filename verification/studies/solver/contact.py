@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 
 import numpy as np
 
@@ -19,8 +18,7 @@ from bh.mechanics.consistent.system import ConsistentSystem
 from bh.paths.path import Path
 from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context
-from verification.framework.store import Store
-from verification.studies.solver.branches import part_of
+from verification.studies.solver.branches import part_of, played
 from verification.studies.solver.contact_scenes import SEED, Row, play
 from verification.theory.wrapped import wrapped_by
 
@@ -152,11 +150,7 @@ def run(context: Context) -> CaseResult:
         f"{ELASTICA}; {SCENES} random scenes of seed {SEED}",
     )
     wrapping(result, context.quick)
-    store = Store.open(context.folder, RUNS, context.quick)
-    for number in part_of(PART, QUICK if context.quick else SCENES, SCENES):
-        if str(number) not in store.runs:
-            context.tell(f"{CASE}: scene {number}")
-            store.keep(str(number), asdict(play(number)))
-    known = [store.runs[str(n)] for n in range(SCENES) if str(n) in store.runs]
+    numbers = part_of(PART, QUICK if context.quick else SCENES, SCENES)
+    known = played(context, CASE, RUNS, numbers, SCENES, play)
     meeting(result, [Row(**{**row, "told": tuple(row["told"])}) for row in known])
     return result
