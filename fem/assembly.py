@@ -114,7 +114,8 @@ def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: boo
         lower = np.tril_indices(rows.shape[1])
         a, b = rows[:, lower[0]], rows[:, lower[1]]
         column = np.minimum(a, b)
-        slots = np.where(column >= 0, np.abs(a - b) + column * (bandwidth + 1), -1).astype(np.int32)
+        places = np.where(column >= 0, np.abs(a - b) + column * (bandwidth + 1), -1)
+        slots = places.astype(np.int32, order="C")  # as of a sparse matrix, for which `scatter` is compiled
         reach = np.arange(len(order))
         np.maximum.at(reach, rows[rows >= 0], np.repeat(last, (rows >= 0).sum(axis=1)))
         reach = np.maximum.accumulate(reach)

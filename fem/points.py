@@ -27,7 +27,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bh.runtime.kernel_options import INNER, KERNEL
+from bh.runtime.kernel_options import INNER
 
 Array = NDArray[np.float64]
 
@@ -96,14 +96,14 @@ def edge_slopes(tau, c, t0, g):  # type: ignore[no-untyped-def]
     g[1, 0], g[1, 1], g[1, 2] = fall * N0, fall * N1, fall * N2
 
 
-@njit(**KERNEL)
+@njit(**INNER)
 def edge_angle(tau, c, t0, d0, g):  # type: ignore[no-untyped-def]
     """Angle theta of one edge point; writes d theta / d tau and d theta / d c into the rows of `g` (2, 3)."""
     edge_slopes(tau, c, t0, g)
     return edge_rise(tau, c, t0, d0)
 
 
-@njit(**KERNEL)
+@njit(**INNER)
 def edge_angle_hessian(tau, c, t0, H):  # type: ignore[no-untyped-def]
     """Second derivatives of theta with respect to (tau, c) into H (2, 2, 3, 3)."""
     room = np.empty((5, 3))  # made at once: it costs as much as the arithmetic
@@ -148,7 +148,7 @@ def edge_angle_hessian(tau, c, t0, H):  # type: ignore[no-untyped-def]
             H[0, 1, j, i] = H[1, 0, i, j]
 
 
-@njit(**KERNEL)
+@njit(**INNER)
 def curvature_hessian(p, r, y, H):  # type: ignore[no-untyped-def]
     """Second derivatives of nu . y with respect to (p, r, y) into H (3, 3, 3, 3), y linear."""
     room = np.empty((12, 3))

@@ -13,12 +13,18 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from bh.runtime.compiling import compilations_heard
 
+if TYPE_CHECKING:
+    from numba import types
+
 MOST = 2  # processes beside the run
 # what a run of the default formulation compiles, in the order in which it is needed; a test holds it to the code.
-# Arguments: d, q, i, b, ? are float64, int64, int32, int8, bool; then the dimensions of an array, then r if read-only
+# Arguments: d, q, i, b, ? are float64, int64, int32, int8, bool; then the dimensions of an array, then r if read-only;
+# Name:... is the named tuple of that name in the kernel's module
 KERNELS = (
     "bh.mechanics.consistent.setup:_join q2 q1 q1 q1 q1 q1",
     "bh.mechanics.consistent.membrane_kernels:_triangle_strains d2r q2 d3 d1",
@@ -49,6 +55,15 @@ KERNELS = (
     "bh.solvers.multifrontal:_update_places q1 q1 q1 q2 q2",
     "bh.solvers.multifrontal:_factorise d1 q1 q1 i1 q1 q1 q1 q1 q q d1 q1 i1 d1",
     "bh.solvers.multifrontal:_solve d1 q1 q1 i1 q1 d1 d1 q1 i1 d1",
+)
+# what the shell, which comes next where the default formulation converges slowly, compiles beside these solvers
+SHELL = (
+    "fem.kernels:measures d2 d3 Loops:q2,q2,d2,d2,d3,d3,d3,d3,d2,d2,d3,d3,d2 Frames:d3,d3 d2 d2",
+    "fem.kernels:gradients d2 Loops:q2,q2,d2,d2,d3,d3,d3,d3,d2,d2,d3,d3,d2 Frames:d3,d3 d3",
+    "fem.kernels:add_material d3 d3 d3 d3",
+    "fem.kernels:add_geometric d2 d2 Loops:q2,q2,d2,d2,d3,d3,d3,d3,d2,d2,d3,d3,d2 Frames:d3,d3 d3",
+    "fem.assembly:_sparse_slots q2 i1 i1",
+    "fem.assembly:scatter d3 d2 i2 d1",
 )
 
 
@@ -94,13 +109,15 @@ def _begin(place: int) -> subprocess.Popen[bytes]:
 def order(place: int) -> list[str]:
     """The kernels in the order of one process: from the last one on; the first process leaves the solver to the end.
 
-    What a narrow sheet does without, the factors of wide ones, thus comes last where there is one process only.
+    What a narrow sheet does without, the factors of wide ones, thus comes late where there is one process only, and
+    the shell, which many runs do without, comes last in both.
 
     Args:
         place: of the process, from 0.
     """
     last_first = list(reversed(KERNELS))
-    return last_first if place else sorted(last_first, key=lambda kernel: kernel.startswith("bh.solvers"))
+    first = last_first if place else sorted(last_first, key=lambda kernel: kernel.startswith("bh.solvers"))
+    return [*first, *reversed(SHELL)]
 
 
 def compile_kernel(kernel: str) -> None:
@@ -109,18 +126,24 @@ def compile_kernel(kernel: str) -> None:
     Args:
         kernel: as in `KERNELS`.
     """
-    from numba import types
-
     name, *arguments = kernel.split()
     module, _, function = name.partition(":")
+    place = importlib.import_module(module)
+    getattr(place, function).compile(tuple(_type(code, place) for code in arguments))
+
+
+def _type(code: str, module: ModuleType) -> types.Type:
+    """The numba type of one argument of a kernel of that module."""
+    from numba import types
+
+    tuple_, colon, members = code.partition(":")
+    if colon:
+        kinds = [_type(member, module) for member in members.split(",")]
+        return types.BaseTuple.from_types(kinds, getattr(module, tuple_))
     plain = {"d": types.float64, "q": types.int64, "i": types.int32, "b": types.int8, "?": types.boolean}
-    signature = tuple(
-        types.Array(plain[code[0]], int(code[1]), "C", readonly=code.endswith("r"))
-        if code[1:]
-        else plain[code]
-        for code in arguments
-    )
-    getattr(importlib.import_module(module), function).compile(signature)
+    if not code[1:]:
+        return plain[code]
+    return types.Array(plain[code[0]], int(code[1]), "C", readonly=code.endswith("r"))
 
 
 def main(parent: int, place: int, compiling: Callable[[str], None] = compile_kernel) -> None:

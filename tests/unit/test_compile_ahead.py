@@ -1,6 +1,7 @@
 """Other processes that compile the kernels of a first run from the last one on."""
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,8 +11,9 @@ import pytest
 from numba import njit
 
 from bh.commands import compile_ahead
-from bh.commands.compile_ahead import KERNELS, compile_kernel, compiled_ahead, main, order
+from bh.commands.compile_ahead import KERNELS, SHELL, compile_kernel, compiled_ahead, main, order
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 ALL = """
 import sys
 from numba import types
@@ -19,17 +21,20 @@ from numba.core.dispatcher import Dispatcher
 from pathlib import Path
 from bh.commands.cli import main
 assert main(["init"]) == 0
-scene = Path("scene.toml")
-scene.write_text(scene.read_text().replace("pictures = true", "pictures = false"))
-assert main(["run", "scene.toml", "--quiet"]) == 0
+for scene in map(Path, ("scene.toml", "wave.toml")):
+    scene.write_text(scene.read_text().replace("pictures = true", "pictures = false"))
+    assert main(["run", str(scene), "-o", scene.stem, "--quiet"]) == 0
 letters = {types.float64: "d", types.int64: "q", types.int32: "i", types.int8: "b", types.boolean: "?"}
 def code(kind):
     if isinstance(kind, types.Array):
-        return f"{letters[kind.dtype]}{kind.ndim}{'' if kind.mutable else 'r'}"
+        layout = "" if kind.layout == "C" else kind.layout
+        return f"{letters[kind.dtype]}{kind.ndim}{layout}{'' if kind.mutable else 'r'}"
+    if isinstance(kind, types.BaseNamedTuple):
+        return f"{kind.instance_class.__name__}:{','.join(map(code, kind))}"
     return letters[kind]
 found = {
     f"{kernel.py_func.__module__}:{kernel.py_func.__name__} {' '.join(map(code, signature))}"
-    for module in list(sys.modules) if module.startswith("bh.")
+    for module in list(sys.modules) if module.startswith(("bh.", "fem."))
     for kernel in vars(sys.modules[module]).values() if isinstance(kernel, Dispatcher)
     if not kernel.targetoptions.get("no_cpython_wrapper") for signature in kernel.signatures
 }
@@ -75,12 +80,14 @@ def kernel(module: str) -> Callable[[float], float]:
 
 @pytest.mark.slow  # compiles everything anew
 def test_the_table_is_what_a_run_compiles(tmp_path: Path) -> None:
-    """Of the scene that `bh init` writes, on narrow meshes and on wide ones."""
+    """Of the scene that `bh init` writes, on narrow meshes and on wide ones, and of a drawing that takes the shell."""
+    for name in ("wave.toml", "wave.svg"):
+        shutil.copy(EXAMPLES / name, tmp_path)
     done = subprocess.run(
         [sys.executable, "-c", ALL], capture_output=True, text=True, timeout=600, cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.partition("found\n")[2].splitlines() == sorted(KERNELS)
+    assert done.stdout.partition("found\n")[2].splitlines() == sorted((*KERNELS, *SHELL))
 
 
 def test_a_kernel_of_the_table_is_compiled_for_its_arguments() -> None:
@@ -90,6 +97,15 @@ def test_a_kernel_of_the_table_is_compiled_for_its_arguments() -> None:
     compile_kernel(row)
     (signature,) = dissection._spread.signatures
     assert len(signature) == len(row.split()) - 1
+
+
+def test_a_kernel_of_named_tuples_is_compiled_for_them() -> None:
+    from fem.kernels import Frames, Loops, gradients
+
+    (row,) = (row for row in SHELL if row.startswith("fem.kernels:gradients "))
+    compile_kernel(row)
+    compiled = [[getattr(kind, "instance_class", None) for kind in one] for one in gradients.signatures]
+    assert [None, Loops, Frames, None] in compiled
 
 
 @pytest.mark.parametrize(("cores", "helpers"), [(1, 0), (2, 1), (3, 2), (64, 2)])
@@ -128,11 +144,12 @@ def test_nothing_begins_where_all_is_there(begun: list[Helper]) -> None:
 
 
 def test_from_the_last_one_on() -> None:
-    """The first process leaves the solver, which a narrow sheet does not need, to the end."""
-    assert order(1) == list(reversed(KERNELS))
-    assert sorted(order(0)) == sorted(KERNELS)
-    solver = [row.startswith("bh.solvers") for row in order(0)]
+    """The first process leaves the solver, which a narrow sheet does not need, to the end; the shell is behind all."""
+    assert order(1) == [*reversed(KERNELS), *reversed(SHELL)]
+    assert sorted(order(0)) == sorted((*KERNELS, *SHELL))
+    solver = [row.startswith("bh.solvers") for row in order(0)[: len(KERNELS)]]
     assert solver == sorted(solver)
+    assert order(0)[len(KERNELS) :] == list(reversed(SHELL))
 
 
 def test_a_helper_stops_when_its_run_has_ended() -> None:
@@ -140,7 +157,7 @@ def test_a_helper_stops_when_its_run_has_ended() -> None:
     main(os.getppid(), 1, done.append)
     assert done == order(1)
     main(-1, 1, done.append)
-    assert len(done) == len(KERNELS)
+    assert len(done) == len(KERNELS) + len(SHELL)
 
 
 def test_a_helper_begins_and_ends() -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numba import njit
 
-from fem.points import curvature_hessian, edge_angle, edge_angle_hessian
+from fem import points
 from fem.spaces import (
     CORNERS,
     EDGES,
@@ -19,6 +20,23 @@ from fem.spaces import (
     shapes,
     tables,
 )
+
+# Python cannot call the functions themselves, which spares every first run three entrances
+
+
+@njit
+def edge_angle(tau, c, t0, d0, g):  # type: ignore[no-untyped-def]
+    return points.edge_angle(tau, c, t0, d0, g)
+
+
+@njit
+def edge_angle_hessian(tau, c, t0, H):  # type: ignore[no-untyped-def]
+    points.edge_angle_hessian(tau, c, t0, H)
+
+
+@njit
+def curvature_hessian(p, r, y, H):  # type: ignore[no-untyped-def]
+    points.curvature_hessian(p, r, y, H)
 
 
 def unit(v: np.ndarray) -> np.ndarray:
