@@ -488,6 +488,9 @@ def test_strips_case_sees_a_wrong_stiffness(monkeypatch: pytest.MonkeyPatch, tmp
 # --------------------------------------------------------------------------------------- long cases
 
 
+TITLE = "1 random scenes by both formulations"
+
+
 @pytest.fixture
 def played_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scenes of the campaign are reached at once, in this process: how they are played has tests of its own."""
@@ -505,16 +508,17 @@ def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytes
     store = tmp_path / "campaign.jsonl"
     told: list[str] = []
     whole = campaign.play_all(few, store, told.append)
-    assert [r.outcome for r in whole] == ["reached"] * 3
+    assert [r.outcome for r in whole] == ["reached"] * 6
+    assert [scene.formulation for scene in few] == ["bars-and-hinges"] * 3 + ["consistent"] * 3
     assert told == []
     lines = store.read_text().splitlines()
-    assert len(lines) == 4
+    assert len(lines) == 7
     marked = json.dumps({**json.loads(lines[1]), "iterations": 12345})
     store.write_text("\n".join([lines[0], marked, lines[2][:20]]))
     again = campaign.play_all(few, store, told.append)
     assert sorted(r.iterations for r in again)[-1] == 12345
-    assert sorted(r.outcome for r in again) == ["reached"] * 3
-    assert "1 of 3 scenes are known" in told[0]
+    assert sorted(r.outcome for r in again) == ["reached"] * 6
+    assert "1 of 6 scenes are known" in told[0]
     monkeypatch.setattr(campaign, "environment", lambda: {"python": "y"})
     anew = campaign.play_all(few, store, told.append)
     assert [r.iterations for r in anew] == [r.iterations for r in whole]
@@ -523,12 +527,11 @@ def test_campaign_goes_on_where_it_was_killed(tmp_path: Path, monkeypatch: pytes
 @pytest.mark.usefixtures("played_at_once")
 def test_long_cases_come_from_the_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run without them shows the kept run, with its own date; a run of them replaces it."""
-    few = campaign.scenes(1)
     monkeypatch.setattr(campaign, "QUICK_SCENES", 1)
     run(["campaign"], tmp_path / "long", quick=True)
     (tmp_path / "records").mkdir()
     kept = tmp_path / "records" / "campaign.json"
-    kept.write_text((tmp_path / "long" / "checks.json").read_text().replace('"1 random scenes"', '"kept"'))
+    kept.write_text((tmp_path / "long" / "checks.json").read_text().replace(f'"{TITLE}"', '"kept"'))
     monkeypatch.setattr(runner, "RECORDS", tmp_path / "records")
     data = run(["shear_calibration"], tmp_path / "short")
     assert [info["name"] for info in data["cases"]] == ["shear_calibration"]
@@ -537,4 +540,4 @@ def test_long_cases_come_from_the_record(tmp_path: Path, monkeypatch: pytest.Mon
     assert titles["campaign"] == "kept"
     run(["campaign"], tmp_path / "short", quick=True)
     stored = json.loads((tmp_path / "short" / "checks.json").read_text())
-    assert [i["title"] for i in stored["cases"] if i["name"] == "campaign"] == [f"{len(few)} random scenes"]
+    assert [i["title"] for i in stored["cases"] if i["name"] == "campaign"] == [TITLE]
