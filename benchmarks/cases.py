@@ -39,6 +39,11 @@ def strip(along: int) -> bh.Model:
     return supported(meshes.structured(pattern, along=along))
 
 
+def sector(along: int, rows: int) -> meshes.SheetMesh:
+    """The sheet of App. B, staggered."""
+    return meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), along=along, rows=rows)
+
+
 def wide(rows: int) -> bh.Model:
     """A sheet 60 mm wide and 150 mm long, refined both ways."""
     return supported(meshes.structured(meshes.annulus_sector(100.0, 30.0, 1.5), along=4 * rows, rows=rows))
