@@ -70,6 +70,7 @@ STUDIES = (
     Study("shell_benchmarks", "solver"),
     Study("eigenvalues", "solver"),
     Study("published", "solver", seconds=250),
+    Study("peers", "solver", seconds=15),
     Study("tables4", "4", seconds=1),
     Study("speed_error", "solver", long=True),
     Study("map", "solver", long=True),
