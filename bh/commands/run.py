@@ -79,7 +79,7 @@ def solve(
         progress: as for `bh.trace`.
         estimate: solve a coarser mesh, too, where the mesh was given, for an estimate of the error.
         strategy: of the increments; None for the scene's.
-        neighbours: as for `bh.trace`.
+        neighbours: as for `bh.trace`; None for what the scene says.
 
     Raises:
         InputError: the folder cannot be written, there is nothing to resume, or the model cannot be solved as
@@ -142,7 +142,7 @@ def _solved(
             symmetry=scene.symmetry,
             strategy=strategy or scene.strategy,
             estimate=estimate and scene.accuracy is None,
-            neighbours=neighbours,
+            neighbours=scene.neighbours if neighbours is None else neighbours,
             warn=False,  # the command says it in a line of its own
         )
     _keep_scene(scene, file)

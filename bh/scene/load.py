@@ -107,6 +107,7 @@ class Scene:
         accuracy: the wanted accuracy, or None: `bh.trace(scene.model, accuracy=scene.accuracy)`.
         symmetry: the plane of symmetry of a scene, or None: `bh.trace(..., symmetry=scene.symmetry)`.
         strategy: of the increments, or None for the default: `bh.trace(..., strategy=scene.strategy)`.
+        neighbours: whether to look beside the ends of steps: `bh.trace(..., neighbours=scene.neighbours)`.
         name: the file's name without its suffix.
         source: the file, or None for a scene that was parsed from text.
         drawn: what the mesh was made from, or None for a scene that was put together in Python.
@@ -119,6 +120,7 @@ class Scene:
     accuracy: Goal | None = None
     symmetry: Plane | None = None
     strategy: Strategy | None = None
+    neighbours: bool | None = None
     drawn: Drawn | None = None
 
 
@@ -239,6 +241,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         accuracy=wanted_accuracy(data, model),
         symmetry=_symmetry(model, data["symmetry"]) if "symmetry" in data else None,
         strategy=Settling() if how.strategy == "settling" else None,
+        neighbours=how.neighbours,
         drawn=drawn,
     )
 

@@ -153,6 +153,11 @@ class ModelTable(Table):
     formulation: str = Field("consistent", description="a name that `bh formulations` lists")
     hinge_lock: bool = Field(True, description="true or false")
     strategy: Literal["automatic", "settling"] = Field("automatic", description='"automatic" or "settling"')
+    neighbours: bool | None = Field(
+        None,
+        description="true: look beside the end of every step for another stable state; false: at none. Left out: where "
+        "there is reason to",
+    )
 
 
 class OutputsTable(Table):

@@ -56,6 +56,7 @@ def solve(
     strategy: Strategy | None = None,
     symmetry: Plane | None = None,
     levels: Levels | None = None,
+    neighbours: bool | None = None,
 ) -> Path:
     """Trace a model to a wanted accuracy; its own mesh and formulation only say what the sheet is.
 
@@ -66,6 +67,7 @@ def solve(
         strategy: as for `bh.trace`.
         symmetry: as for `bh.trace`.
         levels: where the path of every mesh is kept, and found again.
+        neighbours: as for `bh.trace`; looked for once, on the mesh before the one that is taken.
 
     Returns:
         the path on the finest mesh; `path.accuracy` says what was chosen, estimated and spent. If the estimate does not
@@ -101,7 +103,10 @@ def solve(
         race.judge(name, trials, [item.error for item in found if item.formulation == name])
     if not found:
         raise failed or ModelError("no formulation is left to solve this with")
-    return _chosen(goal, found, trials, _notes(race, ladders, trials, why), time.perf_counter() - began)
+    path = _chosen(goal, found, trials, _notes(race, ladders, trials, why), time.perf_counter() - began)
+    if neighbours is not False:
+        look_beside(path, _before(path, found), asked=bool(neighbours))
+    return path
 
 
 @dataclass(frozen=True)
@@ -171,8 +176,6 @@ def _chosen(goal: Goal, found: Sequence[_Found], trials: list[Trial], notes: lis
     if not math.isfinite(best.error):
         best = found[-1]
     path, met = best.path, best.error <= goal.within
-    before = [item.path for item in found[: found.index(best)] if item.formulation == best.formulation]
-    look_beside(path, before[-1] if before and path.reached and before[-1].reached else None)
     path.accuracy = Accuracy(
         goal,
         best.error,
@@ -185,6 +188,13 @@ def _chosen(goal: Goal, found: Sequence[_Found], trials: list[Trial], notes: lis
         notes=tuple(notes if not met else [note for note in notes if not note.startswith("ended")]),
     )
     return path
+
+
+def _before(path: Path, found: Sequence[_Found]) -> Path | None:
+    """The path on the mesh before that of `path`, of the same formulation, if both were reached."""
+    paths = [item.path for item in found if item.formulation == path.model.formulation]
+    number = next(i for i, other in enumerate(paths) if other is path)
+    return paths[number - 1] if number > 0 and path.reached and paths[number - 1].reached else None
 
 
 def _notes(race: Race, ladders: dict[str, Ladder], trials: Sequence[Trial], why: str) -> list[str]:

@@ -231,17 +231,18 @@ def _beside(path: Path, step: int, asked: bool, item: Increment | None) -> str:
         return look_around(system, here, doubtful, Newton())
 
 
-def look_beside(path: Path, coarser: Path | None = None) -> None:
+def look_beside(path: Path, coarser: Path | None = None, *, asked: bool = False) -> None:
     """Look for other stable states beside the ends of steps that were followed with `neighbours=False`.
 
     Args:
         path: its reached steps are told what lies beside their ends, as `follow` does where there is reason to look.
         coarser: the same steps on a coarser mesh, where a look takes a fraction of the time; None to look on its own.
+        asked: look beside every step.
     """
     on, where = (path, "") if coarser is None else (coarser, ", on the coarser mesh before this one")
     with one_blas_thread():
         for step, end in enumerate(path.steps):
-            if end.reached and (seen := _beside(on, step, False, None)):
+            if end.reached and (seen := _beside(on, step, asked, None)):
                 path.steps[step] = replace(end, reason=seen + where)
 
 

@@ -55,7 +55,7 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
         warn: give a `bh.NotReachedWarning` where the path ends early; False where the caller looks at its outcome.
         neighbours: at the end of each step look for other stable states beside it, such as one of lower energy, and
             say so in `path.remarks`; None looks where an increment was cut, a branch was left or a mode hardly
-            resists. With an accuracy every mesh is solved as by None.
+            resists. With an accuracy one look is taken, on the mesh before the one that is taken.
 
     Returns:
         the path; `path.outcome` is "reached" only if every step was. A step that cannot go on ends the path with
@@ -81,7 +81,7 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
     report = meter(progress)
     with compilation_told(report):
         if accuracy is not None:
-            path = _to_accuracy(model, accuracy, symmetry, report, strategy, file, resume)
+            path = _to_accuracy(model, accuracy, symmetry, report, strategy, file, resume, neighbours)
         else:
             options = _Options(symmetry, report, strategy, file, resume, after, neighbours)
             path = _as_needed(model, options) if model.contact == "auto" else options.follow(model)
@@ -144,6 +144,7 @@ def _to_accuracy(
     strategy: Strategy | None,
     file: str | FilePath | None,
     resume: bool,
+    neighbours: bool | None,
 ) -> Path:
     # its analyses are loaded only where they are needed
     from bh.model.refinement import Goal
@@ -152,7 +153,15 @@ def _to_accuracy(
 
     goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
     levels = None if file is None else Levels(file, resume)
-    path = solve(model, goal, progress=report, strategy=strategy, symmetry=symmetry, levels=levels)
+    path = solve(
+        model,
+        goal,
+        progress=report,
+        strategy=strategy,
+        symmetry=symmetry,
+        levels=levels,
+        neighbours=neighbours,
+    )
     if file is not None:
         path.save(file)
     return path

@@ -20,6 +20,7 @@ from bh.solvers.arc_length import ArcLength
 from bh.solvers.automatic import Automatic
 from bh.solvers.load_control import LoadControl
 from bh.solvers.outcome import Outcome
+from bh.solvers.walk import Strategy
 from bh.solving.trace import trace
 from bh.sweep.dataset import Label
 from bh.sweep.measures import Measure
@@ -111,13 +112,13 @@ class SceneTask:
     def __call__(self, parameters: Mapping[str, Value]) -> Measured:
         """Solve the scene of a point and measure its last state."""
         scene = self.scene(parameters)
-        path = trace(scene.model, accuracy=scene.accuracy, strategy=scene.strategy, warn=False)
+        path = _solved(scene, scene.strategy)
         if path.reached:
             return Measured(self.measure(path))
         why = f"{path.outcome} at {_where(path)}"
         if path.outcome not in RETRIED or scene.strategy is not None:
             return Measured({}, path.outcome, f"{_where(path)}: {path.reason}")
-        finer = trace(scene.model, accuracy=scene.accuracy, strategy=FINER, warn=False)
+        finer = _solved(scene, FINER)
         if finer.reached:
             return Measured(self.measure(finer) | {"retried": 1}, reason=f"by finer increments, after {why}")
         tried = f"{_where(finer)}: {finer.reason} (by finer increments; before {why})"
@@ -220,6 +221,16 @@ def _setter(tables: dict[str, object], key: str, name: str) -> Callable[[Value],
         return setter(tables, key)
     except SceneError as error:
         raise SweepError(f"parameter '{name}': {error}") from error
+
+
+def _solved(scene: Scene, strategy: Strategy | None) -> Trace:
+    return trace(
+        scene.model,
+        accuracy=scene.accuracy,
+        strategy=strategy,
+        neighbours=scene.neighbours,
+        warn=False,
+    )
 
 
 def _where(path: Trace) -> str:

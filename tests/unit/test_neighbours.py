@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 import bh
 import meshes
+from bh.commands import cli
 from bh.errors import InputError
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.consistent.system import ConsistentSystem
+from bh.scene.load import parse_scene
 from bh.solvers import neighbours
 from bh.solvers.factor import Factor
 from bh.solvers.matrices import BandMatrix
@@ -23,6 +25,8 @@ from bh.solvers.neighbours import look_around, nearly_neutral, neighbour
 from bh.solvers.newton import Newton
 from bh.solvers.points import Factorised, Point, point
 from bh.solvers.system import Evaluation
+from bh.solving import follow
+from bh.sweep.scenes import SceneTask
 from tests.unit.test_newton import Small
 from verification.studies.solver import branches
 from verification.studies.solver.branch_scenes import drawn
@@ -151,6 +155,64 @@ def test_the_look_makes_nothing_anew(
     assert min(made.values()) > 0
     assert len(looks) == 1
     assert looks[0] > neighbours.SOFT
+
+
+SCENE = """
+[pattern]
+kind = "annulus_sector"
+radius = 100.0
+width = 10.0
+angle = 0.5
+[sheet]
+E = 4000.0
+t = 0.1
+[mesh]
+along = 8
+[model]
+formulation = "bars-and-hinges"
+{}
+[[steps]]
+fold = {{ crease = "crease", by = 0.3 }}
+[[steps]]
+fold = {{ crease = "crease", by = 0.2 }}
+"""
+
+
+@pytest.mark.parametrize(("key", "looks"), [("", []), ("true", [True, True]), ("false", None)])
+@pytest.mark.parametrize("way", ["run", "sweep", "accuracy"])
+def test_a_scene_asks_for_the_look(
+    way: str, key: str, looks: list[bool] | None, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`[model] neighbours`: true looks beside every step, false at none; left out, where there is reason to."""
+    asked: list[bool] = []
+
+    def looked(system: object, here: object, doubtful: bool, *_: object) -> str:
+        asked.append(doubtful)
+        return "seen"
+
+    monkeypatch.setattr(follow, "look_around", looked)
+    text = SCENE.format(f"neighbours = {key}" if key else "")
+    if way == "accuracy":
+        text = "accuracy = 0.1\n" + text.replace("[mesh]\nalong = 8\n", "").replace(
+            "bars-and-hinges", "consistent"
+        )
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    if way == "sweep":
+        task = SceneTask(text, {"t": ("sheet.t",)}, tmp_path)
+        assert task({"t": 0.12}).reason == ""
+    else:
+        words = ["run", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "out"), "-q", "--no-estimate"]
+        assert cli.main(words) == 0
+        remarks = bh.Path.load(tmp_path / "out" / "path.bh").remarks
+        assert any("seen" in line for line in remarks) == (looks is not None)
+    assert asked == ([] if looks is None else looks or [False, False])
+
+
+def test_the_look_is_true_or_false() -> None:
+    with pytest.raises(InputError, match=r"model\.neighbours"):
+        parse_scene(SCENE.format('neighbours = "often"'))
+    assert parse_scene(SCENE.format("neighbours = true")).neighbours is True
+    assert parse_scene(SCENE.format("")).neighbours is None
 
 
 def test_rows_are_judged() -> None:

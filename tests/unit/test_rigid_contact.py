@@ -69,6 +69,31 @@ def test_beam_on_two_supports(formulation: str) -> None:
     assert end["left"][0] == pytest.approx(-end["right"][0], rel=1e-6)
 
 
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_reactions_carry_what_presses_on_held_nodes(formulation: str) -> None:
+    """One bar presses on nodes that a support holds, another beside them: reactions and bars are in balance."""
+    about: dict[str, Any] = {
+        "azimuth": 0.5 * math.pi,
+        "width": 1.0,
+        "height": 1.0,
+        "radius": 0.5,
+        "gap": 0.02,
+    }
+    bars = [
+        Indenter("held", (1.0, 2.5, 0.52), by=(0.0, 0.0, -0.05), **about),
+        Indenter("free", (36.0, 2.5, 0.52), by=(0.0, 0.0, -0.5), **about),
+    ]
+    model = beam(formulation).support("edge:start").support([0, 1, 2, 3, 4, 5]).support("edge:end")
+    state = trace(model.step(*bars)).require()[-1]
+    pressed = sum(state.contact_forces.values())
+    assert state.contact_forces["held"][2] < -0.1
+    assert np.abs(state.reactions.sum(axis=0) + pressed).max() < 1e-6 * np.abs(pressed).max()
+    resultant = np.cross(state.points, state.reactions).sum(axis=0)
+    assert resultant[1] == pytest.approx(
+        36.0 * state.contact_forces["free"][2] + 1.0 * state.contact_forces["held"][2], rel=0.02
+    )
+
+
 def test_supports_may_lie_between_nodes() -> None:
     """Points all over the edges carry the contact, so the span is that of the supports and not of the nodes."""
     slopes = []

@@ -101,7 +101,7 @@ class BarsAndHinges:
         e, mesh = system.elements, system.mesh
         x = system.near(q, lam)
         _, _, f, forces, turn = system.internal_forces(x, q, lam)
-        contact = 0.0 if system.barrier is None else system.barrier.forces(x, f)
+        contact = system.press_on(x, lam, f)
         phi = dihedral_angles(x, e.hinges)
         s_bar, s_hinge = forces[: len(e.bars)], forces[len(e.bars) :]
         stretch = 0.5 * s_bar**2 / np.maximum(e.bar_stiffness, 1e-300)

@@ -107,7 +107,7 @@ class Consistent:
         x = system.near(q, lam)
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
-        contact = 0.0 if system.barrier is None else system.barrier.forces(x, now.f)
+        contact = system.press_on(x, lam, now.f)
         stretching, bending = system.stretching_by_triangle(x), system.bending_by_triangle(now.theta)
         folding, dissipated = 0.5 * e.spring_stiffness * now.turns**2, 0.0
         if system.curves is not None:

@@ -105,6 +105,23 @@ class SupportedSheet:
             return ""
         return "panels would pass through each other on the way there"
 
+    def press_on(self, x: Array, lam: float, f: Array) -> float:
+        """Energy of panels in contact; what they and bodies press with is added to nodal forces.
+
+        Held nodes that are pressed on hand it on to their supports, so reactions are read behind this.
+
+        Args:
+            x: (n, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+            f: (n, 3) N; the gradient is added.
+
+        Returns:
+            N mm, of panels alone.
+        """
+        if self.rigid_contact is not None:
+            self.rigid_contact.forces(x, lam, f)
+        return 0.0 if self.barrier is None else self.barrier.forces(x, f)
+
     def _touching(self, x: Array) -> tuple[Ints, Array] | None:
         """What panels in contact add to the tangent at positions x (`SheetBarrier.blocks`); None without contact.
 
