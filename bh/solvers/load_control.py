@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from bh.solvers.branching import NO_BRANCH, Branch, onto_stable_branch
 from bh.solvers.creeping import CREEPS
+from bh.solvers.hindrance import clear_guess, found_apart, slipped, up_to_contact
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import GAP, KNOWN_GAP, count_negative, neutral_mode
 from bh.solvers.newton import ALONG, INDEFINITE, Newton, Solution
@@ -26,18 +28,12 @@ from bh.solvers.points import (
     lambda_after,
     point,
     power_rate,
-    ways,
 )
 from bh.solvers.stability import leave_saddle, locate
-from bh.solvers.system import Hindered, System, clear_part, meeting, pressing
+from bh.solvers.system import System
 
 Array = NDArray[np.float64]
 LOOK = 2  # cuts of an increment before a bifurcation is looked for
-SMALLEST = 1e-5  # part of a step that an increment up to a contact may be
-APPROACHES = 2  # states that are looked for on a way before what stands in it is reckoned with
-WAYS = 4  # straight ones that an increment is looked at in
-SHORT_OF = 0.98  # of the way to what stands there
-LEAST_CLEAR = 0.2  # of an increment, for a shorter one to be worth it
 AtBifurcation = Literal["stable", "primary", "stop"]
 
 
@@ -135,8 +131,11 @@ class LoadControl:
         held: Array | None = None  # the neutral mode, once the path has one
         while points[-1].lam < 1.0:
             here = points[-1]
-            lam, free, apart, spent = self._apart(system, points, lambda_after(here.lam, step), held, apart)
-            lam, meets = (lam, False) if free else _up_to_contact(system, points, lam, SMALLEST)
+            attempt = partial(self._try, system, points, brisk=True, look=False, held=held)
+            lam, free, apart, spent = found_apart(
+                system, points, lambda_after(here.lam, step), apart, attempt
+            )
+            lam, meets = (lam, False) if free else up_to_contact(system, points, lam)
             fold = fold_ahead(points, system.primal)
             if self.foresee and fold <= lam and len(cuts) > 2:
                 note = f"a limit point is seen at lambda {fold:.6g}; {cuts[-1]}"
@@ -150,7 +149,9 @@ class LoadControl:
             look = self.at_bifurcation == "stable" and len(cuts) >= LOOK and not looked
             if len(cuts) == 1 and held is None:  # a step may begin on a buckled ring
                 held = _neutral(system, here, known=False)
-            tried = free or self._try(system, points, lam, brisk, look, held)
+            tried = free or self._minding_slips(
+                system, here, self._try(system, points, lam, brisk, look, held), len(cuts)
+            )
             iterations += spent + tried.iterations
             looked = looked or bool(tried.branch.critical)
             if tried.branch.points:
@@ -175,18 +176,7 @@ class LoadControl:
                 held = _neutral(system, tried.point, known=held is not None)
             critical = self._critical(system, here, tried.primary, lam)
             if self.at_bifurcation == "stop" and tried.solution.negative:
-                where = f" at lambda {critical[0].lam:.6g}" if critical else f" before lambda {lam:.6g}"
-                note = f"the branch loses its stability{where}"
-                yield Increment(
-                    here,
-                    Outcome.BIFURCATION,
-                    iterations,
-                    imbalance,
-                    step,
-                    tuple(cuts),
-                    note,
-                    critical=critical,
-                )
+                yield _stopped(here, lam, iterations, imbalance, step, tuple(cuts), critical)
                 return
             points = [tried.point] if tried.note else [*points[-2:], tried.point]
             imposed = system.rotation > 0.0
@@ -212,7 +202,7 @@ class LoadControl:
         )  # where a step ends more is asked of the state
         method = replace(newton, globalised=0, hasty=True) if brisk or look else newton
         tangent = self._tangent_guess(system, points, lam)
-        q, forces = _clear_guess(system, here, lam, extrapolate(points, lam), tangent)
+        q, forces = clear_guess(system, here, lam, extrapolate(points, lam), tangent)
         found = method.solve(system, q, lam, forces, tangent)
         primary = found = found if held is None else settle(system, found, lam, newton)
         iterations, note, branch = found.iterations, "", NO_BRANCH
@@ -246,36 +236,14 @@ class LoadControl:
             objection = system.penetration(here.q, here.lam, there.q, lam) if note else found.reason
         return _Trial(there, found, primary, objection, note, iterations, branch)
 
-    def _apart(
-        self, system: System, points: Sequence[Point], lam: float, held: Array | None, apart: bool
-    ) -> tuple[float, _Trial | None, bool, int]:
-        """A state that is found as if nothing could stand in the way, if the way to it is clear.
-
-        The way is along the polynomial through the last states and the new one. Where it is not clear, a state just
-        before what stands there is looked for in the same manner.
-
-        Returns:
-            lambda of the state or of the increment to try, the state or None, whether nothing has been met so far,
-            and the iterations that led to nothing.
-        """
-        here, spent, asked = points[-1], 0, lam
-        if not (apart and isinstance(system, Hindered) and system.hindered):
-            return lam, None, False, 0
-        if pressing(system, here.q, here.lam):
-            return lam, None, False, 0
-        for _ in range(APPROACHES):
-            with system.unhindered():
-                tried = self._try(system, points, lam, brisk=True, look=False, held=held)
-            spent += tried.iterations
-            if tried.objection or tried.note or tried.branch.points:
-                return lam, None, True, spent
-            clear = system.clear_ways(ways(points, tried.point, WAYS)) / WAYS
-            if clear >= 1.0:
-                return lam, tried, True, spent - tried.iterations
-            if clear < LEAST_CLEAR:  # it may be nothing at all
-                return asked, None, False, spent
-            lam = here.lam + SHORT_OF * clear * (lam - here.lam)
-        return lam, None, False, spent
+    def _minding_slips(self, system: System, here: Point, tried: _Trial, cuts: int) -> _Trial:
+        """A trial that objects to a slip of what presses; where increments were cut before, one that tells of it."""
+        if tried.objection or tried.note or tried.branch.points:
+            return tried
+        slip = slipped(system, here, tried.point)
+        if not slip:
+            return tried
+        return replace(tried, objection=slip) if cuts < LOOK else replace(tried, note=slip)
 
     def _critical(
         self, system: System, here: Point, found: Solution, lam: float
@@ -323,6 +291,21 @@ class LoadControl:
         return guess
 
 
+def _stopped(
+    here: Point,
+    lam: float,
+    iterations: int,
+    imbalance: float,
+    step: float,
+    cuts: tuple[str, ...],
+    critical: tuple[CriticalPoint, ...],
+) -> Increment:
+    """The end of a step that stops where its branch loses its stability, before `lam`."""
+    where = f" at lambda {critical[0].lam:.6g}" if critical else f" before lambda {lam:.6g}"
+    note = f"the branch loses its stability{where}"
+    return Increment(here, Outcome.BIFURCATION, iterations, imbalance, step, cuts, note, critical=critical)
+
+
 def jump(system: System, here: Point, there: Point, mismatch: float) -> str:
     """Why two states are not neighbours on one branch, or an empty string.
 
@@ -350,42 +333,6 @@ def jump(system: System, here: Point, there: Point, mismatch: float) -> str:
         if not abs(gained - work) <= most:  # nor if the slopes are not known
             return f"energy gained ({gained:.3g}) is not the work done ({work:.3g} N mm)"
     return ""
-
-
-def _up_to_contact(
-    system: System, points: Sequence[Point], lam: float, smallest: float
-) -> tuple[float, bool]:
-    """`lam`, or where before it the extrapolated path meets something; and whether anything presses there or here."""
-    here = points[-1]
-    meets = pressing(system, here.q, here.lam)
-    for _ in range(2):
-        q, _ = extrapolate(points, lam)
-        part = meeting(system, here.q, q - here.q, lam)
-        if part >= 1.0 or part * (lam - here.lam) < smallest:
-            break
-        lam, meets = here.lam + part * (lam - here.lam), True
-    return lam, meets
-
-
-def _clear_guess(
-    system: System,
-    here: Point,
-    lam: float,
-    guess: tuple[Array, Array],
-    other: Callable[[], tuple[Array, Array]] | None,
-) -> tuple[Array, Array]:
-    """A guess and its element forces, another one if something stands in its way, or as much of it as is clear."""
-    part = clear_part(system, here.q, guess[0] - here.q, lam)
-    if part >= 1.0:
-        return guess
-    if other is not None:
-        tangent = other()
-        along = clear_part(system, here.q, tangent[0] - here.q, lam)
-        if along > part:
-            part, guess = along, tangent
-
-    part = 1.0 if part >= 1.0 else 0.9 * part
-    return here.q + part * (guess[0] - here.q), here.forces + part * (guess[1] - here.forces)
 
 
 def downhill(system: System, q: Array, lam: float, newton: Newton) -> Solution:

@@ -255,6 +255,15 @@ class Hindered(Limited, Protocol):
         """
         ...
 
+    def reshaped(self, one: tuple[Array, float], other: tuple[Array, float]) -> float:
+        """By how much two shapes differ, rigid motions aside: the norm over all nodes, mm.
+
+        Args:
+            one: unknowns (n,) and load parameter.
+            other: the same of the other shape.
+        """
+        ...
+
 
 @contextmanager
 def remembering(system: System, history: Array | None) -> Iterator[None]:
