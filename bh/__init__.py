@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from bh.model.supports import Constraint, Hold, RigidBody, Support
     from bh.model.until import Until, depth
     from bh.model.weight import Weight
+    from bh.model.zones import SheetZone
     from bh.paths.estimate import Accuracy
     from bh.paths.path import Path
     from bh.runtime.consent import allow_outside, allow_plugins
@@ -69,6 +70,7 @@ _NAMES = {
     "bh.model.supports": "Constraint Hold RigidBody Support",
     "bh.model.until": "Until depth",
     "bh.model.weight": "Weight",
+    "bh.model.zones": "SheetZone",
     "bh.paths.estimate": "Accuracy",
     "bh.paths.path": "Path",
     "bh.runtime.consent": "allow_outside allow_plugins",
@@ -148,6 +150,7 @@ __all__ = [
     "Settling",
     "Sheet",
     "SheetSystem",
+    "SheetZone",
     "Softening",
     "State",
     "Step",

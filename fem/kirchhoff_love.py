@@ -16,6 +16,7 @@ from bh.loading.load_step import LoadStep
 from bh.model.model import Model
 from bh.model.refinement import Refinement
 from bh.model.sheet import Sheet
+from bh.model.zones import SheetZone
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.load_control import LoadControl
 from bh.solvers.outcome import Outcome
@@ -63,7 +64,8 @@ class Shell:
             raise ModelError(
                 f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
             )
-        return ShellSystem(model, load_step, start, _elements(model.mesh, model.sheet, self.degree), moments)
+        elements = _elements(model.mesh, model.sheet, model.zones, self.degree)
+        return ShellSystem(model, load_step, start, elements, moments)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
         """What to know of the mesh of a model: only whether curved edges have lost their curves."""
@@ -100,9 +102,9 @@ class LinearShell(Shell):
 
 
 @lru_cache(maxsize=4)
-def _elements(mesh: SheetMesh, sheet: Sheet, degree: int) -> ShellElements:
+def _elements(mesh: SheetMesh, sheet: Sheet, zones: tuple[SheetZone, ...], degree: int) -> ShellElements:
     """Elements are those of the sheet, whatever the step."""
-    return shell_elements(lift(mesh) if degree == 2 else LinearMesh(mesh), sheet)
+    return shell_elements(lift(mesh) if degree == 2 else LinearMesh(mesh), sheet, zones)
 
 
 def follow(

@@ -120,7 +120,7 @@ def _weight(elements: ShellElements, item: Weight, model: Model) -> Array:
     out = np.zeros_like(mesh.nodes)
     if mesh.degree == 1:
         return out
-    force = item.per_area(model.sheet)
+    force = item.of_triangles(model.sections)[:, None]
     for triangles, areas in (
         (mesh.triangles[:, 3:], elements.areas),
         (mesh.sheet.triangles, -mesh.sheet.areas),

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from bh.formulations.state import Energy
 from bh.formulations.stress import Resultants
 from bh.model.model import Model
-from bh.model.sheet import Sheet
+from bh.model.zones import Sections
 from fem import grain
+from fem import sections as by_triangle
 from fem.shell import ShellElements
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients
 from fem.state import ShellState
@@ -56,7 +57,7 @@ def observe(
     reactions = np.zeros_like(here.x)
     local = system.gradient(here)[: system.components.first_alpha].reshape(-1, 3)
     reactions[system.constraints.fixed] = local[system.constraints.fixed]
-    in_plane, bent = stresses(e, model.sheet, moments, strain)
+    in_plane, bent = stresses(e, model.sections, moments, strain)
     return ShellState(
         mesh=mesh,
         step=step,
@@ -78,18 +79,24 @@ def observe(
         crease_couples=couples,
         membrane_forces=in_plane,
         moments=bent,
-        recover=partial(resultants, model.sheet, in_plane, bent),
+        recover=partial(resultants, model.sections, in_plane, bent),
     )
 
 
-def resultants(sheet: Sheet, forces: Array, moments: Array) -> Resultants:
+def resultants(made_of: Sections, forces: Array, moments: Array) -> Resultants:
     """What stresses are made of; strains and curvatures are those that forces and moments belong to.
 
     Args:
-        sheet: material and thickness.
+        made_of: what every triangle is made of.
         forces: (t, 3) membrane forces at the middle of each triangle, N / mm.
         moments: (t, 3) moments there, N.
     """
+    sheet = made_of.sheets[0]
+    if made_of.of is not None:
+        found = by_triangle.matrices(made_of.sheets)
+        strain = np.einsum("tij,tj->ti", np.linalg.inv(found.A)[made_of.of], forces)
+        curvature = np.einsum("tij,tj->ti", np.linalg.inv(found.D)[made_of.of], moments)
+        return Resultants(sheet, strain, curvature, forces, moments, made_of)
     C = grain.compliance_in_drawing(sheet)
     return Resultants(sheet, forces @ C / sheet.t, moments @ C * 12.0 / sheet.t**3, forces, moments)
 
@@ -141,12 +148,14 @@ def _jumps(system: ShellSystem, here: Here) -> Array:
     return out
 
 
-def stresses(elements: ShellElements, sheet: Sheet, moments: Array, strain: Array) -> tuple[Array, Array]:
+def stresses(
+    elements: ShellElements, made_of: Sections, moments: Array, strain: Array
+) -> tuple[Array, Array]:
     """Membrane forces and moments (t, 3) at the middle of each triangle, components xx, yy, xy of the flat sheet.
 
     Args:
         elements: of the sheet.
-        sheet: material and thickness.
+        made_of: what every triangle is made of.
         moments: (t, 3 m) generalised moments.
         strain: (t, 3 m) generalised strains.
 
@@ -160,13 +169,22 @@ def stresses(elements: ShellElements, sheet: Sheet, moments: Array, strain: Arra
     eps = np.einsum("tjm,m,jab->tab", strain.reshape(len(X), 3, -1), middle, STRAINS)
     inverse = np.linalg.inv(F)
     eps = np.einsum("tac,tab,tbd->tcd", inverse, eps, inverse)
-    trace = np.einsum("taa->t", eps)[:, None, None] * np.eye(2)
-    N = (
-        sheet.E * sheet.t / (1.0 - sheet.nu**2) * ((1.0 - sheet.nu) * eps + sheet.nu * trace)
-        if sheet.grain is None
-        else grain.forces(eps, sheet)
-    )
+    N = _forces(eps, made_of)
     m = np.einsum("tjm,m,jab->tab", moments.reshape(len(X), 3, -1), middle, MOMENTS)
     m = np.einsum("tca,tab,tdb->tcd", F, m, F) / np.linalg.det(F)[:, None, None] ** 2
     pick = ([0, 1, 0], [0, 1, 1])
     return N[:, pick[0], pick[1]], m[:, pick[0], pick[1]]
+
+
+def _forces(eps: Array, made_of: Sections) -> Array:
+    """(t, 2, 2) membrane forces of strains (t, 2, 2), N / mm."""
+    sheet = made_of.sheets[0]
+    if made_of.of is not None:
+        A = by_triangle.matrices(made_of.sheets).A[made_of.of]
+        rows = np.column_stack((eps[:, 0, 0], eps[:, 1, 1], 2.0 * eps[:, 0, 1]))
+        n = np.einsum("tij,tj->ti", A, rows)
+        return np.stack((n[:, [0, 2]], n[:, [2, 1]]), axis=1)
+    if sheet.grain is not None:
+        return grain.forces(eps, sheet)
+    trace = np.einsum("taa->t", eps)[:, None, None] * np.eye(2)
+    return np.asarray(sheet.E * sheet.t / (1.0 - sheet.nu**2) * ((1.0 - sheet.nu) * eps + sheet.nu * trace))

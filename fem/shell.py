@@ -26,7 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.model.sheet import Sheet
+from bh.model.zones import Sections, SheetZone, sections
 from fem import grain, kernels
+from fem import sections as by_triangle
 from fem.kernels import Frames, Loops
 from fem.spaces import MOMENTS, STRAINS, Tables, tables
 from meshes.curved import ElementMesh, plane_axes
@@ -121,12 +123,16 @@ class ShellElements:
         return K
 
 
-def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
+def shell_elements(mesh: ElementMesh, sheet: Sheet, zones: tuple[SheetZone, ...] = ()) -> ShellElements:
     """Elements of a sheet; the mesh says of which degree.
 
     Args:
         mesh: flat, of first or second order.
         sheet: material and thickness.
+        zones: parts of it that are made of something else.
+
+    Raises:
+        ModelError: a zone that has no triangle, or two that share one.
     """
     table = tables(mesh.degree)
     X = mesh.planar[mesh.triangles]
@@ -160,7 +166,7 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
         mesh,
         table,
         loops,
-        *_stiffness(table, F, J, sheet),
+        *_stiffness(table, F, J, sections(mesh.sheet, sheet, zones)),
         np.zeros((len(edges), table.measures)),
         lengths,
         J @ table.weights,
@@ -172,8 +178,15 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet) -> ShellElements:
     return elements
 
 
-def _stiffness(table: Tables, F: Array, J: Array, sheet: Sheet) -> tuple[Array, Array]:
+def _stiffness(table: Tables, F: Array, J: Array, made_of: Sections) -> tuple[Array, Array]:
     """Of membrane and bending, (t, 3 m, 3 m) each, with F (t, q, 2, 2) and J (t, q) of the flat sheet."""
+    sheet = made_of.sheets[0]
+    if made_of.of is not None:
+        bases = _basis(table, STRAINS), _basis(table, MOMENTS)
+        membrane, bending, _ = by_triangle.stiffness(
+            *bases, table.weights, F, J, by_triangle.matrices(made_of.sheets), made_of
+        )
+        return membrane, bending
     if sheet.grain is not None:
         return (
             grain.membrane_stiffness(_basis(table, STRAINS), table.weights, F, J, sheet),

@@ -7,8 +7,9 @@ in the order of the drawing. Cuts inside the sheet are its cuts cut-1, ...; what
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -65,10 +66,19 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
     """
     region = region_of(graph, lines)
     creases: list[Crease] = []
+    layers: dict[str, list[str]] = {}
+    drawn_in = {
+        frozenset(graph.edges[e].tolist()): lines[graph.lines[e]].layer
+        for e in region.inside.tolist()
+        if graph.kinds[e] == "flat"
+    }
     for kind, (letter, fold) in CREASES.items():
         numbers = [e for e in region.inside.tolist() if graph.kinds[e] == kind]
         for i, chain in enumerate(_chains(graph, lines, numbers, _joints(graph, region))):
             creases.append(Crease(f"{letter}{i + 1}", curve_through(graph.points[chain[0]]), fold, chain[1]))
+            layer = _layer(drawn_in, chain[0]) if fold == "flat" else ""
+            if layer:  # regions are named by the layer that they are drawn in
+                layers.setdefault(f"layer:{layer}", []).append(f"crease:{letter}{i + 1}")
     facets = [e for e in region.inside.tolist() if graph.kinds[e] in ("facet", "boundary")]
     facet_chains = _chains(graph, lines, facets, _met(graph, region.inside.tolist()))
     numbers = [e for e in region.inside.tolist() if graph.kinds[e] == "cut"]
@@ -82,6 +92,7 @@ def pattern_of(graph: Graph, lines: Sequence[DrawnLine]) -> CreasePattern:
     if sides:
         groups.append(("edge:boundary", sides))
     groups.append((CUTS, tuple(f"edge:{name}" for name, _ in cuts)))
+    groups += [(name, tuple(members)) for name, members in layers.items()]
     pattern = CreasePattern(
         rings=tuple(graph.points[ring] for ring in region.rings),
         creases=tuple(creases),
@@ -366,6 +377,12 @@ def _chains(
             back = walk(e, b)[::-1] if ahead[-1] != a else [a]
             chains.append(([*back, *ahead], angle(e)))
     return chains
+
+
+def _layer(drawn_in: Mapping[frozenset[int], str], chain: list[int]) -> str:
+    """The layer that all edges of a chain of nodes are drawn in; "" where there are several, or none."""
+    names = {drawn_in[frozenset(pair)] for pair in pairwise(chain)}
+    return names.pop() if len(names) == 1 else ""
 
 
 def _edges(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from bh.errors import ModelError
 from bh.formulations import yield_criteria
 from bh.formulations.recovery import corner_values
 from bh.model.sheet import Sheet
+from bh.model.zones import Sections
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -29,6 +31,7 @@ class Resultants(NamedTuple):
         curvature: (t, 3) its change of curvature, 1 / mm; positive where the sheet's edges are bent up.
         forces: (t, 3) membrane forces (second Piola-Kirchhoff), N / mm, components xx, yy, xy.
         moments: (t, 3) N mm / mm, components xx, yy, xy.
+        sections: what every triangle is made of, where there are zones.
     """
 
     sheet: Sheet
@@ -36,6 +39,7 @@ class Resultants(NamedTuple):
     curvature: Array
     forces: Array
     moments: Array
+    sections: Sections | None = None
 
 
 class Extreme(NamedTuple):
@@ -65,7 +69,8 @@ class Stress:
         mesh: the stress-free sheet.
         sheet: its material.
         strain, curvature, forces, moments: see `Resultants`.
-        cut: (k,) rows of `mesh.topology.hinges`: creases, across which nothing is averaged.
+        cut: (k,) rows of `mesh.topology.hinges`: creases and borders of zones, across which nothing is averaged.
+        sections: what every triangle is made of, where there are zones.
     """
 
     mesh: SheetMesh
@@ -75,13 +80,22 @@ class Stress:
     forces: Array
     moments: Array
     cut: Ints
+    sections: Sections | None = None
 
     @cached_property
     def corners(self) -> Stress:
         """The same at the corners of the triangles, (t, 3, ...), averaged within panels and never across creases."""
         both = np.hstack((self.strain, self.curvature, self.forces, self.moments))
         at = corner_values(self.mesh, both, self.cut)
-        return Stress(self.mesh, self.sheet, at[..., :3], at[..., 3:6], at[..., 6:9], at[..., 9:], self.cut)
+        parts = (at[..., :3], at[..., 3:6], at[..., 6:9], at[..., 9:])
+        return Stress(self.mesh, self.sheet, *parts, self.cut, self.sections)
+
+    def _each(self, read: Callable[[Sheet], float]) -> Array:
+        """A value of the sheet, or of that of every triangle, (t, 1) or (t, 1, 1)."""
+        if self.sections is None or self.sections.of is None:
+            return np.asarray(read(self.sheet))
+        values = self.sections.each([read(sheet) for sheet in self.sections.sheets])
+        return values.reshape((-1,) + (1,) * (self.forces.ndim - 1))
 
     def at(self, side: str = "top") -> Array:
         """(..., 3) stresses xx, yy, xy, MPa.
@@ -89,7 +103,7 @@ class Stress:
         Args:
             side: "top", "middle" or "bottom".
         """
-        t = self.sheet.t
+        t = self._each(lambda sheet: sheet.t)
         return np.asarray(self.forces / t - 12.0 / t**2 * _height(side) * self.moments)
 
     def strain_at(self, side: str = "top") -> Array:
@@ -98,7 +112,7 @@ class Stress:
         Args:
             side: "top", "middle" or "bottom".
         """
-        return np.asarray(self.strain - self.sheet.t * _height(side) * self.curvature)
+        return np.asarray(self.strain - self._each(lambda sheet: sheet.t) * _height(side) * self.curvature)
 
     def principal(self, side: str = "top") -> Array:
         """(..., 2) principal stresses, the larger one first, MPa.
@@ -117,7 +131,15 @@ class Stress:
         Raises:
             ModelError: a sheet with a grain whose strengths are not given.
         """
-        return yield_criteria.equivalent(self.at(side), self.sheet)
+        stress = self.at(side)
+        if self.sections is None or self.sections.of is None:
+            return yield_criteria.equivalent(stress, self.sheet)
+        out = np.empty(stress.shape[:-1])
+        for number, sheet in enumerate(self.sections.sheets):
+            here = self.sections.of == number
+            if here.any():
+                out[here] = yield_criteria.equivalent(stress[here], sheet)
+        return out
 
     def utilisation(self, side: str = "top") -> Array:
         """(...,) equivalent stress over the strength of the sheet; yield begins at 1.
@@ -128,7 +150,11 @@ class Stress:
         Raises:
             ModelError: no strength is given.
         """
-        return np.asarray(self.equivalent(side) / self.sheet.strengths()[0])
+        return np.asarray(self.equivalent(side) / self._strength())
+
+    def _strength(self) -> Array:
+        strength = self._each(lambda sheet: sheet.strengths()[0])
+        return strength[..., 0] if strength.ndim else strength
 
     def reserve(self, side: str = "top") -> Array:
         """(...,) by what all stresses could grow until yield: strength over equivalent stress, inf where there is none.
@@ -173,7 +199,9 @@ def stress_of(mesh: SheetMesh, found: Resultants, moments: Array) -> Stress:
     for name in mesh.creases:
         hinge = topology.edge_hinges[topology.find_edges(mesh.crease_edges(name))]
         cut[hinge[hinge >= 0]] = True
-    return Stress(mesh, found.sheet, *found[1:], np.flatnonzero(cut))
+    if found.sections is not None:
+        cut |= found.sections.borders(mesh)
+    return Stress(mesh, *found[:5], np.flatnonzero(cut), found.sections)
 
 
 def _height(side: str) -> float:

@@ -21,6 +21,7 @@ from bh.model.model import Model
 from bh.model.ramp import Ramp
 from bh.model.sheet import Sheet
 from bh.model.step import Body, Step, Zone
+from bh.model.zones import Sections
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -39,6 +40,7 @@ class LoadStepBuilder:
         """
         self.mesh: SheetMesh = model.mesh
         self.sheet: Sheet = model.sheet
+        self.sections: Sections = model.sections
         self._supports = Supports(model)
         self._number = 0
         self._asked = Asked.nothing(model.mesh)

@@ -203,8 +203,15 @@ def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
     Raises:
         ModelError: the grain, a support, a crease or an actuation has no image in the plane.
     """
-    grain = model.sheet.grain
-    if grain is not None:
+    sections = model.sections
+    if sections.of is not None and (sections.of != sections.of[plane.triangle]).any():
+        x, y, _ = model.mesh.points[
+            model.mesh.triangles[np.argmax(sections.of != sections.of[plane.triangle])]
+        ].mean(axis=0)
+        raise ModelError(f"the zones are not mirror-symmetric (at ({x:.4g}, {y:.4g}) mm); {ADVICE}")
+    for grain in (sheet.grain for sheet in sections.sheets):
+        if grain is None:
+            continue
         along = math.cos(grain) * plane.normal[0] + math.sin(grain) * plane.normal[1]
         if min(abs(along), math.sqrt(max(1.0 - along**2, 0.0))) > 1e-7:
             raise ModelError(

@@ -40,7 +40,17 @@ def differing_keys(
         found = (
             [] if _same_mesh(cast("Data", data["mesh"]), arrays, now["mesh"], new) else ["pattern or mesh"]
         )
-    for key in ("formulation", "sheet", "supports", "creases", "steps", "hinge_lock", "contact", "green"):
+    for key in (
+        "formulation",
+        "sheet",
+        "zones",
+        "supports",
+        "creases",
+        "steps",
+        "hinge_lock",
+        "contact",
+        "green",
+    ):
         if not (chosen and key in CHOSEN):
             found += _differing(key, data.get(key), now.get(key))
     return found

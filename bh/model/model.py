@@ -19,6 +19,7 @@ from bh.model.sheet import ElementStiffness, Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
+from bh.model.zones import Sections, SheetZone, changed, sections
 from bh.runtime.consent import said
 from meshes import SheetMesh
 from meshes.mesh import count
@@ -47,6 +48,7 @@ class Model:
         contact: panels that share no node stop each other: "thickness" (their middle surfaces stay the sheet's
             thickness apart), a gap in mm, "auto" (by their thickness, from where they meet in a path that is solved
             without at first), or False (they pass through each other: `bh.contact.first_contact` tells).
+        zones: parts of the sheet that are made of something else.
     """
 
     mesh: SheetMesh
@@ -58,6 +60,7 @@ class Model:
     stiffness: ElementStiffness | None = None
     hinge_lock: bool = True
     contact: Contact = False
+    zones: tuple[SheetZone, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
@@ -77,7 +80,12 @@ class Model:
                 raise ModelError(
                     f"the {name} of a model is {what}; give bh.Model(mesh, sheet) {how} as {name}"
                 )
-        if self.sheet.grain is not None and not drawn_flat(self.mesh):
+        for zone in self.zones:
+            if not isinstance(zone, SheetZone):
+                raise ModelError(
+                    f"a zone of a model is a {type(zone).__name__}; give bh.SheetZone(where, sheet)"
+                )
+        if any(sheet.directed for sheet in self.sections.sheets) and not drawn_flat(self.mesh):
             raise ModelError(
                 "the grain is a direction in the drawing, so the stress-free sheet must lie in z = const with its "
                 "triangles counter-clockwise; unfold it first, or give a sheet without a grain"
@@ -95,6 +103,11 @@ class Model:
         number = isinstance(gap, int | float) and not isinstance(gap, bool) and 0.0 < gap < math.inf
         if not (number or gap is False or gap in ("thickness", "auto")):
             raise ModelError(f"contact = {gap!r} cannot be; give 'thickness', 'auto', a gap in mm, or False")
+
+    @property
+    def sections(self) -> Sections:
+        """What every triangle is made of."""
+        return sections(self.mesh, self.sheet, self.zones)
 
     @property
     def stops_itself(self) -> bool:
@@ -204,6 +217,27 @@ class Model:
         """
         self.mesh.crease_edges(name)
         return replace(self, creases={**self.creases, name: CreaseLaw(**law)})
+
+    def zone(
+        self,
+        where: str | Sequence[str] | Sequence[Sequence[float]],
+        sheet: Sheet | None = None,
+        stiff: float = 1.0,
+        **values: float | str | None,
+    ) -> Model:
+        """Make a part of the sheet of something else; what is not given is that of the sheet.
+
+        Args:
+            where: "face:X,Y", "inside:PLACE", "layer:NAME", "all", several, or a polygon: see `bh.SheetZone`.
+            sheet: its material and thickness.
+            stiff: factor of all moduli; 1000 for a panel that is as good as rigid.
+            **values: of `bh.Sheet`, such as t = 0.6.
+
+        Raises:
+            ModelError: no triangle lies there, or another zone does; one line.
+        """
+        made = changed(self.sheet if sheet is None else sheet, stiff, **values)
+        return replace(self, zones=(*self.zones, SheetZone(where, made)))
 
     def step(
         self,

@@ -23,6 +23,7 @@ from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
 from bh.model.weight import Weight
+from bh.model.zones import SheetZone
 from bh.runtime.consent import said
 from meshes import Arc, ArcChain, Line, Polyline, SheetMesh
 from meshes.curves import Curve
@@ -61,7 +62,8 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         "hinge_lock": model.hinge_lock,
         **({"contact": model.contact} if model.stops_itself else {}),
         "green": model.stiffness is not None and model.stiffness.green,
-        "sheet": {name: value for name, value in _plain(model.sheet).items() if value is not None},
+        "sheet": _sheet(model.sheet),
+        **({"zones": [_zone(zone) for zone in model.zones]} if model.zones else {}),
         "mesh": {
             "corners": dict(mesh.corners),
             "folds": dict(mesh.folds),
@@ -107,6 +109,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
         return Model(
             mesh=mesh,
             sheet=Sheet(**data["sheet"]),
+            zones=tuple(SheetZone(zone["where"], Sheet(**zone["sheet"])) for zone in data.get("zones", ())),
             supports=tuple(_constraint(s) for s in data["supports"]),
             steps=tuple(_stored_step(step) for step in data["steps"]),
             creases={name: _stored_crease(law) for name, law in data["creases"].items()},
@@ -134,6 +137,14 @@ def fingerprint(model: Model) -> str:
 
 def _plain(item: Any) -> dict[str, Any]:
     return {f.name: _jsonable(getattr(item, f.name)) for f in fields(item)}
+
+
+def _sheet(sheet: Sheet) -> dict[str, object]:
+    return {name: value for name, value in _plain(sheet).items() if value is not None}
+
+
+def _zone(zone: SheetZone) -> dict[str, object]:
+    return {"where": _jsonable(zone.where), "sheet": _sheet(zone.sheet)}
 
 
 def _crease(crease: CreaseLaw) -> dict[str, object]:

@@ -144,6 +144,11 @@ class Sheet:
         return self.strength, across, math.sqrt(self.strength * across / 3.0) if shear is None else shear
 
     @property
+    def directed(self) -> bool:
+        """Does it depend on the direction?"""
+        return self.grain is not None
+
+    @property
     def nu_squared(self) -> float:
         """nu^2, or nu12 nu21 of a sheet with a grain."""
         return self.nu**2 if self.E2 is None else self.nu**2 * self.E2 / self.E

@@ -13,6 +13,7 @@ from bh.errors import ModelError
 from bh.model.sheet import Sheet
 from bh.model.supports import Constraint
 from bh.model.until import Until
+from bh.model.zones import Sections
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -52,6 +53,11 @@ class StepBuilder(Protocol):
     @property
     def sheet(self) -> Sheet:
         """Its material and thickness."""
+        ...
+
+    @property
+    def sections(self) -> Sections:
+        """The same of every triangle, where there are zones."""
         ...
 
     def creases(self, name: str) -> tuple[Ints, Array, Array]:

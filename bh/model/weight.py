@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.model.sheet import Sheet
 from bh.model.step import Actuation, StepBuilder
+from bh.model.zones import Sections
 
 Array = NDArray[np.float64]
 EARTH = (0.0, 0.0, -9.81)  # m / s^2
@@ -60,8 +61,27 @@ class Weight(Actuation):
             raise ModelError("a weight needs a density in kg/m^3; give it with the sheet or with the weight")
         return np.asarray(UNITS * density * sheet.t * np.asarray(self.g, dtype=float))
 
+    def of_triangles(self, sections: Sections) -> Array:
+        """(t, 3) force an area of every triangle, N / mm^2, or (1, 3) of a sheet without zones.
+
+        Args:
+            sections: what they are made of.
+
+        Raises:
+            ModelError: a density is missing.
+        """
+        return sections.each([self.per_area(sheet) for sheet in sections.sheets])
+
     def apply(self, builder: StepBuilder) -> None:
         """Ask for the weight of every triangle, a third on each of its corners."""
-        mesh = builder.mesh
-        area = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3.0, 3), minlength=len(mesh.points))
-        builder.bear(area[:, None] * self.per_area(builder.sheet))
+        mesh, sections = builder.mesh, builder.sections
+        if sections.of is None:
+            area = np.bincount(
+                mesh.triangles.ravel(), np.repeat(mesh.areas / 3.0, 3), minlength=len(mesh.points)
+            )
+            builder.bear(area[:, None] * self.per_area(builder.sheet))
+            return
+        force = np.zeros_like(mesh.points)
+        for corner in mesh.triangles.T:
+            np.add.at(force, corner, (mesh.areas / 3.0)[:, None] * self.of_triangles(sections))
+        builder.bear(force)

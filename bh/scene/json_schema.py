@@ -9,6 +9,7 @@ from bh.scene.bodies import BODIES
 from bh.scene.moving import MoveTable
 from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import Table
+from bh.scene.sheets import ZoneTable
 
 Schema = dict[str, object]
 
@@ -51,6 +52,7 @@ def schema() -> Schema:
     scene = {
         "pattern": {"anyOf": [*_tables(found, patterns), OWN]},
         **{name: _table(found, kind) for name, kind in SINGLE.items()},
+        "zones": {"type": "array", "items": _table(found, ZoneTable)},
         "mesh": {"anyOf": _tables(found, MESHES)},
         "supports": {"type": "array", "items": support},
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},

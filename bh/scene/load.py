@@ -14,14 +14,12 @@ from bh.errors import InputError, SceneError
 from bh.formulations.registry import formulation, names
 from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
-from bh.materials.table import material as material_of
 from bh.model.actuations import Displace, Force, Tether
 from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model, Place
 from bh.model.plugins import consent, made
 from bh.model.refinement import Goal
 from bh.model.serialise import ACTUATIONS as MAKERS
-from bh.model.sheet import Sheet
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, select
 from bh.model.until import Until
@@ -45,12 +43,12 @@ from bh.scene.reading import (
     within,
     without,
 )
+from bh.scene.sheets import sheet_of, zones_of
 from bh.scene.tables import (
     ACTUATIONS,
     CreaseTable,
     ModelTable,
     OutputsTable,
-    SheetTable,
     SupportTable,
     UntilTable,
 )
@@ -73,6 +71,7 @@ SECTIONS = (
     "accuracy",
     "symmetry",
     "contact",
+    "zones",
 )
 ACTING = {**ACTUATIONS, **BODIES}
 CHANGES = ("support", "hold", "release")  # keys of a step beside its actuations
@@ -212,7 +211,8 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     for key in ("pattern", "sheet", "steps"):
         if key not in data:
             raise SceneError(f"{key} is missing; add a table {'[[steps]]' if key == 'steps' else f'[{key}]'}")
-    sheet = read_table(SheetTable, data["sheet"], "sheet")
+    sheet = sheet_of(data["sheet"])
+    zones = zones_of(as_tables(data.get("zones", []), "zones"), sheet)
     how = read_table(ModelTable, data.get("model", {}), "model")
     name = _formulation(how.formulation)
     steps = as_tables(data["steps"], "steps")
@@ -225,7 +225,8 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data)
     model = Model(
         mesh=drawn.mesh,
-        sheet=_sheet(sheet),
+        sheet=sheet,
+        zones=zones,
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(step for legs in asked for step in legs),
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
@@ -269,31 +270,6 @@ def _formulation(name: str) -> str:
         with within("model.formulation"):
             consent(name)
     return name
-
-
-def _sheet(table: SheetTable) -> Sheet:
-    if table.material is not None:
-        with within("sheet"):
-            made_of = material_of(table.material).sheet(table.t, table.grain)
-            return made_of if table.density is None else replace(made_of, density=table.density)
-    if table.t is None:
-        raise SceneError("sheet.t is missing; give the thickness in mm, a positive number")
-    E = table.E1 if table.E is None else table.E
-    nu = table.nu12 if table.nu is None else table.nu
-    assert E is not None
-    with within("sheet"):
-        return Sheet(
-            E=E,
-            t=table.t,
-            nu=nu or 0.0,
-            E2=table.E2,
-            G12=table.G12,
-            grain=table.grain,
-            density=table.density,
-            strength=table.strength,
-            strength2=table.strength2,
-            shear_strength=table.shear_strength,
-        )
 
 
 def _support(item: object, at: str) -> Constraint:

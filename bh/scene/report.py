@@ -35,6 +35,18 @@ def _grain(sheet: Sheet) -> str:
     return f", grain at {degrees(sheet.grain):.4g} degrees (E {sheet.E:.4g} along, {sheet.E2:.4g} MPa across)"
 
 
+def _zones(scene: Scene) -> list[str]:
+    model = scene.model
+    of = model.sections.of
+    areas = (
+        np.zeros(0) if of is None else np.bincount(of, model.mesh.areas, minlength=len(model.zones) + 1)[1:]
+    )
+    return [
+        f"zone {zone.where}: {area:.6g} mm^2, E = {zone.sheet.E:g} MPa, t = {zone.sheet.t:g} mm{_grain(zone.sheet)}"
+        for zone, area in zip(model.zones, areas, strict=False)
+    ]
+
+
 def report(scene: Scene) -> list[str]:
     """The scene in lines: sheet, mesh, creases, places, supports, steps, and what to know of them.
 
@@ -46,6 +58,7 @@ def report(scene: Scene) -> list[str]:
     lines = [
         f"sheet: {size[0]:.5g} x {size[1]:.5g} mm, {mesh.areas.sum():.6g} mm^2, t = {model.sheet.t:g} mm"
         f"{_grain(model.sheet)}",
+        *_zones(scene),
         f"mesh: {mesh!r}; {model.formulation}" if scene.accuracy is None else _chosen(scene.accuracy),
     ]
     for name in mesh.creases[:SHOWN]:

@@ -11,6 +11,7 @@ from bh.scene import bodies as scene_bodies
 from bh.scene import crease_tables, moving
 from bh.scene import patterns as scene_patterns
 from bh.scene import reading as scene_tables
+from bh.scene import sheets as scene_sheets
 from bh.scene import tables as schema
 from bh.scene.load import SECTIONS
 
@@ -28,6 +29,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     'pattern, kind = "opposite_parabolas"': scene_patterns.OppositeParabolasPattern,
     "pattern, drawing": scene_patterns.DrawingPattern,
     "sheet": schema.SheetTable,
+    "zones": scene_sheets.ZoneTable,
     "mesh": schema.MeshTable,
     "mesh by gmsh": schema.GmshTable,
     "mesh as drawn": schema.DrawnTable,
@@ -78,7 +80,9 @@ def test_tables_are_those_of_the_schema(title: str) -> None:
 def test_nothing_is_left_out() -> None:
     every = {
         kind
-        for kind in (vars(schema) | vars(scene_patterns) | vars(scene_bodies) | vars(moving)).values()
+        for kind in (
+            vars(schema) | vars(scene_patterns) | vars(scene_bodies) | vars(moving) | vars(scene_sheets)
+        ).values()
         if isinstance(kind, type) and issubclass(kind, scene_tables.Table)
     }
     assert set(TABLES.values()) == every - {scene_tables.Table, scene_patterns.PatternTable}

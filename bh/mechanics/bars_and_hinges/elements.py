@@ -64,9 +64,13 @@ def sheet_elements(
         moment_start: (m,) total moments of all hinges at the start, N mm; zero off creases.
 
     Raises:
-        ModelError: a sheet with a grain.
+        ModelError: a sheet with a grain, or with zones.
     """
     mesh, sheet = model.mesh, model.sheet
+    if model.zones:
+        raise ModelError(
+            "bars and hinges are of one sheet all over; fold a sheet with zones by 'consistent' or 'shell'"
+        )
     if sheet.grain is not None:
         raise ModelError(
             "bars and hinges are alike in all directions; fold a sheet with a grain in the formulation 'consistent' or "

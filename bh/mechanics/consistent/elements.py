@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
-from bh.materials import Constant, Directed, Law, LinearElastic, Material
-from bh.materials.protocols import in_axes
+from bh.materials import Constant, LinearElastic, Material
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.bending import Bending
 from bh.mechanics.consistent.clamps import Clamps, clamps
@@ -26,13 +25,13 @@ from bh.mechanics.consistent.patches import (
     patches,
     triangle_frames,
 )
+from bh.mechanics.consistent.sections import sheet_laws
 from bh.mechanics.consistent.stretching import Stretching
 from bh.mechanics.shared.hinge_lock import ZONE, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
 from bh.model.ramp import Ramp
-from bh.model.sheet import Sheet
 from bh.solvers.matrices import reverse_cuthill_mckee
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -121,16 +120,18 @@ def consistent_elements(
     """
     if model.stiffness is not None:
         raise ModelError("given bar and hinge stiffness is of bars-and-hinges only; use that formulation")
-    mesh, sheet, law = model.mesh, model.sheet, load_step.law
+    mesh, law = model.mesh, load_step.law
     _check_moments(mesh, load_step)
     topology = mesh.topology
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
-    of_strain, of_curvature = _laws(material, sheet)
+    laws = sheet_laws(material, model.sections, mesh)
     maps, angle = curvature_maps(edges, areas), frame_angles(mesh.points, mesh.triangles)
-    B = bending_matrices(maps, areas, in_axes(of_curvature, angle).moduli(np.zeros((len(areas), 3))))
+    B = bending_matrices(
+        maps, areas, laws.of_triangles(np.arange(len(areas)), angle).moduli(np.zeros((len(areas), 3)))
+    )
     held, spring = clamps(mesh, load_step, start), law == SPRING
     part = None if plane is None else plane.triangle_weight
-    condense = isinstance(of_curvature, Constant)
+    condense = isinstance(laws.bending[0], Constant)
     joined = patches(mesh, B, spring, held.edges, triangle_ranks(mesh), group=part, condense=condense)
     if plane is not None:
         from bh.mechanics.consistent.half import half_patches
@@ -138,8 +139,8 @@ def consistent_elements(
         joined = half_patches(joined, spring, plane)
     rotation, turns, rotations, let_go = _number_rotations(mesh, joined, spring, plane, held)
     part_area = areas if part is None else part * areas
-    membrane = measure(mesh, creased(mesh, law))
-    bending_law = in_axes(of_curvature, angle[joined.members[:, 0]])
+    membrane = measure(mesh, creased(mesh, law) | model.sections.borders(mesh))
+    bending_law = laws.of_triangles(joined.members[:, 0], angle[joined.members[:, 0]])
     quad, ghost = _quads(mesh, joined, held.outward)
     nodes, place = _rows(joined, quad)
     has = rotation >= 0
@@ -150,8 +151,29 @@ def consistent_elements(
     nodes = np.pad(nodes, ((0, 0), (0, -(-int(width.max()) // 3) - nodes.shape[1])), constant_values=-1)
 
     prescribed = load_step.prescribed_angles(prescribed_start)
+    springs, k_fold, spring_rest, couple = _springs(mesh, load_step, spring, prescribed_start, moment_start)
+    whole = ConsistentElements(
+        members=np.arange(len(mesh.triangles)), triangles=mesh.triangles,
+        heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2),
+        stretching=Stretching(membrane, laws, mesh.points),
+        bending=Bending(joined, bending_law, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
+        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, width=width, nodes=nodes,
+        rest=_rest(mesh, joined, law, prescribed), springs=springs,
+        hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
+        spring_stiffness=k_fold, spring_rest=spring_rest,
+        couple=couple,
+        prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
+        lock=lock_stiffness(model, load_step), rotations=rotations, let_go=let_go,
+    )  # fmt: skip
+    return whole if plane is None else _half(whole, plane)
+
+
+def _springs(
+    mesh: SheetMesh, load_step: LoadStep, spring: Bools, prescribed_start: Array, moment_start: Array
+) -> tuple[Ints, Array, Ramp, Ramp]:
+    """Rows (h,) of springs, stiffness (N mm / rad), rest angles (rad) and couples (N mm)."""
     springs = np.flatnonzero(spring)
-    ends = mesh.points[topology.hinges[:, 1:3]]
+    ends = mesh.points[mesh.topology.hinges[:, 1:3]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     k_fold = folding_hinge_stiffness(load_step.stiffness, length)[springs]
     couple = Ramp((load_step.moment.start * length)[springs], (load_step.moment.end * length)[springs])
@@ -159,20 +181,7 @@ def consistent_elements(
     carried = moment_start[springs] - couple.start
     begin = prescribed_start[springs] - carried / np.where(k_fold == 0.0, np.inf, k_fold)
     begin = np.where(np.isnan(load_step.rest.start[springs]), begin, load_step.rest.start[springs])
-    whole = ConsistentElements(
-        members=np.arange(len(mesh.triangles)), triangles=mesh.triangles,
-        heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2),
-        stretching=Stretching(membrane, of_strain, mesh.points),
-        bending=Bending(joined, bending_law, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
-        quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, width=width, nodes=nodes,
-        rest=_rest(mesh, joined, law, prescribed), springs=springs,
-        hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
-        spring_stiffness=k_fold, spring_rest=Ramp(begin, load_step.rest.end[springs]),
-        couple=couple,
-        prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
-        lock=lock_stiffness(model, load_step), rotations=rotations, let_go=let_go,
-    )  # fmt: skip
-    return whole if plane is None else _half(whole, plane)
+    return springs, k_fold, Ramp(begin, load_step.rest.end[springs]), couple
 
 
 def creased(mesh: SheetMesh, law: Ints) -> Bools:
@@ -211,16 +220,6 @@ def lock_stiffness(model: Model, load_step: LoadStep) -> Array:
         until_closed(dihedral_angles(mesh.points, topology.hinges)) < ZONE
     )
     return np.where(without, 0.0, np.maximum(spring, sheet))
-
-
-def _laws(material: Material, sheet: Sheet) -> tuple[Law, Law]:
-    """Laws of strain and curvature; a material that knows no directions would take a grain for nothing."""
-    laws = material.stretching(sheet), material.bending(sheet)
-    if sheet.grain is not None and not all(isinstance(law, Directed) for law in laws):
-        raise ModelError(
-            f"the material {type(material).__name__} is alike in all directions; take a sheet without grain, E2 and G12"
-        )
-    return laws
 
 
 def _check_moments(mesh: SheetMesh, load_step: LoadStep) -> None:
@@ -336,7 +335,7 @@ def _half(e: ConsistentElements, plane: Mirror) -> ConsistentElements:
     by = by[spring]
     return replace(
         e, members=e.members[triangle], triangles=np.ascontiguousarray(e.triangles[triangle]),
-        heights=e.heights[triangle], stretching=Stretching(membrane, e.stretching.law, e.stretching.points),
+        heights=e.heights[triangle], stretching=Stretching(membrane, e.stretching.laws, e.stretching.points),
         B_triangle=(weight[:, None, None] * e.B_triangle)[triangle], springs=e.springs[spring],
         hinges=np.ascontiguousarray(e.hinges[spring]), turns=e.turns[spring],
         spring_stiffness=by * e.spring_stiffness[spring],

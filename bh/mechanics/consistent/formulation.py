@@ -139,7 +139,7 @@ class Consistent:
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable, edge_slopes=slopes, clamp_couples=couples,
-            recover=partial(resultants, model.sheet, mesh, e, self.material, x, now.theta),
+            recover=partial(resultants, model.sections, mesh, e, self.material, x, now.theta),
             contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
             crease_history=system.history_at(q, lam) if system.remembers else None,
         )  # fmt: skip

@@ -7,25 +7,30 @@ from numpy.typing import NDArray
 
 from bh.formulations.stress import Resultants
 from bh.materials import Material
-from bh.materials.protocols import in_axes
 from bh.mechanics.consistent.elements import ConsistentElements
 from bh.mechanics.consistent.patches import curvature_maps, frame_angles, triangle_frames
+from bh.mechanics.consistent.sections import sheet_laws
 from bh.mechanics.consistent.stretching import Stretching
-from bh.model.sheet import Sheet
+from bh.model.zones import Sections
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
 
 
 def resultants(
-    sheet: Sheet, mesh: SheetMesh, elements: ConsistentElements, material: Material, x: Array, theta: Array
+    sections: Sections,
+    mesh: SheetMesh,
+    elements: ConsistentElements,
+    material: Material,
+    x: Array,
+    theta: Array,
 ) -> Resultants:
     """What the elements measure, and what their material makes of it.
 
     A triangle has the mean strain of its thirds, each that of the cell of its edge, and the curvature of its angles.
 
     Args:
-        sheet: of the model.
+        sections: what every triangle is made of.
         mesh: the stress-free sheet, flat.
         elements: of the whole sheet.
         material: of the formulation.
@@ -40,8 +45,16 @@ def resultants(
     own = np.zeros((len(areas), 3))
     own[patches.members[patches.members >= 0]] = half[patches.members >= 0]
     curvature = np.einsum("tij,tj->ti", curvature_maps(edges, areas), own)
-    moments = in_axes(material.bending(sheet), angle).stress(curvature)
-    return Resultants(sheet, strain, _turned(curvature, -angle, 0.5), forces, _turned(moments, -angle, 1.0))
+    laws = sheet_laws(material, sections, mesh)
+    moments = laws.of_triangles(np.arange(len(areas)), angle).stress(curvature)
+    return Resultants(
+        sections.sheets[0],
+        strain,
+        _turned(curvature, -angle, 0.5),
+        forces,
+        _turned(moments, -angle, 1.0),
+        sections,
+    )
 
 
 def _membrane(mesh: SheetMesh, stretching: Stretching, x: Array) -> tuple[Array, Array]:

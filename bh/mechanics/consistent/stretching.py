@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.materials import Constant, Law
-from bh.materials.protocols import in_axes
 from bh.mechanics.consistent import membrane_kernels as kernels
 from bh.mechanics.consistent.membrane import Cells, Membrane
+from bh.mechanics.consistent.sections import SheetLaws
 from bh.mechanics.shared.sparsity import Slots
 from meshes.topology import Ints
 
@@ -22,24 +22,29 @@ Array = NDArray[np.float64]
 class Stretching:
     """Energy of the membrane at positions x (n, 3), mm. Its element forces are N (b,), N / mm: d energy / d gamma."""
 
-    def __init__(self, membrane: Membrane, law: Law, points: Array) -> None:
-        """A membrane and the law of the strains that it measures.
+    def __init__(self, membrane: Membrane, laws: SheetLaws, points: Array) -> None:
+        """A membrane and the laws of the strains that it measures.
 
         Args:
             membrane: bars and cells.
-            law: in the axes of the drawing.
+            laws: in the axes of the drawing.
             points: (n, 3) of the stress-free sheet, mm.
         """
-        self.membrane, self.law, self.points = membrane, law, points
-        self.constant = isinstance(law, Constant)
+        self.membrane, self.laws, self.points = membrane, laws, points
+        self.constant = isinstance(self.law, Constant)
         self._at: Array | None = None
         self._last: tuple[Array, ...] = ()
-        self._laws = tuple(in_axes(law, cells.angle(points)) for cells in membrane.cells)
+        self._laws = tuple(laws.of_cells(cells, points) for cells in membrane.cells)
         self._K: tuple[Array, ...] = tuple(
             cells.stiffness(own.matrix)
             for cells, own in zip(membrane.cells, self._laws, strict=True)
             if isinstance(own, Constant)
         )
+
+    @property
+    def law(self) -> Law:
+        """Of the sheet outside of zones."""
+        return self.laws.stretching[0]
 
     def gamma(self, x: Array) -> Array:
         """(b,) half changes of the bars' squares, mm^2."""

@@ -317,6 +317,8 @@ def sheet_barrier(model: Model) -> SheetBarrier:
     lengths = mesh_edges(mesh)
     heights = 2.0 * mesh.areas / lengths[mesh.topology.triangle_edges].max(axis=1)
     thick = model.contact == "thickness"
+    if thick and any(zone.sheet.t != sheet.t for zone in model.zones):
+        raise ModelError("contact = thickness: zones have another thickness; give a gap in mm")
     offset = OFFSET * sheet.t if thick else 0.0
     reach = REACH * sheet.t if thick else float(model.contact)
     if offset + reach > heights.min():

@@ -1,0 +1,96 @@
+"""Tables [sheet] and [[zones]] of a scene: what the sheet is made of, and where it is made of something else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pydantic import Field
+
+from bh.errors import SceneError
+from bh.materials.table import material as material_of
+from bh.model.sheet import Sheet
+from bh.model.zones import SheetZone, changed
+from bh.scene.reading import Number, Positive, read_table, within
+from bh.scene.tables import SheetTable
+
+Corner = list[Number]
+OTHER_NAMES = {"E1": "E", "nu12": "nu"}
+OF_A_GRAIN = ("E2", "G12", "grain", "strength2", "shear_strength")
+
+
+class ZoneTable(SheetTable):
+    """A part of the sheet that is made of something else; what is left out is that of the sheet."""
+
+    where: str | list[str] | list[Corner] = Field(
+        description='a region: "face:X,Y", "inside:PLACE", "layer:NAME", "all", a list of these, or a polygon '
+        "[[x, y], ...] in mm"
+    )
+    stiff: Positive = Field(
+        1.0, description="a factor of the moduli, a positive number; 1000 is as good as rigid"
+    )
+
+    def names(self) -> None:
+        """Check that nothing is given by two names; the moduli may be left out."""
+        if self.material is not None or self.E is not None or self.E1 is not None:
+            super().names()
+
+
+def sheet_of(data: object) -> Sheet:
+    """The sheet of a scene.
+
+    Args:
+        data: its table.
+
+    Raises:
+        SceneError: keys or values that cannot be; one line.
+    """
+    table = read_table(SheetTable, data, "sheet")
+    if table.material is not None:
+        return _of_material(table, "sheet")
+    if table.t is None:
+        raise SceneError("sheet.t is missing; give the thickness in mm, a positive number")
+    with within("sheet"):
+        return Sheet(**_given(table))
+
+
+def zones_of(data: list[object], sheet: Sheet) -> tuple[SheetZone, ...]:
+    """The zones of a scene.
+
+    Args:
+        data: their tables.
+        sheet: of the scene.
+
+    Returns:
+        the zones in order.
+
+    Raises:
+        SceneError: keys or values that cannot be; one line.
+    """
+    return tuple(_zone(item, sheet, f"zones[{i}]") for i, item in enumerate(data))
+
+
+def _zone(item: object, sheet: Sheet, at: str) -> SheetZone:
+    table = read_table(ZoneTable, item, at)
+    if table.material is not None:
+        made = _of_material(table, at)
+        with within(at):
+            return SheetZone(table.where, changed(made, table.stiff))
+    given: dict[str, float | None] = {**_given(table)}
+    alike = (table.E is not None or "nu" in given) and not any(key in given for key in ("E2", "G12", "grain"))
+    if alike and sheet.grain is not None:  # E and nu alone are a sheet that is alike in all directions
+        given = dict.fromkeys(OF_A_GRAIN) | given
+    with within(at):
+        return SheetZone(table.where, changed(sheet, table.stiff, **given))
+
+
+def _of_material(table: SheetTable, at: str) -> Sheet:
+    assert table.material is not None
+    with within(at):
+        made = material_of(table.material).sheet(table.t, table.grain)
+        return made if table.density is None else replace(made, density=table.density)
+
+
+def _given(table: SheetTable) -> dict[str, float]:
+    """What a table gives, by the names of `Sheet`."""
+    given = {key: getattr(table, key) for key in SheetTable.model_fields if key != "material"}
+    return {OTHER_NAMES.get(key, key): value for key, value in given.items() if value is not None}
