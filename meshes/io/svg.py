@@ -71,8 +71,8 @@ def read_svg(path: str | os.PathLike[str]) -> Strokes:
             "Illustrator's pixels are 1/72 inch, but an SVG file's are 1/96: if the sheet is too small, scale = "
             f"{25.4 / 72.0:.6g} makes it as large as in Illustrator"
         )
-    # svgelements' own millimetre, so that a drawing in mm comes out exactly
-    unit = 1.0 / float(se.Length("1mm").value(ppi=PIXELS))
+    # svgelements' millimetre is 5e-7 off (0.0393701 in): a page in mm comes out exactly by it, one in inches does not
+    unit = 1.0 / float(se.Length("1mm").value(ppi=PIXELS)) if tree.metric else 25.4 / PIXELS
     return Strokes(strokes, unit, stated=tree.unit or tree.illustrator, remarks=remarks)
 
 

@@ -46,11 +46,13 @@ class Tree:
     Attributes:
         text: the SVG written out, UTF-8.
         unit: whether the file states its size in a unit.
+        metric: whether that is mm or cm.
         illustrator: whether Adobe Illustrator wrote it in pixels, which are 1/72 inch there.
     """
 
     text: bytes
     unit: bool
+    metric: bool
     illustrator: bool
 
 
@@ -89,6 +91,7 @@ def svg_tree(data: bytes) -> Tree:
     return Tree(
         text=ElementTree.tostring(out, encoding="utf-8"),
         unit=any(re.search(r"(mm|cm|in|pt|pc)\s*$", value) for value in (width, height)),
+        metric=any(re.search(r"(mm|cm)\s*$", value) for value in (width, height)),
         illustrator=pixels and b"Adobe Illustrator" in data[:2000],
     )
 
