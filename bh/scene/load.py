@@ -211,6 +211,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         if key not in data:
             raise SceneError(f"{key} is missing; add a table {'[[steps]]' if key == 'steps' else f'[{key}]'}")
     sheet = read_table(SheetTable, data["sheet"], "sheet")
+    material = _sheet(sheet)
     how = read_table(ModelTable, data.get("model", {}), "model")
     name = _formulation(how.formulation)
     steps = as_tables(data["steps"], "steps")
@@ -220,16 +221,16 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     creases = as_table(data.get("creases", {}), "creases")
     asked = [_steps(item, f"steps[{i}]") for i, item in enumerate(steps)]
     numbers = [i for i, legs in enumerate(asked) for _ in legs]
-    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data)
+    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data, material.t)
     model = Model(
         mesh=drawn.mesh,
-        sheet=_sheet(sheet),
+        sheet=material,
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(step for legs in asked for step in legs),
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
         hinge_lock=how.hinge_lock,
-        contact=contact_of(data.get("contact", False)),
+        contact=contact_of(data.get("contact", "auto")),
     )
     _check_names(model, numbers)
     _check_steps(model, numbers)
