@@ -5,14 +5,14 @@ solver's notice, and states beyond that are no longer those of a real sheet. The
 without thickness. A state is looked at in three stages, each of which only sees what the one before could not rule out:
 
 1. if all triangles face the same way from some direction and the boundary, seen from there, is that of one region
-   covered once, then so is every point inside, and the sheet cannot meet itself (see `seen_once`);
-2. boxes round the triangles, in the plane of the sheet's largest extent, in an STR tree of shapely;
-3. pairs whose boxes meet are intersected (`bh.analysis.triangles`).
+   covered once, then so is every point inside, and the sheet cannot meet itself (`bh.analysis.projection`);
+2. triangles whose boxes meet are intersected until a pair is found, in one compiled sweep (`meets_itself` there);
+3. all pairs: by an STR tree of shapely.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from bh.formulations.state import State
 from bh.paths.path import Path
 from meshes import SheetMesh
-from meshes.errors import MeshError
-from meshes.topology import Ints, boundary_loops
+from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # of the sheet's size: distances and overlaps up to this are touching
@@ -122,51 +121,27 @@ def first_contact(path: Path | Iterable[State]) -> Contact | None:
     Looks at the accepted states only: what happens between two of them is not seen.
     """
     detector: _Detector | None = None
-    for index, state in enumerate(path):
-        if detector is None or detector.mesh is not state.mesh:
-            detector = _Detector(state.mesh)
-        pairs = detector.pairs(state.points)
+    for index, (mesh, points, step, lam) in enumerate(_shapes(path)):
+        if detector is None or detector.mesh is not mesh:
+            detector = _Detector(mesh)
+        pairs = detector.pairs(points)
         if len(pairs):
-            panels = Panels.of(state.mesh)
+            panels = Panels.of(mesh)
             met = np.unique(np.sort(panels.of_triangle[pairs], axis=1), axis=0).tolist()
             words = tuple((panels.name(a), panels.name(b)) for a, b in met)
-            return Contact(index, state.step, state.lam, pairs, words)
+            return Contact(index, step, lam, pairs, words)
     return None
 
 
-def seen_once(points: Array, triangles: Ints, loops: Iterable[Ints]) -> bool:
-    """Proof that a connected sheet does not meet itself: from some direction every point of it is seen, and only once.
-
-    If all triangles turn the same side towards the direction (here their mean normal), the projection of the sheet
-    covers every point of the plane as often as its boundary winds round it. If the boundary loops are the shell and the
-    holes of a valid polygon, that is once inside of it, never outside, and in a hole never or twice; the area tells
-    which. The same idea as for the self-collision of cloth (Volino and Magnenat Thalmann 1994).
-
-    Args:
-        points: (n, 3), mm.
-        triangles: (t, 3).
-        loops: boundary loops of node indices.
-
-    Returns:
-        True for a sheet that is proven free of self-contact; False means nothing.
-    """
-    import shapely
-
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    doubled = np.cross(b - a, c - a)
-    mean = doubled.sum(axis=0)
-    size = float(np.linalg.norm(mean))
-    area = np.linalg.norm(doubled, axis=1)
-    if size <= 1e-6 * area.sum():
-        return False
-    towards = doubled @ (mean / size)
-    if (towards <= 1e-6 * area).any():
-        return False
-    axes = np.linalg.svd((mean / size)[None, :])[2][1:]
-    flat = points @ axes.T
-    rings = sorted((shapely.Polygon(flat[loop]) for loop in loops), key=lambda ring: -ring.area)
-    region = shapely.Polygon(rings[0].exterior, [ring.exterior for ring in rings[1:]])
-    return bool(region.is_valid and abs(0.5 * towards.sum() - region.area) <= 1e-9 * region.area)
+def _shapes(path: Path | Iterable[State]) -> Iterator[tuple[SheetMesh, Array, int, float]]:
+    """Mesh, positions (n, 3), step and lambda of every state; those of a path without what else a state knows."""
+    if isinstance(path, Path):
+        for record in path.records:
+            points = path.system(record.step).positions(record.q, record.lam)
+            yield path.model.mesh, points, record.step, record.lam
+    else:
+        for state in path:
+            yield state.mesh, state.points, state.step, state.lam
 
 
 def candidates(points: Array, triangles: Ints, margin: float = 0.0) -> Ints:
@@ -201,28 +176,23 @@ class _Detector:
     mesh: SheetMesh
 
     @cached_property
-    def loops(self) -> list[Ints] | None:
-        """Boundary loops of a connected sheet, else None."""
-        import scipy.sparse as sp
-        from scipy.sparse.csgraph import connected_components
+    def edges(self) -> Ints:
+        """(b, 2) of the boundary."""
+        from bh.analysis.projection import outline
 
-        one, two = self.mesh.topology.edge_triangles[self.mesh.topology.hinge_edges].T
-        count = len(self.mesh.triangles)
-        graph = sp.coo_array((np.ones(len(one)), (one, two)), shape=(count, count))
-        if connected_components(graph, directed=False)[0] > 1:
-            return None
-        try:
-            return boundary_loops(self.mesh.topology) or None
-        except MeshError:  # it touches itself at a node
-            return None
+        edges: Ints = outline(self.mesh.triangles)
+        return edges
 
     def pairs(self, points: Array) -> Ints:
+        from bh.analysis.projection import meets_itself, seen_once
         from bh.analysis.triangles import intersecting
 
         triangles = self.mesh.triangles
-        if self.loops is not None and seen_once(points, triangles, self.loops):
+        if seen_once(points, triangles, self.edges):
             return np.empty((0, 2), dtype=np.int64)
         tolerance = TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
+        if not meets_itself(points, triangles, self.edges, tolerance):
+            return np.empty((0, 2), dtype=np.int64)
         found = candidates(points, triangles, tolerance)
         found = found[intersecting(points, triangles, found, tolerance)]
         return np.asarray(found[np.lexsort((found[:, 1], found[:, 0]))])

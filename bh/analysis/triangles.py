@@ -123,6 +123,45 @@ def _overlap_in_plane(A, B, n, tolerance):  # type: ignore[no-untyped-def]
     return True
 
 
+@njit(**INNER)
+def meet(points, one, two, tolerance, room):  # type: ignore[no-untyped-def]
+    """Do triangles `one` and `two` (3,), the lower one first, intersect? `room` (11, 3) is to work in.
+
+    Args:
+        points: (n, 3) node positions, mm.
+        one: (3,) nodes.
+        two: (3,) nodes.
+        tolerance: mm; distances and overlaps up to this are none.
+        room: (11, 3).
+
+    Returns:
+        whether they do.
+    """
+    A, B, n_a, n_b, d_a, d_b, line = room[:3], room[3:6], room[6], room[7], room[8], room[9], room[10]
+    _arrange(points, one, two, A, B)
+    _normal(A, n_a)
+    zeros_b = _distances(B, A[0], n_a, tolerance, d_b)
+    if zeros_b < 0:
+        return False
+    _normal(B, n_b)
+    zeros_a = _distances(A, B[0], n_b, tolerance, d_a)
+    if zeros_a < 0:
+        return False
+    if zeros_b == 3 or zeros_a == 3:
+        return _overlap_in_plane(A, B, n_a if zeros_b == 3 else n_b, tolerance)
+    if zeros_a == 2 and zeros_b == 2:  # both have an edge in the line where the planes meet, shared or not
+        return False
+    line[0] = n_a[1] * n_b[2] - n_a[2] * n_b[1]
+    line[1] = n_a[2] * n_b[0] - n_a[0] * n_b[2]
+    line[2] = n_a[0] * n_b[1] - n_a[1] * n_b[0]
+    size = math.sqrt(line[0] * line[0] + line[1] * line[1] + line[2] * line[2])
+    for c in range(3):
+        line[c] /= size
+    low_a, high_a = _interval(A, d_a, line)
+    low_b, high_b = _interval(B, d_b, line)
+    return min(high_a, high_b) - max(low_a, low_b) > tolerance
+
+
 @njit(**KERNEL)  # type: ignore[untyped-decorator]
 def intersecting(points: Array, triangles: Ints, pairs: Ints, tolerance: float) -> NDArray[np.bool_]:
     """(k,) whether the two triangles of each pair (k, 2) intersect.
@@ -134,33 +173,8 @@ def intersecting(points: Array, triangles: Ints, pairs: Ints, tolerance: float) 
         tolerance: mm; distances and overlaps up to this are none.
     """
     found = np.zeros(len(pairs), dtype=np.bool_)
-    A, B = np.empty((3, 3)), np.empty((3, 3))
-    n_a, n_b, d_a, d_b, line = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    room = np.empty((11, 3))
     for row in range(len(pairs)):
         i, j = min(pairs[row, 0], pairs[row, 1]), max(pairs[row, 0], pairs[row, 1])
-        _arrange(points, triangles[i], triangles[j], A, B)
-        _normal(A, n_a)
-        zeros_b = _distances(B, A[0], n_a, tolerance, d_b)
-        if zeros_b < 0:
-            continue
-        _normal(B, n_b)
-        zeros_a = _distances(A, B[0], n_b, tolerance, d_a)
-        if zeros_a < 0:
-            continue
-        if zeros_b == 3 or zeros_a == 3:
-            found[row] = _overlap_in_plane(A, B, n_a if zeros_b == 3 else n_b, tolerance)
-            continue
-        if (
-            zeros_a == 2 and zeros_b == 2
-        ):  # both have an edge in the line where the planes meet, shared or not
-            continue
-        line[0] = n_a[1] * n_b[2] - n_a[2] * n_b[1]
-        line[1] = n_a[2] * n_b[0] - n_a[0] * n_b[2]
-        line[2] = n_a[0] * n_b[1] - n_a[1] * n_b[0]
-        size = math.sqrt(line[0] * line[0] + line[1] * line[1] + line[2] * line[2])
-        for c in range(3):
-            line[c] /= size
-        low_a, high_a = _interval(A, d_a, line)
-        low_b, high_b = _interval(B, d_b, line)
-        found[row] = min(high_a, high_b) - max(low_a, low_b) > tolerance
+        found[row] = meet(points, triangles[i], triangles[j], tolerance, room)
     return found

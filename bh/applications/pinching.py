@@ -70,7 +70,7 @@ class Pinching:
         """The sheet with two steps: all creases folded, all creases pinched."""
         along = 2 * max(1, round(0.5 * pattern.creases[0].curve.length / self.cell))  # a node in the middle
         mesh = meshes.structured(pattern, along=along, rows=self.rows)
-        model = Model(mesh, self.sheet, formulation=self.formulation).fold(
+        model = Model(mesh, self.sheet, formulation=self.formulation, contact=False).fold(
             "all", by=self.fold, Lstar=self.Lstar
         )
         return model.pinch("all", by=math.pi - self.left, length=self.zone, profile=self.profile)

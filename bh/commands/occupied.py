@@ -11,6 +11,7 @@ from bh.model.serialise import fingerprint
 from bh.paths.storage import PathFile, reading
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
+from bh.solving.contact import stored_model
 from bh.solving.levels import folder_of
 
 FINISHED, UNFINISHED = ("path.bh", "result.json"), ("path-unfinished.bh", "result-unfinished.json")
@@ -26,7 +27,7 @@ def changed(file: Path, scene: Scene) -> bool:
     if scene.accuracy is not None:
         return False
     with contextlib.closing(PathFile.open(file)) as stored, reading(file):
-        return bool(stored.meta()["provenance"]["input"] != fingerprint(scene.model))
+        return bool(stored.meta()["provenance"]["input"] != fingerprint(stored_model(file, scene.model)))
 
 
 def check_folder(folder: Path, scene: Scene) -> None:

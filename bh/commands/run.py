@@ -31,6 +31,7 @@ from bh.scene.flat import write_flat_pattern
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
 from bh.solvers.walk import Strategy
+from bh.solving.contact import stored_model
 from bh.solving.follow import check_resumable
 from bh.solving.levels import folder_of, move
 from bh.solving.levels import remove as remove_levels
@@ -125,7 +126,7 @@ def _solved(
     file = folder / names[0]
     goes_on = resume and names == FINISHED and _is_finished(folder) and changed(file, scene)
     if goes_on:  # the finished one stays until this one is finished, too
-        check_resumable(file, scene.model)
+        check_resumable(file, stored_model(file, scene.model))
         names, file = UNFINISHED, folder / UNFINISHED[0]
         shutil.copyfile(folder / FINISHED[0], file)
     before = resume and _is_whole(file, scene)

@@ -45,9 +45,9 @@ class Model:
         stiffness: given element stiffness (bars and hinges only), or None to derive it from the sheet.
         hinge_lock: bending hinges and spring creases stop before their panels pass through each other (bars and hinges
             only): stiffening without bound within the last 2 degrees before 0 and 2 pi, nothing elsewhere.
-        contact: panels that share no node stop each other: "thickness" (their middle surfaces stay the sheet's
-            thickness apart), a gap in mm, "auto" (by their thickness, from where they meet in a path that is solved
-            without at first), or False (they pass through each other: `bh.contact.first_contact` tells).
+        contact: panels that share no node stop each other: "auto" (by their thickness, from where they meet in a path
+            that is solved without at first), "thickness" (their middle surfaces stay the sheet's thickness apart in
+            every state), a gap in mm, or False (they pass through each other: `bh.contact.first_contact` tells).
         zones: parts of the sheet that are made of something else.
     """
 
@@ -59,7 +59,7 @@ class Model:
     formulation: str = "consistent"
     stiffness: ElementStiffness | None = None
     hinge_lock: bool = True
-    contact: Contact = False
+    contact: Contact = "auto"
     zones: tuple[SheetZone, ...] = ()
 
     def __post_init__(self) -> None:

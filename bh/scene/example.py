@@ -44,7 +44,7 @@ fold = {{ crease = "all", by = 0.8, Lstar = 25.0 }}
 # [[steps]]                      # steps run one after another
 # force = {{ at = "{place}", total = [0.0, 0.0, 0.01] }}      # N
 
-# Panels that stop each other where they meet (above the first table): contact = "thickness", or a gap in mm.
+# Panels stop each other from where they meet. To let them pass (above the first table): contact = false.
 
 [outputs]                        # beside path.bh and result.json
 pictures = true

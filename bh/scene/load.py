@@ -222,7 +222,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     creases = as_table(data.get("creases", {}), "creases")
     asked = [_steps(item, f"steps[{i}]") for i, item in enumerate(steps)]
     numbers = [i for i, legs in enumerate(asked) for _ in legs]
-    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data)
+    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data, sheet.t)
     model = Model(
         mesh=drawn.mesh,
         sheet=sheet,
@@ -232,7 +232,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
         formulation=name,
         hinge_lock=how.hinge_lock,
-        contact=contact_of(data.get("contact", False)),
+        contact=contact_of(data.get("contact", "auto")),
     )
     _check_names(model, numbers)
     _check_steps(model, numbers)

@@ -17,6 +17,8 @@ from meshes.choices import first_mesh
 if TYPE_CHECKING:
     from meshes.io.drawing import DrawingOptions
 
+ROOM = 1.03  # thicknesses between layers that are untangled: they press on each other up to 1.005
+
 
 @dataclass(frozen=True)
 class Drawn:
@@ -35,7 +37,9 @@ class Drawn:
     options: DrawingOptions = field(default_factory=dict)  # type: ignore[assignment]
 
 
-def mesh_of(pattern: object, mesh: object, folder: Path, anew: bool = False) -> Drawn:
+def mesh_of(
+    pattern: object, mesh: object, folder: Path, anew: bool = False, thickness: float | None = None
+) -> Drawn:
     """The meshed sheet of a scene, and what it was made from.
 
     Args:
@@ -43,6 +47,7 @@ def mesh_of(pattern: object, mesh: object, folder: Path, anew: bool = False) -> 
         mesh: table [mesh], or None for a coarse one that only shows the places (the mesh is chosen by the run).
         folder: where files that these name are looked for.
         anew: without a table [mesh], the faces of a FOLD file are not the mesh, but a coarse one of its pattern.
+        thickness: of the sheet, mm, that layers of a folded form are moved apart by; None where it is not known.
 
     Raises:
         SceneError: a table that is not understood, or a mesh that would only fill the memory.
@@ -50,7 +55,7 @@ def mesh_of(pattern: object, mesh: object, folder: Path, anew: bool = False) -> 
     """
     table = as_table(pattern, "pattern")
     if "file" in table:
-        return _mesh_from_file(table, mesh, folder, anew)
+        return _mesh_from_file(table, mesh, folder, anew, thickness)
     drawn = _drawn(table)
     if mesh is None:
         with within("pattern"):
@@ -95,6 +100,13 @@ def _meshed(flat: CreasePattern, how: MeshTable | GmshTable) -> SheetMesh:
         return structured(flat, aspect_ratio=how.aspect_ratio, along=how.along, rows=how.rows, kind=how.kind)
 
 
+def _layers_apart(untangle: bool | float, thickness: float | None) -> float | None:
+    """How far layers are moved apart, mm: by a little more than panels in contact keep between them."""
+    if isinstance(untangle, bool):
+        return ROOM * (thickness or 0.0) if untangle else None
+    return untangle
+
+
 def _mesh_table(table: dict[str, object]) -> MeshTable | GmshTable | DrawnTable:
     if table.get("kind") == "gmsh":
         return read_table(GmshTable, table, "mesh")
@@ -107,7 +119,9 @@ def _mesh_table(table: dict[str, object]) -> MeshTable | GmshTable | DrawnTable:
     return read_table(MeshTable, table, "mesh")
 
 
-def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: bool) -> Drawn:
+def _mesh_from_file(
+    table: dict[str, object], mesh: object, folder: Path, anew: bool, thickness: float | None
+) -> Drawn:
     from meshes.io import read_drawn, read_fold, read_pattern
     from meshes.io.drawing import PATTERNS
 
@@ -119,6 +133,10 @@ def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: 
     given = read_table(DrawingPattern, table, "pattern")
     if given.frame is not None and suffix != ".fold":
         raise SceneError("pattern.frame is for FOLD files; remove it")
+    if given.untangle is not False and (suffix != ".fold" or mesh is not None or anew):
+        raise SceneError(
+            "pattern.untangle is for the faces of FOLD files as they are; remove it, or [mesh] and accuracy"
+        )
     file = inside(folder, given.file, "pattern.file")
     options: DrawingOptions = {
         "scale": given.scale,
@@ -134,7 +152,10 @@ def _mesh_from_file(table: dict[str, object], mesh: object, folder: Path, anew: 
     own_faces = isinstance(how, DrawnTable) or (mesh is None and not anew)
     with within("pattern.file"):
         if suffix == ".fold" and own_faces and given.sheet is None:
-            return Drawn(read_fold(file, given.frame, scale=given.scale, fit=given.fit))
+            apart = _layers_apart(given.untangle, thickness)
+            return Drawn(
+                read_fold(file, given.frame, scale=given.scale, fit=given.fit, untangle=apart),
+            )
         if isinstance(how, DrawnTable) or (suffix == ".fold" and own_faces):
             return Drawn(read_drawn(file, **options), None, file, options)
         drawn = read_pattern(file, **options)

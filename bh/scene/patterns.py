@@ -192,6 +192,10 @@ class DrawingPattern(Table):
     frame: Annotated[int, Field(ge=0, le=1_000_000)] | Annotated[str, Field(min_length=1)] | None = Field(
         None, description="of a FOLD file: a frame number from 0 (the key frame), or the title of a frame"
     )
+    untangle: bool | Length = Field(
+        False,
+        description="of a FOLD file: true, or a distance in mm: layers of a folded form are moved apart by faceOrders",
+    )
     sheet: Annotated[int, Field(ge=1, le=1_000)] | None = Field(
         None, description="which of several sheets that are drawn, from 1, in rows from the top left"
     )

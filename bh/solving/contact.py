@@ -9,46 +9,62 @@ from pathlib import Path as FilePath
 from typing import Literal
 
 from bh.analysis.contact import first_contact
+from bh.errors import ModelError
 from bh.formulations.protocols import Stopping
 from bh.model.model import Model
-from bh.model.serialise import fingerprint
 from bh.paths.path import Path
 from bh.paths.record import StepOutcome
 from bh.paths.storage import PathFile, reading
 
-Solve = Callable[[Model, Path | None], Path]
+Solve = Callable[[Model, Path], Path]
+AUTO: Literal["auto"] = "auto"
 WITH: Literal["thickness"] = "thickness"  # what stops panels once they have met
 
 
-def solve_as_needed(model: Model, solve: Solve) -> Path:
-    """A path without contact where its panels do not meet, else one that goes on with contact from before they do.
+def go_on_as_needed(free: Path, solve: Solve) -> Path:
+    """A path without contact if its panels do not meet, else one that goes on with contact from before they do.
 
     Args:
-        model: with contact = "auto".
-        solve: follows a model through its steps, from the start or from where a path of it has come to.
+        free: of a model with contact = "auto", solved without.
+        solve: follows a model with contact on from where a path of it has come to.
 
     Returns:
-        the path; that it goes on with contact is said in its remarks (the reason of the step in which panels meet).
+        `free` itself where nothing meets or nothing can be done about it, else a path of another model. What was done
+        is said in its remarks (the reason of the step in which panels meet).
     """
-    free = solve(replace(model, contact=False), None)
     met = first_contact(free)
     if met is None:
         return free
-    stopped = replace(model, contact=WITH)
-    kept = last_clear(free, stopped, met.state)
+    stopped = replace(free.model, contact=WITH)
+    try:
+        kept = last_clear(free, stopped, met.state)
+    except ModelError as error:
+        _say(free, met.step, f"panels pass through each other ({met}), not prevented: {error}")
+        return free
     begun = Path(stopped)
     begun.records = free.records[: kept + 1]
     begun.steps = list(free.steps[: begun.records[-1].step])
     path = solve(stopped, begun)
     last = free.records[kept]
     where = f"lambda {last.lam:.4g} of step {last.step + 1}"
-    about = f"panels met without contact ({met}); solved again from {where} on with contact = '{WITH}'"
-    number = min(met.step, len(path.steps) - 1)
-    end = path.steps[number]
-    path.steps[number] = StepOutcome(
-        end.outcome, f"{end.reason}; {about}" if end.reason else about, end.iterations
+    _say(
+        path,
+        met.step,
+        f"panels met without contact ({met}); solved again from {where} on with contact = '{WITH}'",
     )
+    if free.accuracy is not None:
+        note = "the estimate is that of the path without contact"
+        path.accuracy = replace(free.accuracy, notes=(*free.accuracy.notes, note))
     return path
+
+
+def _say(path: Path, step: int, about: str) -> None:
+    """Add to what is said of how a step ended, or the last one that there is."""
+    number = min(step, len(path.steps) - 1)
+    end = path.steps[number]
+    if about not in end.reason:  # a resumed run has said it before
+        reason = f"{end.reason}; {about}" if end.reason else about
+        path.steps[number] = StepOutcome(end.outcome, reason, end.iterations)
 
 
 def last_clear(path: Path, stopped: Model, before: int) -> int:
@@ -60,7 +76,7 @@ def last_clear(path: Path, stopped: Model, before: int) -> int:
         before: index of the first state in which the sheet meets itself.
 
     Raises:
-        ModelError: the first state meets itself already.
+        ModelError: the first state meets itself already, or the model cannot be solved with contact.
     """
     system = Path(stopped).system(0)  # which refuses a first state that meets itself
     assert isinstance(system, Stopping)
@@ -77,6 +93,7 @@ def stored_model(file: FilePath, model: Model) -> Model:
         file: place of the path file.
         model: with contact = "auto".
     """
-    with_contact = replace(model, contact=WITH)
+    if model.contact != AUTO or not file.is_file():
+        return model
     with closing(PathFile.open(file)) as stored, reading(file):
-        return with_contact if stored.meta()["provenance"]["input"] == fingerprint(with_contact) else model
+        return replace(model, contact=WITH) if stored.meta()["model"].get("contact") == WITH else model

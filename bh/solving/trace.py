@@ -74,16 +74,12 @@ def trace(  # noqa: PLR0913 - the options of the one entry, all by name
         raise ModelError(
             "a run to a wanted accuracy begins anew on every mesh; leave out after, and resume it with its file"
         )
-    if accuracy is not None and model.contact == "auto":
-        raise ModelError(
-            "contact = 'auto' is for one mesh; give the mesh (and no accuracy), or contact = 'thickness'"
-        )
     report = meter(progress)
     with compilation_told(report):
+        options = _Options(symmetry, report, strategy, file, resume, after, neighbours)
         if accuracy is not None:
-            path = _to_accuracy(model, accuracy, symmetry, report, strategy, file, resume, neighbours)
+            path = _to_accuracy(model, accuracy, options)
         else:
-            options = _Options(symmetry, report, strategy, file, resume, after, neighbours)
             path = _as_needed(model, options) if model.contact == "auto" else options.follow(model)
         if estimate and path.accuracy is None:
             from bh.solving.given_mesh import add_estimate
@@ -122,46 +118,43 @@ class _Options:
         )
 
 
-def _as_needed(model: Model, options: _Options) -> Path:
-    """A path of a model with contact = "auto"."""
-    from bh.solving.contact import solve_as_needed, stored_model
+def _as_needed(model: Model, options: _Options, free: Path | None = None) -> Path:
+    """A path of a model with contact = "auto", from one without that is solved first."""
+    from bh.solving.contact import go_on_as_needed, stored_model
 
-    if options.resume and options.file is not None:
-        stored = stored_model(FilePath(options.file), model)
-        if stored.stops_itself:
+    if free is None:
+        stored = model if options.file is None else stored_model(FilePath(options.file), model)
+        if options.resume and stored.stops_itself:
             return options.follow(stored)
-    path = solve_as_needed(model, options.follow)
-    if options.file is not None and path.model.stops_itself:
+        free = options.follow(model)
+    ends = list(free.steps)
+    path = go_on_as_needed(free, options.follow)
+    if options.file is not None and path.steps != ends:
         path.save_steps(options.file)
     return path
 
 
-def _to_accuracy(
-    model: Model,
-    accuracy: float | Goal,
-    symmetry: Plane | None,
-    report: ProgressMeter,
-    strategy: Strategy | None,
-    file: str | FilePath | None,
-    resume: bool,
-    neighbours: bool | None,
-) -> Path:
+def _to_accuracy(model: Model, accuracy: float | Goal, options: _Options) -> Path:
     # its analyses are loaded only where they are needed
     from bh.model.refinement import Goal
     from bh.solving.accuracy import solve
     from bh.solving.levels import Levels
 
     goal = accuracy if isinstance(accuracy, Goal) else Goal(accuracy)
-    levels = None if file is None else Levels(file, resume)
+    levels = None if options.file is None else Levels(options.file, options.resume)
     path = solve(
         model,
         goal,
-        progress=report,
-        strategy=strategy,
-        symmetry=symmetry,
+        progress=options.report,
+        strategy=options.strategy,
+        symmetry=options.symmetry,
         levels=levels,
-        neighbours=neighbours,
+        neighbours=options.neighbours,
     )
-    if file is not None:
-        path.save(file)
+    if options.file is not None:
+        path.save(options.file)
+    if model.contact == "auto":
+        path = _as_needed(path.model, options, path)
+        if options.file is not None and path.model.stops_itself:
+            path.save_accuracy(options.file)
     return path

@@ -19,6 +19,7 @@ from meshes.errors import FileFormatError, InputError
 from meshes.io.export import one_line, shown
 from meshes.io.fold_faces import area, faces_of_graph, orient, sides_of, triangulate
 from meshes.io.fold_frame import UNITS, Frame, Side, check, laid_flat, load, select, side
+from meshes.io.fold_layers import orders_of, untangled
 from meshes.io.loose_ends import tie_ends
 from meshes.io.sizes import check_lengths, size_remarks
 from meshes.mesh import SheetMesh, count
@@ -37,6 +38,7 @@ def read_fold(
     *,
     scale: float | None = None,
     fit: float | None = None,
+    untangle: float | None = None,
 ) -> SheetMesh:
     """The sheet of one frame of a FOLD file, with faces triangulated, in mm.
 
@@ -56,6 +58,8 @@ def read_fold(
             has vertices and is no folded form (the first that has vertices where all are).
         scale: mm a unit of the file, in place of its frame_unit.
         fit: length of the longer side of the sheet's bounding box, mm, in place of a scale.
+        untangle: layers of a folded form are moved this far apart, mm, in the order that its faceOrders give
+            (`meshes.io.fold_layers`); None reads the frame as it is.
 
     Returns:
         The mesh, mm, of kind "imported". A flat pattern in another plane is laid into z = 0.
@@ -68,6 +72,8 @@ def read_fold(
     try:
         chosen = select(load(path), frame)
         found = _sized(laid_flat(check(chosen)), chosen, scale, fit)
+        if untangle is not None:
+            found = untangled(found, orders_of(chosen, len(found.faces)), untangle)
         mesh = sheet_of_frame(found)
         remarks = _remarks(found, chosen, scale is None and fit is None)
         return replace(mesh, remarks=(*remarks, *mesh.remarks))
@@ -116,7 +122,8 @@ def sheet_of_frame(frame: Frame) -> SheetMesh:
         try:
             if frame.flat and area(frame.points[:, :2], face) < 0.0:
                 raise FileFormatError(
-                    "is turned over (folded flat): the frame is a folded form; choose one where the sheet lies open"
+                    "is turned over (folded flat): the frame is a folded form; choose one where the sheet lies open, "
+                    "or untangle = true (its layers, by its faceOrders)"
                 )
             corners += triangulate(frame.points, face, frame.flat)
         except FileFormatError as error:

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 import bh
 import meshes
 from bh import Model, Sheet, State, trace
-from bh.analysis.contact import Panels, _Detector, candidates, first_contact, seen_once, self_contact
+from bh.analysis.contact import Panels, candidates, first_contact, self_contact
+from bh.analysis.projection import outline, seen_once
 from bh.analysis.triangles import intersecting
 from bh.commands.cli import main
 from bh.scene.load import load_scene
-from meshes.topology import boundary_loops
 
 Array = NDArray[np.float64]
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.toml"))
@@ -247,7 +247,7 @@ def test_staircase() -> None:
     angle, radius = 4.0 * math.pi * s / 40.0, 5.0 + width
     flat = np.column_stack((-radius * np.cos(angle), radius * np.sin(angle), 0.0 * s))
     ramp = flat + np.column_stack((0.0 * s, 0.0 * s, 0.3 * angle))
-    loops = boundary_loops(mesh.topology)
+    loops = outline(mesh.triangles)
     for x in (flat, ramp):
         assert not seen_once(x, mesh.triangles, loops)
     assert len(self_contact(at(mesh, ramp))) == 0
@@ -267,7 +267,6 @@ def test_two_discs_joined_crosswise() -> None:
         triangles += [[p, q_above, nw], [q_above, ne, nw], [q_above, r, ne], [r, se, ne]]
         triangles += [[q_below, p, sw], [q_below, sw, se], [r, q_below, se], [p, nw, sw]]
     x = np.column_stack((nodes, np.zeros(len(nodes)))).astype(float)
-    loops = [np.array([4, 5, 6, 7]), np.array([8, 9, 10, 11])]
     edges = [tuple(sorted((t[k], t[k - 1]))) for t in triangles for k in range(3)]
     assert sorted({e for e in edges if edges.count(e) == 1}) == [  # a manifold with these two boundaries
         (4, 5),
@@ -280,10 +279,10 @@ def test_two_discs_joined_crosswise() -> None:
         (10, 11),
     ]
     assert max(edges.count(e) for e in edges) == 2
-    assert not seen_once(x, np.array(triangles), loops)
+    assert not seen_once(x, np.array(triangles), outline(np.array(triangles)))
     large = np.array(triangles[:8])
     large[large == below] = above
-    assert seen_once(x, large, loops[:1])  # one square alone
+    assert seen_once(x, large, outline(large))  # one square alone
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-3, 0.5])
@@ -310,7 +309,7 @@ def test_flat_sheets_do_not_meet_themselves() -> None:
         meshes.strip(30.0, 10.0, [4.0]),
     ):
         mesh = meshes.structured(pattern, along=40, rows=2)
-        assert seen_once(mesh.points, mesh.triangles, boundary_loops(mesh.topology))
+        assert seen_once(mesh.points, mesh.triangles, outline(mesh.triangles))
         assert not intersecting(
             mesh.points, mesh.triangles, candidates(mesh.points, mesh.triangles), 1e-8
         ).any()
@@ -331,7 +330,7 @@ def test_rigid_motion_and_numbering_change_nothing(seed: int, bend: float) -> No
     x[:, 0], x[:, 2] = (40.0 / 12.0 * np.interp(s, np.arange(13), corners[:, c]) for c in (0, 1))
     x += 1e-3 * rng.normal(size=x.shape)
     pairs = self_contact(at(mesh, x))
-    if seen_once(x, mesh.triangles, boundary_loops(mesh.topology)):
+    if seen_once(x, mesh.triangles, outline(mesh.triangles)):
         found = candidates(x, mesh.triangles)
         assert not intersecting(x, mesh.triangles, found, 1e-7).any()
     for y in (x @ rotation(seed).T + rng.normal(size=3), 1e-3 * x, x * [1.0, 1.0, -1.0]):
@@ -397,12 +396,12 @@ def test_no_false_alarm_in_examples(file: Path) -> None:
 def test_no_false_alarm_in_deep_folds() -> None:
     mesh = meshes.structured(meshes.annulus_sector(200.0, 5.0, 0.5), aspect_ratio=6)
     path = trace(
-        Model(mesh, Sheet(E=4000.0, t=0.5), formulation="bars-and-hinges").fold(
+        Model(mesh, Sheet(E=4000.0, t=0.5), formulation="bars-and-hinges", contact=False).fold(
             "crease", to=math.radians(1.0)
         )
     )
     assert path.outcome == "reached"
-    assert not seen_once(path[-1].points, mesh.triangles, boundary_loops(mesh.topology))
+    assert not seen_once(path[-1].points, mesh.triangles, outline(mesh.triangles))
     assert first_contact(path) is None
 
 
@@ -410,7 +409,9 @@ def test_folded_sector_rolls_onto_itself() -> None:
     """A plane crease curls up by 1 / sin(phi / 2) when folded: its ends meet when it has turned by 2 pi, not before."""
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, 4.6), aspect_ratio=6)
     model = (
-        Model(mesh, SHEET, formulation="bars-and-hinges").support("crease:crease", "z").support("rigid-body")
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False)
+        .support("crease:crease", "z")
+        .support("rigid-body")
     )
     path = trace(
         model.fold("crease", to=math.pi / 2), strategy=bh.LoadControl(largest_rotation=math.radians(5.0))
@@ -435,7 +436,7 @@ def test_folded_sector_rolls_onto_itself() -> None:
 def roll_of_panels(to: float) -> Model:
     """Four mountain creases; at fold angles beyond 2 pi / 5 the last panel runs into the first."""
     mesh = meshes.structured(meshes.strip(12.0, 50.0, [10.0, 20.0, 30.0, 40.0]), along=3)
-    return Model(mesh, SHEET, formulation="bars-and-hinges").fold("all", by=to)
+    return Model(mesh, SHEET, formulation="bars-and-hinges", contact=False).fold("all", by=to)
 
 
 def test_corrugation_folded_past_contact() -> None:
@@ -495,7 +496,7 @@ def test_a_sheet_in_two_pieces() -> None:
     mesh = meshes.SheetMesh(
         np.array([*one, [9, 0, 0], [13, 0, 0], [9, 4, 0]]), np.array([[0, 1, 2], [3, 4, 5]])
     )
-    assert _Detector(mesh).loops is None
+    assert not seen_once(mesh.points, mesh.triangles, outline(mesh.triangles))
     assert self_contact(at(mesh, np.array(one + two, dtype=float))).tolist() == [[0, 1]]
     assert len(self_contact(at(mesh, mesh.points))) == 0
 
@@ -521,7 +522,7 @@ def test_run_reports_it(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for angle, name in (("1.5", "past"), ("1.2", "before")):
-        Path(f"{name}.toml").write_text(SCENE % angle)
+        Path(f"{name}.toml").write_text("contact = false\n" + SCENE % angle)
         assert main(["run", f"{name}.toml"]) == 0
     said = capsys.readouterr().out
     assert said.count("self-contact: none") == 1

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import bh
 import meshes
+from bh.commands.cli import main
 from bh.commands.result import result
 from bh.errors import SceneError
 from bh.mechanics.contact.barrier import SheetBarrier
@@ -59,15 +63,19 @@ def test_values_that_cannot_be_say_what_can(value: str) -> None:
 def test_a_run_sets_it(tmp_path: object) -> None:
     file = tmp_path / "scene.toml"  # type: ignore[operator]
     file.write_text(SCENE)
-    assert load_scene(file).model.contact is False
+    assert load_scene(file).model.contact == "auto"
+    assert load_scene(file, ["contact=false"]).model.contact is False
     assert load_scene(file, ["contact=0.3"]).model.contact == 0.3
     assert load_scene(file, ["contact=thickness"]).model.contact == "thickness"
     assert "contact" in schema()["properties"]  # type: ignore[operator]
 
 
 def test_auto_describes_the_same_model_as_none_until_panels_meet() -> None:
-    plain, auto = (parse_scene(text).model for text in (SCENE, f'contact = "auto"\n{SCENE}'))
+    plain, auto, default = (
+        parse_scene(f"{line}\n{SCENE}").model for line in ("contact = false", 'contact = "auto"', "")
+    )
     assert describe(plain)[0] == describe(auto)[0]
+    assert default.contact == auto.contact == bh.Model(auto.mesh, auto.sheet).contact
 
 
 def test_energy_of_contact_stands_beside_the_others() -> None:
@@ -161,6 +169,44 @@ def test_auto_goes_on_with_contact_from_the_last_clear_state(tmp_path: object) -
     assert np.array_equal(again[-1].points, path[-1].points)
 
 
-def test_auto_and_an_accuracy_do_not_go_together() -> None:
-    with pytest.raises(bh.ModelError, match="is for one mesh"):
-        bh.trace(letter("auto", 1.0), accuracy=0.1)
+def test_auto_goes_on_from_the_mesh_that_an_accuracy_has_chosen(tmp_path: Path) -> None:
+    file = tmp_path / "path.bh"
+    path = bh.trace(letter("auto", 2.4), accuracy=0.5, file=file)
+    assert path.model.contact == "thickness"
+    assert bh.contact.first_contact(path) is None
+    assert path.accuracy is not None
+    assert "the estimate is that of the path without contact" in path.remarks
+    assert bh.Path.load(file).remarks == path.remarks
+
+
+def test_what_cannot_be_prevented_is_told(tmp_path: Path) -> None:
+    """Layers that are thicker than a triangle is high; the path is the one without contact."""
+    file = tmp_path / "path.bh"
+    thick = dataclasses.replace(letter("auto", 2.4), sheet=bh.Sheet(E=4000.0, t=5.0))
+    path = bh.trace(thick, file=file)
+    assert path.outcome == "reached"
+    assert bh.contact.first_contact(path) is not None
+    said = [line for line in path.remarks if "not prevented: contact = thickness: layers" in line]
+    assert len(said) == 1
+    assert bh.Path.load(file).remarks == path.remarks
+    again = bh.trace(thick, file=file, resume=True)
+    assert [line for line in again.remarks if "not prevented" in line] == said
+
+
+def test_a_run_that_met_itself_goes_on_with_later_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = SCENE.replace("by = 1.0", "by = 2.4, Lstar = 5.0").replace("t = 0.127", "t = 0.5")
+    Path("letter.toml").write_text(text)
+    assert main(["run", "letter.toml"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "panels met without contact" in said
+    assert "self-contact: none" in said
+    assert main(["run", "letter.toml", "--resume"]) == 0  # it is whole
+    Path("letter.toml").write_text(f'{text}[[steps]]\nfold = {{ crease = "all", by = 2.3, Lstar = 5.0 }}\n')
+    assert main(["run", "letter.toml", "--resume"]) == 0
+    path = bh.Path.load("letter-out/path.bh")
+    assert path.outcome == "reached"
+    assert len(path.steps) == 2
+    assert path.model.contact == "thickness"

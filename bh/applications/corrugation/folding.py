@@ -55,7 +55,7 @@ def fold(
         mesh = corrugation(mesh)
     if isinstance(mesh, CreasePattern):
         mesh = structured(mesh, along=along, rows=rows)
-    model = Model(mesh, sheet, formulation=formulation).support("rigid-body")
+    model = Model(mesh, sheet, formulation=formulation, contact=False).support("rigid-body")
     path = trace(
         model.fold("all", by=SHARPEST, Lstar=Lstar, until=depth(depth_mm)), strategy=strategy, warn=False
     )

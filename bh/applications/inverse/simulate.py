@@ -95,7 +95,7 @@ def model(
     pattern = parallel_creases(list(k0), list(lengths), setting.width)
     along = max(2, round(whole / setting.edge))
     mesh = structured(pattern, along=along, rows=setting.rows, kind=setting.kind)  # type: ignore[arg-type]
-    strip = Model(mesh, Sheet(E=setting.E, t=setting.t), formulation=setting.formulation)
+    strip = Model(mesh, Sheet(E=setting.E, t=setting.t), formulation=setting.formulation, contact=False)
     strip = strip.fold("crease", rest=setting.fold, Lstar=setting.Lstar)
     middles = np.cumsum(lengths) - 0.5 * np.asarray(lengths)
     pinches: list[Actuation] = [

@@ -25,7 +25,7 @@ from bh.mechanics.contact.detection import Detection
 from bh.mechanics.shared.assembly import add_lower, rotate
 from bh.mechanics.shared.kinematics import OPTIONS
 from bh.mechanics.shared.sparsity import Slots
-from bh.model.model import Model
+from bh.model.model import Model, drawn_flat
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -61,7 +61,7 @@ class SheetBarrier:
             mesh.points, self.edges.astype(np.int32), mesh.triangles.astype(np.int32)
         )
         if offset > 0.0:
-            near = _neighbours(mesh.points, LOCAL * (offset + reach))
+            near = _neighbours(mesh, LOCAL * (offset + reach))
             self._mesh.can_collide = ipctk.make_sparse_filter(dict.fromkeys(near, False), True)
         self._potential = ipctk.BarrierPotential(reach, pressure, True)
         slack = max(reach, SLACK * float(np.median(mesh_edges(mesh))))
@@ -297,11 +297,21 @@ def mesh_edges(mesh: SheetMesh) -> Array:
     return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
 
-def _neighbours(points: Array, within: float) -> list[tuple[int, int]]:
-    """Pairs (low, high) of nodes that are nearer than `within` in the flat sheet."""
-    from scipy.spatial import cKDTree
+def _neighbours(mesh: SheetMesh, within: float) -> list[tuple[int, int]]:
+    """Pairs (low, high) of nodes that are nearer than `within` in the sheet: as it lies flat, else along its edges."""
+    if drawn_flat(mesh):
+        from scipy.spatial import cKDTree
 
-    return [(int(a), int(b)) for a, b in cKDTree(points).query_pairs(within)]
+        return [(int(a), int(b)) for a, b in cKDTree(mesh.points).query_pairs(within)]
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import dijkstra
+
+    a, b = mesh.topology.edges.T
+    size = len(mesh.points)
+    graph = sp.coo_array((mesh_edges(mesh), (a, b)), shape=(size, size))
+    far = dijkstra(graph, directed=False, limit=within)
+    low, high = np.nonzero(np.triu(np.isfinite(far), k=1))
+    return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
 def sheet_barrier(model: Model) -> SheetBarrier:

@@ -126,6 +126,7 @@ def model(study: Study, Lstar: float, formulation: str, mesh: tuple[int, int]) -
         meshes.structured(study.pattern, along=along, rows=rows),
         Sheet(E=4000.0, t=study.t),
         formulation=formulation,
+        contact=False,
     )
     for rest in study.rests:
         sheet = sheet.fold("all", by=math.radians(180 - rest), Lstar=Lstar)

@@ -227,7 +227,9 @@ def folded(pattern: CreasePattern, formulation: str, Lstar: float, size: float |
         mesh = meshes.structured(pattern, along=32)
     else:
         mesh = meshes.unstructured(pattern, size=size)
-    return bh.trace(bh.Model(mesh, PAPER, formulation=formulation).fold("all", by=FOLD, Lstar=Lstar))
+    return bh.trace(
+        bh.Model(mesh, PAPER, formulation=formulation, contact=False).fold("all", by=FOLD, Lstar=Lstar)
+    )
 
 
 def _folds(result: CaseResult, path: bh.Path, params: dict[str, Any]) -> None:

@@ -38,7 +38,7 @@ class Ratio:
 def strip_model(alpha: float, kind: Kind) -> Model:
     """The strip of 3.4.1, 10 x 1 x 0.1 mm, one row of cells, without supports."""
     mesh = meshes.structured(meshes.strip(L, H), along=max(1, round(alpha * L / H)), kind=kind)
-    return Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+    return Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges", contact=False)
 
 
 def loaded(model: Model, load: str) -> tuple[Model, float]:

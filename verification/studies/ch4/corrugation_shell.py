@@ -41,7 +41,7 @@ def bent(formulation: str, along: int, rows: int) -> Bent:
         return int(nodes[np.argmin(np.abs(mesh.points[nodes, 0]))])
 
     under = top("crease:crease-3")
-    model = Model(mesh, POLYESTER, formulation=formulation)
+    model = Model(mesh, POLYESTER, formulation=formulation, contact=False)
     model = model.support(ends[:1]).support(ends[1:], "yz").support([top("edge:outer")], "z")
     path = trace(model.fold("all", by=REST, Lstar=LSTAR).force([under], total=(0.0, 0.0, -LOAD)))
     folded = path[max(i for i, record in enumerate(path.records) if record.step == 0)]

@@ -119,7 +119,10 @@ def curve(
         1.0 / KAPPA_0, WIDTH, LENGTH * KAPPA_0, folds="valley" if valley else "mountain"
     )
     model = Model(
-        meshes.structured(pattern, along=cells[0], rows=cells[1]), scaled(factor), formulation=formulation
+        meshes.structured(pattern, along=cells[0], rows=cells[1]),
+        scaled(factor),
+        formulation=formulation,
+        contact=False,
     )
     for fraction in fractions:
         phi = math.pi / fraction

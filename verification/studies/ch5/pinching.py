@@ -153,7 +153,10 @@ def pinched(
     along, rows = mesh
     pattern = meshes.parallel_creases(curvature, LENGTH, spacing, creases, folds)  # type: ignore[arg-type]
     model = Model(
-        meshes.structured(pattern, along=along, rows=rows), stiffness.sheet, formulation=way.formulation
+        meshes.structured(pattern, along=along, rows=rows),
+        stiffness.sheet,
+        formulation=way.formulation,
+        contact=False,
     )
     model = model.fold("all", by=FOLDED, Lstar=stiffness.Lstar)
     how = "imposed" if way.couple is None else "couple"

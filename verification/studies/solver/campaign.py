@@ -58,7 +58,7 @@ class Scene:
         folds: list[Any] = ["mountain" if i % 2 == 0 else "valley" for i in range(self.creases)]
         pattern = meshes.annulus_sector(radii, self.width, self.angle, folds)
         mesh = meshes.structured(pattern, aspect_ratio=self.aspect_ratio, kind=self.kind)  # type: ignore[arg-type]
-        model = Model(mesh, Sheet(E=4000.0, t=self.thickness), formulation=self.formulation)
+        model = Model(mesh, Sheet(E=4000.0, t=self.thickness), formulation=self.formulation, contact=False)
         if self.supports == "corners":
             model = model.support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
             model = model.support("corner:inner-end", "z")

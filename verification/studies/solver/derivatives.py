@@ -82,7 +82,7 @@ def small_model() -> Model:
     mesh = meshes.structured(pattern, along=6)
     from bh import Fold, Force
 
-    model = Model(mesh, Sheet(E=4000.0, t=0.2), formulation="bars-and-hinges")
+    model = Model(mesh, Sheet(E=4000.0, t=0.2), formulation="bars-and-hinges", contact=False)
     model = model.support("edge:start", "xyz").support("corner:inner-end", [[0.0, 1.0, 1.0]])
     return model.step(
         Fold("crease-1", rest=2.0, Lstar=5.0),
@@ -153,7 +153,7 @@ def prediction_ratio(system, q: Array, lam: float) -> float:  # type: ignore[no-
 def work_mismatch(increment: float) -> tuple[float, int]:
     """Energy gained over a whole fold to 90 degrees, against Simpson's integral of the rate of work; relative error."""
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, math.pi / 4), along=32)
-    model = Model(mesh, Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges").fold(
+    model = Model(mesh, Sheet(E=4000.0, t=0.127), formulation="bars-and-hinges", contact=False).fold(
         "crease", to=math.pi / 2
     )
     fixed = LoadControl(first_rotation=increment, largest_rotation=increment)

@@ -72,14 +72,14 @@ def problems() -> tuple[Problem, ...]:
 def _strip(formulation: str, along: int) -> bh.Model:
     pattern = meshes.strip(LONG, WIDE, [0.5 * WIDE], "flat")
     mesh = meshes.structured(pattern, along=along, rows=max(along // 16, 1))
-    return bh.Model(mesh, bh.Sheet(E=E, nu=0.0, t=T), formulation=formulation)
+    return bh.Model(mesh, bh.Sheet(E=E, nu=0.0, t=T), formulation=formulation, contact=False)
 
 
 def _square(formulation: str, along: int) -> bh.Model:
     """Simply supported: its edges stay in their plane and move freely in it."""
     pattern = meshes.strip(SIDE, SIDE, [0.5 * SIDE], "flat")
     mesh = meshes.structured(pattern, along=along, rows=max(along // 2, 1))
-    model = bh.Model(mesh, bh.Sheet(E=E, nu=0.3, t=T), formulation=formulation)
+    model = bh.Model(mesh, bh.Sheet(E=E, nu=0.3, t=T), formulation=formulation, contact=False)
     for edge in ("start", "end", "inner", "outer"):
         model = model.support(f"edge:{edge}", "z")
     return model.support("edge:start", "x").support("corner:inner-start", "y")
@@ -123,7 +123,9 @@ def _folded(formulation: str, along: int) -> bh.Model:
     # masses at nodes give a flap that turns with n rows of cells 1 + 1 / (2 n^2) of its moment of inertia
     rows = along // 8 if formulation == "consistent" else along // 4
     mesh = meshes.structured(meshes.strip(LONG, 2.0 * WIDE, [WIDE], "valley"), along=along, rows=rows)
-    model = bh.Model(mesh, bh.Sheet(E=E, nu=0.0, t=T), formulation=formulation).support("edge:start", "x")
+    model = bh.Model(mesh, bh.Sheet(E=E, nu=0.0, t=T), formulation=formulation, contact=False).support(
+        "edge:start", "x"
+    )
     ends = [int(model.mesh.nodes("crease:crease")[k]) for k in (0, -1)]
     model = model.support(ends, "yz").support("corner:inner-start", "z")
     return model.fold("crease", by=math.radians(60.0), Lstar=20.0)

@@ -88,7 +88,7 @@ def narrow(rng: np.random.Generator) -> Draw:
         heights = [width * (k + 1) for k in range(creases)]
         pattern = meshes.strip(length, width * (creases + 1), heights, alternating(creases))
         words = f"strip of {creases}"
-    model = Model(first_mesh(pattern), sheet)
+    model = Model(first_mesh(pattern), sheet, contact=False)
     held = not curved or bool(rng.random() < 0.5)  # a free sheet folds along straight creases for nothing
     if held:
         model = _held(model, curved)
@@ -117,7 +117,7 @@ def wide(rng: np.random.Generator) -> Draw:
     radius = float(rng.uniform(60.0, 150.0))
     width = radius * float(rng.uniform(0.25, 0.6))
     angle = float(rng.uniform(0.6, 1.3))
-    model = Model(first_mesh(meshes.annulus_sector(radius, width, angle)), paper(rng))
+    model = Model(first_mesh(meshes.annulus_sector(radius, width, angle)), paper(rng), contact=False)
     words = f"wide sector, R = {radius:.0f}, w = {width:.0f}, {angle:.2f} rad"
     tip = bool(rng.random() < 0.4)
     if tip:
@@ -133,7 +133,9 @@ def ring(rng: np.random.Generator) -> Draw:
     width = radius * float(rng.uniform(0.15, 0.4))
     creases = int(rng.choice([1, 1, 2]))
     radii = [radius + width * k for k in range(creases)]
-    model = Model(first_mesh(meshes.full_annulus(radii, width, alternating(creases))), paper(rng))
+    model = Model(
+        first_mesh(meshes.full_annulus(radii, width, alternating(creases))), paper(rng), contact=False
+    )
     model, how = _folded(rng, model, 20.0, 50.0, True)
     return Draw(f"ring of {creases}, R = {radius:.0f}, w = {width:.0f}, {how}", model, Goal(_asked(rng)))
 
@@ -163,7 +165,7 @@ def several(rng: np.random.Generator) -> Draw:
         pattern = meshes.two_arcs(
             100.0, 100.0, [float(rng.uniform(70.0, 100.0)), float(rng.uniform(150.0, 300.0))]
         )
-    model, how = _folded(rng, Model(first_mesh(pattern), paper(rng)), 20.0, 60.0, True)
+    model, how = _folded(rng, Model(first_mesh(pattern), paper(rng), contact=False), 20.0, 60.0, True)
     return Draw(f"{count} {name}, {how}", model, Goal(_asked(rng)))
 
 
@@ -188,5 +190,5 @@ def network(rng: np.random.Generator) -> Draw:
         file = Path(folder, "network.svg")
         file.write_text(f"<svg {head}>{rim}{''.join(lines)}</svg>")
         pattern = read_pattern(file)
-    model, how = _folded(rng, Model(first_mesh(pattern), paper(rng)), 15.0, 45.0, True)
+    model, how = _folded(rng, Model(first_mesh(pattern), paper(rng), contact=False), 15.0, 45.0, True)
     return Draw(f"{len(ends)} curved creases meet, {how}", model, Goal(_asked(rng)))

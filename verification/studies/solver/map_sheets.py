@@ -68,7 +68,7 @@ def _sector(rng: Random, sheet: Sheet, wide: tuple[float, float], creases: int =
     radii = [radius + width * k for k in range(creases)]
     pattern = meshes.annulus_sector(radii, width, angle, alternating(creases))
     words = f"{creases} creases, R = {radius:.0f}, w = {width:.1f}, {angle:.2f} rad, t = {sheet.t:g}"
-    return _held(Model(first_mesh(pattern), sheet)), words
+    return _held(Model(first_mesh(pattern), sheet, contact=False)), words
 
 
 def _sprung(rng: Random, model: Model, low: float, high: float) -> Model:
@@ -123,7 +123,7 @@ def _twisted(rng: Random) -> Sample:
     length, height = float(rng.uniform(60.0, 120.0)), float(rng.uniform(12.0, 24.0))
     pattern = meshes.strip(length, height, [0.5 * height], "flat")
     turn = 0.5 * height * math.sin(math.radians(float(rng.uniform(8.0, 20.0))))
-    model = Model(first_mesh(pattern), honesty_scenes.paper(rng)).support("edge:start", "xyz")
+    model = Model(first_mesh(pattern), honesty_scenes.paper(rng), contact=False).support("edge:start", "xyz")
     low, high = "corner:inner-end", "corner:outer-end"
     model = model.step(Displace(low, "z", -turn), Displace(high, "z", turn))
     return Sample(f"strip of {length:.0f} x {height:.0f}, ends {turn:.1f} mm up and down", model, (high, "z"))

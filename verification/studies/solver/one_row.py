@@ -45,7 +45,7 @@ class Scene:
         """N mm in the sheet; None where the fold is not reached."""
         size = {"aspect_ratio": ALPHA} if along is None else {"along": along}
         mesh = meshes.structured(self.pattern, rows=rows, kind=kind, **size)  # type: ignore[arg-type]
-        path = trace(self.fold(Model(mesh, SHEET, formulation=formulation)))
+        path = trace(self.fold(Model(mesh, SHEET, formulation=formulation, contact=False)))
         energy = path[-1].energy
         return energy.stretching + energy.bending if path.reached else None
 

@@ -54,7 +54,7 @@ def displacement(model: Model) -> tuple[Array, int]:
 def square_plate(cells: int, kind: Kind, nu: float, clamped: bool) -> Answer:
     """Deflection of the centre under a uniform load, times D / (q a^4)."""
     mesh = meshes.structured(meshes.strip(1.0, 1.0), along=cells, rows=cells, kind=kind)
-    model = Model(mesh, Sheet(E=1.0, t=0.01, nu=nu), formulation=NAME)
+    model = Model(mesh, Sheet(E=1.0, t=0.01, nu=nu), formulation=NAME, contact=False)
     for edge in ("inner", "outer", "start", "end"):
         model = model.support(f"edge:{edge}", "z", clamp=clamped)
     model = model.support("corner:inner-start", "xy").support("corner:inner-end", "y")
@@ -68,7 +68,7 @@ def cooks_panel(cells: int, kind: Kind) -> Answer:
     unit = meshes.structured(meshes.strip(1.0, 1.0), along=cells, rows=cells, kind=kind)
     x, y = unit.points[:, 0], unit.points[:, 1]
     mesh = replace(unit, points=np.column_stack((48.0 * x, 44.0 * x + y * (44.0 - 28.0 * x))), spans=None)
-    model = Model(mesh, Sheet(E=1.0, t=1.0, nu=1.0 / 3.0), formulation=NAME)
+    model = Model(mesh, Sheet(E=1.0, t=1.0, nu=1.0 / 3.0), formulation=NAME, contact=False)
     model = model.support("edge:start", "xyz").support("all", "z")
     forces = np.zeros((len(mesh.points), 3))
     end = mesh.edge_sets["edge:end"]
@@ -89,7 +89,7 @@ def strip_ratio(load: str, kind: Kind, rows: int, alpha: float = 1.0, nu: float 
     """
     along = max(1, round(alpha * rows * strips.L / strips.H))
     mesh = meshes.structured(meshes.strip(strips.L, strips.H), along=along, rows=rows, kind=kind)
-    model = Model(mesh, Sheet(E=strips.E, t=strips.T, nu=nu), formulation=NAME)
+    model = Model(mesh, Sheet(E=strips.E, t=strips.T, nu=nu), formulation=NAME, contact=False)
     if load == "bending_out_of_plane":
         model = model.support("edge:start", "xyz").support("edge:end", "yz")
         forces = nodal_areas(mesh)[:, None] * [[0.0, 0.0, 1.0]]

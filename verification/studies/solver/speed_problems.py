@@ -96,7 +96,7 @@ def _fold_stiffness(path: Path) -> float:
 
 
 def _appendix_b(actuation: str, mesh: SheetMesh, name: str) -> Model:
-    model = Model(mesh, SHEET, formulation=name)
+    model = Model(mesh, SHEET, formulation=name, contact=False)
     model = model.support("corner:inner-start", "xyz").support("corner:outer-start", "yz")
     if actuation == "d":
         model = model.support("corner:inner-end", "z").support("corner:outer-end", "z")
@@ -106,12 +106,12 @@ def _appendix_b(actuation: str, mesh: SheetMesh, name: str) -> Model:
 
 
 def _free(mesh: SheetMesh, name: str) -> Model:
-    return Model(mesh, SHEET, formulation=name).fold("crease", rest=REST, Lstar=LSTAR)
+    return Model(mesh, SHEET, formulation=name, contact=False).fold("crease", rest=REST, Lstar=LSTAR)
 
 
 def _twisted(mesh: SheetMesh, name: str) -> Model:
     low, high = "corner:inner-end", "corner:outer-end"
-    held = Model(mesh, STRIP, formulation=name).support("edge:start", "xyz")
+    held = Model(mesh, STRIP, formulation=name, contact=False).support("edge:start", "xyz")
     return held.step(Displace(low, "z", -TWIST), Displace(high, "z", TWIST))
 
 
@@ -129,7 +129,11 @@ def _bent(mesh: SheetMesh, name: str) -> Model:
 
     A `total` on a crease is a line load to shells; the others get the share of each node (the end nodes are held).
     """
-    model = Model(mesh, STRIP, formulation=name).support("edge:start", "xyz").support("edge:end", "yz")
+    model = (
+        Model(mesh, STRIP, formulation=name, contact=False)
+        .support("edge:start", "xyz")
+        .support("edge:end", "yz")
+    )
     nodes = mesh.nodes("crease:crease")
     if is_shell(name):
         return model.force("crease:crease", total=(0.0, 0.0, -PUSH * LENGTH))

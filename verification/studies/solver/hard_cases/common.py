@@ -31,4 +31,5 @@ def annulus(along: int = 48, t: float = 0.127, kind: Any = "staggered", **sector
         meshes.structured(meshes.annulus_sector(**size), along=along, kind=kind),
         Sheet(E=4000.0, t=t),
         formulation="bars-and-hinges",
+        contact=False,
     )

@@ -45,7 +45,7 @@ def pinched_crease(kappa_0: float, length: float = LENGTH, t: float = 0.5, along
     mesh = replace(
         mesh, edge_sets={**mesh.edge_sets, "crease:pinch": zone}, folds={**mesh.folds, "pinch": "mountain"}
     )
-    model = Model(mesh, Sheet(E=4000.0, t=t), formulation="bars-and-hinges").fold(
+    model = Model(mesh, Sheet(E=4000.0, t=t), formulation="bars-and-hinges", contact=False).fold(
         "crease", rest=0.5 * math.pi, Lstar=2.0
     )
     return model.fold("pinch", to=PINCHED)
@@ -167,7 +167,7 @@ class Fan:
         places = ["edge:inner", *(f"crease:{name}" for name in self.mesh.creases), "edge:outer"]
         across = np.abs(self.mesh.points @ self.et)
         self.line = [int(nodes[np.argmin(across[nodes])]) for nodes in map(self.mesh.nodes, places)]
-        model = Model(self.mesh, Sheet(E=4000.0, t=t), formulation=formulation)
+        model = Model(self.mesh, Sheet(E=4000.0, t=t), formulation=formulation, contact=False)
         model = model.support(self.line, [self.et.tolist()])
         model = model.support(self.line[0::2], "z").support(self.line[:1], [self.er.tolist()])
         model = model.support("rigid-body")

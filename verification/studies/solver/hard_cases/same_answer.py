@@ -85,7 +85,9 @@ def model(mesh: SheetMesh, view: View, how: str) -> tuple[Model, Ints]:
     """A supported sector that is folded exactly ("held") or by springs ("spring"), then loaded across the fold."""
     seen, new = view.mesh(mesh)
     x, y, z = view.turn.T.tolist()
-    sheet = Model(seen, Sheet(E=E / view.scale**2, t=T * view.scale), formulation="bars-and-hinges")
+    sheet = Model(
+        seen, Sheet(E=E / view.scale**2, t=T * view.scale), formulation="bars-and-hinges", contact=False
+    )
     sheet = sheet.support("corner:inner-start", [x, y, z]).support("corner:outer-start", [y, z])
     sheet = sheet.support("corner:inner-end", [z])
     fold: dict[str, Any] = {"to": 1.5} if how == "held" else {"rest": 1.2, "Lstar": LSTAR * view.scale}

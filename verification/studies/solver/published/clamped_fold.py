@@ -56,7 +56,9 @@ def fold_model(turn: tuple[float, float], formulation: str, rows: int) -> Model:
     mesh = strip_mesh(lines, BREADTH, max(ACROSS, rows // 4), creases)
     y = mesh.points[:, 1]
     first, last = (np.flatnonzero(part).tolist() for part in (y < STUB + 1e-9, y > STUB + LENGTH - 1e-9))
-    model = Model(mesh, SHEET, formulation=formulation).support(first, "xyz").support(last, "xz")
+    model = (
+        Model(mesh, SHEET, formulation=formulation, contact=False).support(first, "xyz").support(last, "xz")
+    )
     # without its own clamp so short a part could bow between its nodes
     model = model.support("edge:inner", "z", clamp=True).support("edge:outer", "z", clamp=True)
     return model.step(

@@ -76,6 +76,7 @@ def ring_model(angle: float, ring: Ring, formulation: str, along: int, rows: int
         ),
         ring.sheet,
         formulation=formulation,
+        contact=False,
     )
     model = model.support("edge:start", "y", clamp=True).support("edge:end", "x", clamp=True)
     return model.support("rigid-body").fold("crease", to=math.radians(angle))

@@ -61,7 +61,7 @@ def sine_model(share: float, formulation: str, along: int, rows: int, sheet: She
     )
     family = SineFold(AMPLITUDE, WAVE, PITCH, share)
     up = PITCH * math.sin(family.incline)
-    model = Model(mesh, sheet, formulation=formulation).support("rigid-body")
+    model = Model(mesh, sheet, formulation=formulation, contact=False).support("rigid-body")
     model = model.support("edge:inner", "z").support("crease:crease-2", "z")
     up = PITCH * math.sin(family.incline)
     raised = [Displace(place, "z", by=up) for place in ("crease:crease-1", "edge:outer")]
