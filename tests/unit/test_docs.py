@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bh.scene import bodies as scene_bodies
-from bh.scene import crease_tables, moving
+from bh.scene import crease_tables, loads, moving
 from bh.scene import patterns as scene_patterns
 from bh.scene import reading as scene_tables
 from bh.scene import tables as schema
@@ -42,6 +42,11 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: move": moving.MoveTable,
     "steps: pull": schema.PullTable,
     "steps: weight": schema.WeightTable,
+    "steps: pressure": loads.PressureTable,
+    "steps: line_force": loads.LineForceTable,
+    "steps: area_force": loads.AreaForceTable,
+    "steps: edge_moment": loads.EdgeMomentTable,
+    "springs": loads.SpringTable,
     "steps: press": scene_bodies.PressTable,
     "steps: tether": scene_bodies.TetherTable,
     "steps: until": schema.UntilTable,
@@ -78,7 +83,9 @@ def test_tables_are_those_of_the_schema(title: str) -> None:
 def test_nothing_is_left_out() -> None:
     every = {
         kind
-        for kind in (vars(schema) | vars(scene_patterns) | vars(scene_bodies) | vars(moving)).values()
+        for kind in (
+            vars(schema) | vars(scene_patterns) | vars(scene_bodies) | vars(loads) | vars(moving)
+        ).values()
         if isinstance(kind, type) and issubclass(kind, scene_tables.Table)
     }
     assert set(TABLES.values()) == every - {scene_tables.Table, scene_patterns.PatternTable}
