@@ -29,10 +29,12 @@ if TYPE_CHECKING:
     from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
     from bh.model.crease_law import CreaseLaw
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
+    from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
     from bh.model.model import Model
     from bh.model.pinch import Pinch
     from bh.model.refinement import Goal, Refinement
     from bh.model.sheet import ElementStiffness, Sheet
+    from bh.model.springs import GroundSpring
     from bh.model.step import Actuation, Body, Step, StepBuilder, Zone
     from bh.model.supports import Constraint, Hold, RigidBody, Support
     from bh.model.until import Until, depth
@@ -62,10 +64,12 @@ _NAMES = {
     "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
     "bh.model.crease_law": "CreaseLaw",
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
+    "bh.model.loads": "AreaForce EdgeMoment LineForce Pressure",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
     "bh.model.refinement": "Goal Refinement",
     "bh.model.sheet": "ElementStiffness Sheet",
+    "bh.model.springs": "GroundSpring",
     "bh.model.step": "Actuation Body Step StepBuilder Zone",
     "bh.model.supports": "Constraint Hold RigidBody Support",
     "bh.model.until": "Until depth",
@@ -109,6 +113,7 @@ __all__ = [
     "Accuracy",
     "Actuation",
     "ArcLength",
+    "AreaForce",
     "Automatic",
     "Bilinear",
     "Body",
@@ -117,6 +122,7 @@ __all__ = [
     "CreaseLaw",
     "Displace",
     "DisplacementControl",
+    "EdgeMoment",
     "ElasticPlastic",
     "ElementStiffness",
     "Energy",
@@ -124,10 +130,12 @@ __all__ = [
     "Force",
     "Formulation",
     "Goal",
+    "GroundSpring",
     "HingeLaw",
     "Hold",
     "Indenter",
     "InputError",
+    "LineForce",
     "LoadControl",
     "Measured",
     "Model",
@@ -141,6 +149,7 @@ __all__ = [
     "Path",
     "PathFileError",
     "Pinch",
+    "Pressure",
     "Pull",
     "Refinement",
     "Remark",

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.builder import load_steps
-from bh.loading.load_step import StepEnd
+from bh.loading.load_step import LoadStep, StepEnd
 from bh.model.actuations import Displace, Fold, Force
 from bh.model.constraints import Constraints
+from bh.model.loads import AreaForce, LineForce
 from bh.model.model import Model
 from bh.model.ramp import Ramp
+from bh.model.springs import ground_stiffness
 from bh.model.step import Actuation
 from bh.model.supports import select
 from bh.model.weight import Weight
@@ -23,7 +25,7 @@ from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
-LATE = (Force, Displace, Weight)
+LATE = (Force, Displace, Weight, LineForce, AreaForce)
 WEIGHT = "the weight"  # no set of edges is called that
 
 
@@ -58,6 +60,30 @@ def constraints(mesh: ElementMesh, model: Model, step: int, points: Array | None
     if points is not None and any(each.looks_back for each in steps):
         ends = {step - 1: StepEnd(1.0, points, np.zeros(0))}
     return load_steps(replace(model, mesh=mesh.linear, steps=steps), ends)[step].constraints
+
+
+def ground(elements: ShellElements, model: Model) -> Array | None:
+    """(n, 3) stiffness of the springs to the ground at all nodes along x, y and z, N / mm; None without springs.
+
+    Those of an area or of a place as a whole are shared by middle nodes too; those of each node are of corners only.
+
+    Args:
+        elements: of the sheet.
+        model: has the springs.
+    """
+    mesh = elements.mesh
+    if not model.springs:
+        return None
+    out = ground_stiffness([item for item in model.springs if item.total is not None], mesh.linear)
+    corners = [item for item in model.springs if item.each is not None]
+    out[: len(mesh.sheet.points)] += ground_stiffness(corners, mesh.sheet)
+    rows = mesh.triangles[:, 3:] if mesh.degree == 2 else mesh.triangles  # as a force an area acts on them
+    area = np.bincount(rows.ravel(), np.repeat(elements.areas / 3.0, 3), minlength=len(out))
+    for item in model.springs:
+        if item.per_area is not None:
+            nodes = select(mesh.linear, item.at)
+            out[nodes] += area[nodes, None] * np.asarray(item.per_area)
+    return out
 
 
 def _plain(item: Actuation) -> Actuation:
@@ -104,7 +130,12 @@ def forces(elements: ShellElements, model: Model, step: int, acting: Ramp) -> Ra
             if isinstance(item, Force) and isinstance(item.at, str) and item.at in mesh.sheet.edge_sets:
                 lines[item.at] = _line(mesh, item, lengths)
             elif isinstance(item, Weight):
-                lines[WEIGHT] = _weight(elements, item, model)
+                lines[WEIGHT] = _spread(elements, item.of_triangles(model.sections), None)
+            elif isinstance(item, AreaForce):
+                force = np.asarray(item.per_area, dtype=float)
+                lines[item.key] = _spread(elements, force, item.on(mesh.sheet))
+            elif isinstance(item, LineForce):
+                lines[item.key] = _along(mesh, item, lengths)
 
     def whole(corners: Array, instead: dict[str, Array]) -> Array:
         out = np.zeros_like(mesh.nodes)
@@ -114,18 +145,37 @@ def forces(elements: ShellElements, model: Model, step: int, acting: Ramp) -> Ra
     return Ramp(whole(acting.start, before), whole(acting.end, lines))
 
 
-def _weight(elements: ShellElements, item: Weight, model: Model) -> Array:
-    """(n, 3) what is different where a weight acts on quadratic triangles, not on their corners alone, N."""
+def _spread(elements: ShellElements, force: Array, triangles: Ints | None) -> Array:
+    """(n, 3) what is different where a force an area acts on quadratic triangles, not on their corners alone, N."""
     mesh = elements.mesh
     out = np.zeros_like(mesh.nodes)
     if mesh.degree == 1:
         return out
-    force = item.of_triangles(model.sections)[:, None]
-    for triangles, areas in (
+    rows = slice(None) if triangles is None else triangles
+    each = np.broadcast_to(force, (len(mesh.triangles), 3))[rows]
+    for nodes, areas in (
         (mesh.triangles[:, 3:], elements.areas),
         (mesh.sheet.triangles, -mesh.sheet.areas),
     ):
-        np.add.at(out, triangles, (areas / 3.0)[:, None, None] * force)
+        np.add.at(out, nodes[rows], (areas[rows] / 3.0)[:, None, None] * each[:, None])
+    return out
+
+
+def _along(mesh: ElementMesh, item: LineForce, lengths: Array) -> Array:
+    """(n, 3) what is different where a force a length acts on curved edges with a middle, N."""
+    out = np.zeros_like(mesh.nodes)
+    edges = mesh.sheet.topology.find_edges(mesh.sheet.edge_sets[item.at])
+    ends = mesh.sheet.topology.edges[edges]
+    force = np.asarray(item.per_length, dtype=float)
+    chords = np.linalg.norm(mesh.sheet.points[ends[:, 1]] - mesh.sheet.points[ends[:, 0]], axis=1)
+    rule = [(ends[:, k], -0.5 * chords) for k in range(2)]
+    if mesh.degree == 2:
+        rule += [(ends[:, k], lengths[edges] / 6.0) for k in range(2)]
+        rule.append((len(mesh.sheet.points) + edges, lengths[edges] * (2.0 / 3.0)))  # Simpson's
+    else:
+        rule += [(ends[:, k], 0.5 * lengths[edges]) for k in range(2)]
+    for rows, length in rule:
+        np.add.at(out, rows, length[:, None] * force)
     return out
 
 
@@ -150,12 +200,13 @@ def _line(mesh: ElementMesh, item: Force, lengths: Array) -> Array:
     return out
 
 
-def edge_moments(elements: ShellElements, moments: EdgeMoments) -> Ramp:
+def edge_moments(elements: ShellElements, moments: EdgeMoments, load_step: LoadStep | None = None) -> Ramp:
     """(e, r) couples on the rotations alpha of edges, N mm / rad.
 
     Args:
         elements: of the sheet.
         moments: on named sets of boundary edges, N.
+        load_step: whose couples on edges act besides, or None.
 
     Raises:
         ModelError: a set that does not exist, or edges inside the sheet.
@@ -170,4 +221,7 @@ def edge_moments(elements: ShellElements, moments: EdgeMoments) -> Ramp:
         if (sheet.topology.edge_triangles[chosen, 1] >= 0).any():
             raise ModelError(f"edge moments act on boundary edges; '{name}' lies inside")
         out[:, chosen] += np.reshape(couple, (2, 1, 1)) / turns * (side * elements.lengths)[chosen, None]
+    if load_step is not None and load_step.edge_couple is not None:
+        ends = np.stack((load_step.edge_couple.start, load_step.edge_couple.end))
+        out += (ends / turns * side * elements.lengths)[..., None]
     return Ramp(out[0], out[1])

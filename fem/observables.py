@@ -14,10 +14,11 @@ from bh.model.model import Model
 from bh.model.zones import Sections
 from fem import grain
 from fem import sections as by_triangle
+from fem.here import Here
 from fem.shell import ShellElements
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients
 from fem.state import ShellState
-from fem.system import Here, ShellSystem
+from fem.system import ShellSystem
 
 Array = NDArray[np.float64]
 MIDDLE = np.array([[1.0 / 3.0, 1.0 / 3.0]])
@@ -63,7 +64,12 @@ def observe(
         step=step,
         lam=lam,
         points=here.x[: len(mesh.points)],
-        energy=Energy(float(stretching.sum()), float(bending.sum()), float(folding.sum())),
+        energy=Energy(
+            float(stretching.sum()),
+            float(bending.sum()),
+            float(folding.sum()),
+            ground=0.0 if system.outside is None else system.outside.spring_energy(here.x),
+        ),
         dihedral_angles=angles,
         energy_density={
             "stretching": stretching / e.areas,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -20,8 +19,10 @@ from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
 from fem.creases import connectors
+from fem.here import Here, root_mean_square
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
+from fem.outside import shell_outside
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
 from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, unit
 from fem.state import ShellState
@@ -31,39 +32,6 @@ Array = NDArray[np.float64]
 LARGEST_TURN = 1.3  # rad that any edge may turn in one increment before the driver mistrusts it
 LARGEST_ANGLE = 2.6  # rad between an edge's sides or tangent and its frame, which begins anew with every step
 ROUNDING = 8.0 * np.finfo(float).eps
-
-
-@dataclass(frozen=True, eq=False)
-class Here:
-    """What has been computed at one (q, lambda).
-
-    Attributes:
-        q: (size,) unknowns.
-        lam: how much of the step is applied.
-        components: (k,) all components, see `Components`.
-        x: (n, 3) positions of all nodes, mm.
-        forces: (t, 6 m) forces conjugate to strains and curvatures.
-        energy: potential, N mm.
-        B: (t, 6 m, w) derivatives of strains and curvatures.
-        pull: (t, 3 n + 3 r) element forces by positions and side rotations.
-    """
-
-    q: Array
-    lam: float
-    components: Array
-    x: Array
-    forces: Array
-    energy: float
-    B: Array
-    pull: Array
-
-
-def root_mean_square(values: Array) -> float:
-    """Root mean square, also of values whose squares overflow, which a wild trial step may have."""
-    largest = float(np.abs(values).max(initial=0.0))
-    if not 0.0 < largest < np.inf:
-        return largest
-    return largest * float(np.sqrt(np.mean((values / largest) ** 2)))
 
 
 class ShellSystem:
@@ -119,6 +87,7 @@ class ShellSystem:
         self.constraints = loads.constraints(mesh, model, step, None if start is None else x)
         clamped = mesh.sheet.topology.find_edges(load_step.constraints.clamped)
         self.components = lay_out(elements, self.constraints, self.creases, x, beta, clamped)
+        self.outside = shell_outside(elements, load_step, loads.ground(elements, model), self.constraints)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
         if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
@@ -132,7 +101,7 @@ class ShellSystem:
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
         force = loads.forces(self.elements, model, step, self.load_step.force)
-        couple = loads.edge_moments(self.elements, moments)
+        couple = loads.edge_moments(self.elements, moments, self.load_step)
         none = np.zeros(self.elements.tables.rotations * len(self.creases))
         ends = [
             np.concatenate((self.components.to_local(f).ravel(), m.ravel(), none))
@@ -230,7 +199,18 @@ class ShellSystem:
         out[self.components.first_beta :] += self.creases.gradient(
             self.components.beta(here.components), here.lam
         ).ravel()
+        if self.outside is not None:
+            self._add_nodal(out, self.outside.gradient(here.x, here.lam))
         return out
+
+    def _add_nodal(self, out: Array, nodal: Array) -> None:
+        """Add nodal vectors (n, 3) to all components (k,)."""
+        out[: self.components.first_alpha] += self.components.to_local(nodal).ravel()
+
+    @cached_property
+    def conservative(self) -> bool:
+        """Is the residual the gradient of the energy? Not under a pressure on a sheet with free edges."""
+        return self.outside is None or self.outside.conservative(self.components)
 
     # ------------------------------------------------------------------------------- the System protocol
 
@@ -242,6 +222,7 @@ class ShellSystem:
             here.energy + float(self.creases.energy(beta, lam).sum()) + self.creases.load_energy(beta, lam)
         )
         energy -= float(self.load.at(lam) @ here.components)
+        energy += 0.0 if self.outside is None else self.outside.energy(here.x, lam)
         residual = self.gradient(here)[self.components.free]
         return Evaluation(energy, residual, self._imbalance(residual, here), here.forces.ravel())
 
@@ -256,8 +237,10 @@ class ShellSystem:
         floors = (eps * self._stiffest[0], eps * self._stiffest[1])
         couples = self.creases.largest(self.components.beta(here.components), here.lam)
         first, width = self.components.first_alpha, self.elements.moves
+        acting = float(np.abs(load[:first]).max())
+        acting += 0.0 if self.outside is None else self.outside.largest(here.x, here.lam)
         groups = (
-            (residual[moves], here.pull[:, :width], float(np.abs(load[:first]).max()), floors[0]),
+            (residual[moves], here.pull[:, :width], acting, floors[0]),
             (
                 residual[~moves],
                 here.pull[:, width:],
@@ -306,6 +289,8 @@ class ShellSystem:
 
     def _matrix(self, here: Here, forces: Array) -> Matrix:
         K = self.element_tangents(here, forces)
+        if self.outside is not None:
+            self.outside.add(K, here.x, here.lam)
         if (self.constraints.frame_of >= 0).any():
             turn_blocks(K, self.mesh.triangles, self.constraints.frame_of, self.constraints.frames)
         pattern = self._pattern
@@ -314,8 +299,11 @@ class ShellSystem:
         slots, values = self._springs
         np.add.at(data, slots, values)
         if not self.constraints.rigid_body:
-            return pattern.matrix(data)
-        Z = self._rigid(here)
+            matrix = pattern.matrix(data)
+            if self.outside is None or self.conservative:
+                return matrix
+            return self.outside.followed(matrix, self.components, here.x, here.lam)
+        Z = free_rigid_motions(self.components, self.elements, self.frames, here.x)
         if Z.shape[1] == 0:  # clamped edges hold what the supports do not
             return pattern.matrix(data)
         ground = self._ground(Z, data)
@@ -330,20 +318,28 @@ class ShellSystem:
 
     def control_rate(self, q: Array, lam: float) -> Array:
         """(size,) derivative of the residual by lambda."""
-        out = self._times(self.at(q, lam), self.components.rate) - self.load.rate
+        here = self.at(q, lam)
+        out = self._times(here, self.components.rate) - self.load.rate
         out[self.components.first_beta :] += self.creases.gradient_rate().ravel()
+        if self.outside is not None:
+            self._add_nodal(out, -self.outside.push_rate(here.x))
         return out[self.components.free]
 
     def power(self, q: Array, lam: float) -> float:
         """Derivative of the potential by lambda at fixed q, N mm."""
         here = self.at(q, lam)
         total = float(self.gradient(here) @ self.components.rate) - float(self.load.rate @ here.components)
+        total += 0.0 if self.outside is None else self.outside.power(here.x)
         return total + self.creases.power(self.components.beta(here.components), lam)
 
     def control_stiffness(self, q: Array, lam: float) -> float:
         """Second derivative of the potential by lambda at fixed q, N mm."""
         c = self.creases
-        total = float(self._times(self.at(q, lam), self.components.rate) @ self.components.rate)
+        here = self.at(q, lam)
+        total = float(self._times(here, self.components.rate) @ self.components.rate)
+        if self.outside is not None:
+            moves = self.components.moves(self.components.rate)
+            total -= 2.0 * float(np.vdot(self.outside.push_rate(here.x), moves))
         total -= 2.0 * float(self.load.rate @ self.components.rate)
         total += 2.0 * float(np.vdot(c.gradient_rate(), self.components.beta(self.components.rate)))
         return total + float(np.einsum("c,ci,cij,cj->", c.stiffness, c.rest.rate, c.mass, c.rest.rate))
@@ -358,6 +354,8 @@ class ShellSystem:
                 "cij,cj->ci", self.creases.mass, self.components.beta(v)
             )
             out[self.components.first_beta :] += turn.ravel()
+            if self.outside is not None:
+                self._add_nodal(out, self.outside.times(here.x, self.components.moves(v), here.lam))
         return out
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
@@ -422,9 +420,6 @@ class ShellSystem:
         slot, value = np.concatenate(slots), np.concatenate(values)
         return slot[slot >= 0], value[slot >= 0]
 
-    def _rigid(self, here: Here) -> Array:
-        return free_rigid_motions(self.components, self.elements, self.frames, here.x)
-
     @cached_property
     def _ground_triangle(self) -> int:
         return ground_triangle(self.components, self.elements)
@@ -441,7 +436,9 @@ class ShellSystem:
     def _unbalanced(self, q: Array, lam: float) -> float:
         """Part of the loads that works on free rigid motions."""
         load = self.load.at(lam)[self.components.free]
-        work = self._rigid(self.at(q, lam)).T @ load if load.any() else load
+        x = self.at(q, lam).x
+        rigid = free_rigid_motions(self.components, self.elements, self.frames, x)
+        work = rigid.T @ load if load.any() else load
         return float(np.abs(work).max(initial=0.0)) / max(float(np.abs(load).sum()), 1e-300)
 
     def _check_balance(self) -> None:

@@ -16,7 +16,18 @@ from typing import Any, Literal, NamedTuple, TypeVar, overload
 from meshes.errors import InputError
 
 Kind = Literal[
-    "angle", "length", "modulus", "force", "couple", "stiffness", "curvature", "energy", "moment", "time"
+    "angle",
+    "length",
+    "modulus",
+    "force",
+    "couple",
+    "stiffness",
+    "curvature",
+    "energy",
+    "moment",
+    "time",
+    "pressure",
+    "line force",
 ]
 Typed = float | str  # a number in the project's unit, or a text with a unit
 T = TypeVar("T")
@@ -55,6 +66,8 @@ UNITS: dict[Kind, _Unit] = {
     "curvature": _Unit("1 / millimeter", "curvature", "0.01/mm or 10/m", ("1/mm", "1/m", "1/in")),
     "energy": _Unit("newton * millimeter", "energy", "2mJ or 2 N mm", ("J", "mJ", "uJ", "joule")),
     "moment": _Unit("newton * millimeter", "moment", "2 N mm", ("N mm", "N m")),
+    "pressure": _Unit("megapascal", "pressure", "2kPa or 0.002MPa", ("MPa", "kPa", "Pa", "GPa", "psi", "ksi", "bar")),
+    "line force": _Unit("newton / millimeter", "force a length", "0.1 N/mm", ("N/mm", "N/m", "mN/mm", "N/cm")),
     "time": _Unit("second", "time", "30s or 2min", ("s", "second", "seconds", "min", "minute", "minutes", "ms", "h")),
 }  # fmt: skip
 SHORT = {

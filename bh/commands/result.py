@@ -52,6 +52,7 @@ def result(
         ],
         "energy": {kind: _number(value) for kind, value in last.energy.as_dict().items()},
         "lock_energy": _number(last.energy.lock),
+        "spring_energy": _number(last.energy.ground),
         "contact_energy": _number(last.energy.contact),
         "dissipated": _number(last.energy.dissipated),
         "press": {name: [_number(f) for f in force] for name, force in last.contact_forces.items()},

@@ -23,9 +23,10 @@ class Energy:
     Attributes:
         lock: what the locks of hinges hold that are about to close (`Model.hinge_lock`), zero otherwise. It is no part
             of the theory and of none of the others, but of what the actuation has done as work:
-            work = change of (total + lock + contact).
+            work = change of (total + lock + contact + ground).
         dissipated: what creases that yield have used up, as `lock` no part of the others; work = change of
-            (total + lock + contact + dissipated) where their angles are not imposed.
+            (total + lock + contact + ground + dissipated) where their angles are not imposed.
+        ground: what springs to the ground hold (`bh.GroundSpring`), zero otherwise; apart like the locks.
         contact: what panels hold that press on each other (`Model.contact`), zero otherwise; apart like the locks.
     """
 
@@ -35,6 +36,7 @@ class Energy:
     lock: float = 0.0
     contact: float = 0.0
     dissipated: float = 0.0
+    ground: float = 0.0
 
     @property
     def total(self) -> float:

@@ -22,7 +22,8 @@ Direction = tuple[float, float, float]
 class Asked:
     """What hinges (m,) and nodes (n,) are asked for at the end of a step; the next step begins with it.
 
-    For the fields see `LoadStep`; `borne` are forces beside `force`. `pinched` marks hinges whose prescribed angle
+    For the fields see `LoadStep`; `borne` are forces beside `force`, by name; `pressed` (t,) are pressures and `turned`
+    (e,) couples on edges. `pinched` marks hinges whose prescribed angle
     follows from a solved state.
     """
 
@@ -33,7 +34,9 @@ class Asked:
     prescribed: Array
     moment: Array
     force: Array
-    borne: Array
+    borne: dict[str, Array]
+    pressed: Array
+    turned: Array
     pinched: NDArray[np.bool_]
     curve: NDArray[np.int64]  # row of the builder's `laws` of creases that are no straight line, else -1
     displaced: dict[tuple[int, Direction], float]  # nan where it is not known yet
@@ -50,7 +53,9 @@ class Asked:
             prescribed=np.full(hinges, np.nan),
             moment=np.zeros(hinges),
             force=np.zeros((nodes, 3)),
-            borne=np.zeros((nodes, 3)),
+            borne={},
+            pressed=np.zeros(len(mesh.triangles)),
+            turned=np.zeros(len(mesh.topology.edges)),
             pinched=np.zeros(hinges, dtype=bool),
             curve=np.full(hinges, -1, dtype=np.int64),
             displaced={},
@@ -59,6 +64,11 @@ class Asked:
     def copy(self) -> Asked:
         """The same in arrays of its own."""
         return Asked(**{name: value.copy() for name, value in vars(self).items()})
+
+    @property
+    def dead(self) -> Array:
+        """(n, 3) all dead forces, N."""
+        return sum(self.borne.values(), self.force)
 
     def angles(self) -> Array:
         """(m,) angles that this is meant to bring about, rad."""

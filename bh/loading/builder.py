@@ -13,13 +13,14 @@ from bh.loading.asked import Asked, StepInHand
 from bh.loading.load_step import LoadStep, StepEnd, edge_hinges, hinge_name
 from bh.loading.supports import Supports, isostatic
 from bh.model.actuations import Indenter
-from bh.model.constraints import Constraints, Prescribed, resolve
+from bh.model.constraints import Constraints, Prescribed, check_held, resolve
 from bh.model.crease_law import CreaseLaw
 from bh.model.hinge_laws import HingeLaw
 from bh.model.laws import PRESCRIBED, SPRING
 from bh.model.model import Model
 from bh.model.ramp import Ramp
 from bh.model.sheet import Sheet
+from bh.model.springs import ground_stiffness
 from bh.model.step import Body, Step, Zone
 from bh.model.zones import Sections
 from meshes import SheetMesh
@@ -42,6 +43,7 @@ class LoadStepBuilder:
         self.sheet: Sheet = model.sheet
         self.sections: Sections = model.sections
         self._supports = Supports(model)
+        self._ground = ground_stiffness(model.springs, model.mesh) if model.springs else None
         self._number = 0
         self._asked = Asked.nothing(model.mesh)
         self._rest_of_laws = self._asked.rest.copy()  # they come in during the first step
@@ -173,9 +175,17 @@ class LoadStepBuilder:
         """Dead forces (k, 3) or (3,), N, in place of what pulled there."""
         self._asked.force[nodes] = force
 
-    def bear(self, force: Array) -> None:
-        """Dead forces (n, 3) beside those of `pull`, N, in place of what was borne before."""
-        self._asked.borne = np.asarray(force, dtype=float)
+    def bear(self, force: Array, what: str = "weight") -> None:
+        """Dead forces (n, 3) beside those of `pull`, N, in place of what was borne by that name before."""
+        self._asked.borne[what] = np.asarray(force, dtype=float)
+
+    def press(self, triangles: Ints, pressure: float) -> None:
+        """A pressure on triangles (k,), N / mm^2; see `StepBuilder.press`."""
+        self._asked.pressed[triangles] = pressure
+
+    def turn(self, edges: Ints, couple: float) -> None:
+        """A dead couple a length on edges of the boundary (k,), N mm / mm; see `StepBuilder.turn`."""
+        self._asked.turned[edges] = couple
 
     def displace(self, nodes: Ints, direction: Sequence[float], by: float, further: bool = False) -> None:
         """Prescribe the displacement of nodes (k,) along a unit vector, mm; see `StepBuilder.displace`.
@@ -237,13 +247,16 @@ class LoadStepBuilder:
             prescribed=Ramp(start.prescribed, end.prescribed),
             pinch=now.pinch,
             moment=Ramp(start.moment, end.moment),
-            force=Ramp(start.force + start.borne, end.force + end.borne),
+            force=Ramp(start.dead, end.dead),
             constraints=self._constraints(start, bool(now.bodies), bool(step.release)),
             bodies=tuple(now.bodies),
             releases=bool(step.release),
             curve=end.curve if self._laws else None,
             laws=tuple(self._laws),
             freed=freed if freed.any() else None,
+            pressure=_some(start.pressed, end.pressed),
+            edge_couple=_some(start.turned, end.turned),
+            ground=self._ground,
         )
 
     def ended(self, points: Array) -> None:
@@ -268,8 +281,11 @@ class LoadStepBuilder:
         asked.rest, asked.rest_ends, asked.moment, force = (
             ramp.at(end.lam) for ramp in (step.rest, step.rest_ends, step.moment, step.force)
         )
-        asked.borne = Ramp(self._begun.borne, asked.borne).at(end.lam)
-        asked.force = force - asked.borne
+        for what, there in asked.borne.items():
+            asked.borne[what] = Ramp(self._begun.borne.get(what, np.zeros_like(there)), there).at(end.lam)
+        asked.force = force - sum(asked.borne.values(), np.zeros_like(force))
+        asked.pressed = Ramp(self._begun.pressed, asked.pressed).at(end.lam)
+        asked.turned = Ramp(self._begun.turned, asked.turned).at(end.lam)
         if np.isnan(asked.rest).any() or step.freed is not None:
             raise ModelError(
                 "a prescribed crease is released in a step that ends early (until); release it in a step before"
@@ -335,7 +351,10 @@ class LoadStepBuilder:
             moves.append(Prescribed(np.array([node]), direction, begin, end, by if further else 0.0))
         supports = self._supports
         try:
-            found = resolve(self.mesh, supports.flat, moves, in_contact, supports.lying)
+            carried = in_contact or self._ground is not None
+            found = resolve(self.mesh, supports.flat, moves, carried, supports.lying)
+            if self._ground is not None and not in_contact:
+                check_held(self.mesh, found, self._ground > 0.0, supports.lying)
             if releases and found.rigid_body and supports.points is not None and self._number > 1:
                 # the forces that let go would turn a free sheet while they fade: it is held at six places meanwhile
                 if self._asked.force.any():
@@ -352,6 +371,11 @@ class LoadStepBuilder:
             raise NotHeldError(f"where step {self._number} begins, {error}") from None
         self._supports.points = None  # until the end of this step is told
         return found
+
+
+def _some(start: Array, end: Array) -> Ramp | None:
+    """A ramp, or None where there is nothing at either end."""
+    return Ramp(start, end) if start.any() or end.any() else None
 
 
 def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple[LoadStep, ...]:

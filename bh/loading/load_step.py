@@ -63,6 +63,10 @@ class LoadStep:
         releases: supports are let go of, whose forces on the sheet go to zero during the step.
         curve: (m,) row of `laws` of creases whose moment is no straight line, else -1; None where there is none.
         laws: those laws.
+        pressure: (t,) on the triangles along their normals, N / mm^2; None where there is none.
+        edge_couple: (e,) dead couples a length on edges of the boundary, N mm / mm; None where there are none.
+        ground: (n, 3) stiffness of springs along x, y and z to where nodes lie in the stress-free sheet, N / mm; None
+            where there are none.
         freed: (m,) such creases whose angle was imposed up to here; what imposed it fades out during the step.
     """
 
@@ -80,6 +84,9 @@ class LoadStep:
     curve: Ints | None = None
     laws: tuple[HingeLaw, ...] = ()
     freed: NDArray[np.bool_] | None = None
+    pressure: Ramp | None = None
+    edge_couple: Ramp | None = None
+    ground: Array | None = None
 
     def prescribed_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""

@@ -228,6 +228,11 @@ def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
             raise ModelError(
                 f"{where}: a sheet that touches bodies is not solved by halves; leave out symmetry"
             )
+        if step.pressure is not None or step.ground is not None or step.edge_couple is not None:
+            raise ModelError(
+                f"{where}: a sheet under pressure, on springs or with couples on its edges is not solved by halves; "
+                "leave out symmetry"
+            )
         _check_hinges(model, step, plane, where)
         for name in ("start", "end"):
             force = getattr(step.force, name)

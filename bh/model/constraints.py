@@ -284,6 +284,23 @@ def _check_rigid_motions(mesh: SheetMesh, constraints: Constraints, lying: Lying
         _check_piece(points[nodes], mesh.size, _restricted(constraints, nodes), where)
 
 
+def check_held(
+    mesh: SheetMesh, constraints: Constraints, sprung: NDArray[np.bool_], lying: Lying | None = None
+) -> None:
+    """Raises `NotHeldError` where supports and springs together leave rigid motions free.
+
+    Args:
+        mesh: of the sheet.
+        constraints: what supports hold.
+        sprung: (n, 3) True where a spring pulls along x, y or z.
+        lying: of a step of a model whose supports change.
+
+    Raises:
+        NotHeldError: one line that names the motions.
+    """
+    _check_rigid_motions(mesh, replace(constraints, fixed=constraints.fixed | sprung), lying)
+
+
 def _bodies(mesh: SheetMesh) -> Ints:
     """(t,) number of the body of each triangle: pieces that share a node, as those of a truss do, are one."""
     piece = mesh.pieces

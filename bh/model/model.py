@@ -16,6 +16,7 @@ from bh.model.crease_law import CreaseLaw
 from bh.model.moving import legs
 from bh.model.pinch import Pinch
 from bh.model.sheet import ElementStiffness, Sheet
+from bh.model.springs import GroundSpring
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
@@ -49,6 +50,7 @@ class Model:
             that is solved without at first), "thickness" (their middle surfaces stay the sheet's thickness apart in
             every state), a gap in mm, or False (they pass through each other: `bh.contact.first_contact` tells).
         zones: parts of the sheet that are made of something else.
+        springs: to the ground, in all steps; they carry the sheet beside its supports, or alone.
     """
 
     mesh: SheetMesh
@@ -61,6 +63,7 @@ class Model:
     hinge_lock: bool = True
     contact: Contact = "auto"
     zones: tuple[SheetZone, ...] = ()
+    springs: tuple[GroundSpring, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
@@ -204,6 +207,15 @@ class Model:
             else Support(at, fix, clamp)
         )
         return replace(self, supports=(*self.supports, item))
+
+    def spring(self, at: Place, **stiffness: Sequence[float]) -> Model:
+        """Let nodes rest on springs; arguments of `bh.GroundSpring`.
+
+        Args:
+            at: name of a place, or node indices.
+            **stiffness: `each` or `total` (3,), N / mm, or `per_area` (3,), N / mm^3.
+        """
+        return replace(self, springs=(*self.springs, GroundSpring(at, **stiffness)))
 
     def crease(self, name: str, **law: Any) -> Model:
         """Give a crease a spring: `Lstar` (mm) or `stiffness` (N mm / (mm rad)), and its `rest` angle (rad).

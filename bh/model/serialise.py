@@ -15,10 +15,12 @@ from bh.errors import PathFileError
 from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
 from bh.model.crease_law import CreaseLaw
 from bh.model.hinge_laws import LAWS, HingeLaw
+from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
 from bh.model.model import Model
 from bh.model.pinch import Pinch
 from bh.model.plugins import consent, from_file
 from bh.model.sheet import ElementStiffness, Sheet
+from bh.model.springs import GroundSpring
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
@@ -37,6 +39,10 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "displace": Displace,
     "pull": Pull,
     "weight": Weight,
+    "pressure": Pressure,
+    "line_force": LineForce,
+    "area_force": AreaForce,
+    "edge_moment": EdgeMoment,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 SUPPORTS: dict[str, type[Constraint]] = {"hold": Hold}
@@ -75,6 +81,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         "supports": [_support(s) for s in model.supports],
         "creases": {name: _crease(law) for name, law in model.creases.items()},
         "steps": [_step(step) for step in model.steps],
+        **({"springs": [_plain(item) for item in model.springs]} if model.springs else {}),
     }
     return data, arrays
 
@@ -119,6 +126,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             else None,
             hinge_lock=data.get("hinge_lock", False),  # files of versions that had no lock
             contact=data.get("contact", False),
+            springs=tuple(GroundSpring(**item) for item in data.get("springs", ())),
         )
     except (KeyError, TypeError) as missing:
         raise PathFileError(f"the stored model is incomplete ({missing}); solve again") from missing

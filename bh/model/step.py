@@ -133,11 +133,30 @@ class StepBuilder(Protocol):
         """
         ...
 
-    def bear(self, force: Array) -> None:
-        """Dead forces (n, 3) on all nodes beside those of `pull`, N, in place of what was borne before.
+    def bear(self, force: Array, what: str = "weight") -> None:
+        """Dead forces (n, 3) on all nodes beside those of `pull`, N, in place of what was borne by that name before.
 
         Args:
             force: (n, 3), such as the weight of what belongs to each node.
+            what: name of what is borne.
+        """
+        ...
+
+    def press(self, triangles: Ints, pressure: float) -> None:
+        """A pressure on triangles (k,), N / mm^2, along their normals, in place of what pressed there.
+
+        Args:
+            triangles: (k,) rows of `mesh.triangles`.
+            pressure: at the end of the step.
+        """
+        ...
+
+    def turn(self, edges: Ints, couple: float) -> None:
+        """A dead couple a length on edges of the boundary (k,), N mm / mm, in place of what turned them.
+
+        Args:
+            edges: (k,) rows of `mesh.topology.edges`.
+            couple: at the end of the step; positive turns the outside towards the upper side.
         """
         ...
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from bh.scene import tables
 from bh.scene.bodies import BODIES
+from bh.scene.loads import SpringTable
 from bh.scene.moving import MoveTable
 from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import Table
@@ -55,6 +56,7 @@ def schema() -> Schema:
         "zones": {"type": "array", "items": _table(found, ZoneTable)},
         "mesh": {"anyOf": _tables(found, MESHES)},
         "supports": {"type": "array", "items": support},
+        "springs": {"type": "array", "items": _table(found, SpringTable)},
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
         "contact": {
             "anyOf": [{"enum": ["thickness", "auto", False]}, {"type": "number", "exclusiveMinimum": 0}]

@@ -27,6 +27,7 @@ from bh.scene.bodies import BODIES, body
 from bh.scene.changes import set_keys
 from bh.scene.contact import contact_of
 from bh.scene.crease_tables import crease_law
+from bh.scene.loads import check_springs, springs_of
 from bh.scene.meshing import Drawn, mesh_of
 from bh.scene.moving import moved
 from bh.scene.reading import (
@@ -65,6 +66,7 @@ SECTIONS = (
     "mesh",
     "model",
     "supports",
+    "springs",
     "creases",
     "steps",
     "outputs",
@@ -233,7 +235,9 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         formulation=name,
         hinge_lock=how.hinge_lock,
         contact=contact_of(data.get("contact", "auto")),
+        springs=springs_of(data.get("springs", [])),
     )
+    check_springs(model)
     _check_names(model, numbers)
     _check_steps(model, numbers)
     return Scene(

@@ -77,6 +77,11 @@ SectorAngle = Annotated[float, _SECTOR, spelled("angle", _SECTOR)]
 PinchAngle = Annotated[float, _PINCHED, spelled("angle", _PINCHED)]
 Spot = Annotated[list[Distance], Field(min_length=3, max_length=3)]
 Push = Annotated[list[Annotated[float, _ANY, spelled("force", _ANY)]], Field(min_length=3, max_length=3)]
+Pressing = Annotated[float, _ANY, spelled("pressure", _ANY)]
+PerArea = Annotated[list[Pressing], Field(min_length=3, max_length=3)]
+PerLength = Annotated[
+    list[Annotated[float, _ANY, spelled("line force", _ANY)]], Field(min_length=3, max_length=3)
+]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Few = Annotated[int, Field(ge=1, le=1000)]
 Node = Annotated[int, Field(ge=0, le=2**62)]

@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 
 from bh.model.pinch import Profile
 from bh.model.refinement import LEAST, MOST, MOST_TRIANGLES
+from bh.scene.loads import LOADS
 from bh.scene.reading import (
     DENSITY,
     LSTAR,
@@ -364,4 +365,5 @@ ACTUATIONS: dict[str, type[Table]] = {
     "displace": DisplaceTable,
     "pull": PullTable,
     "weight": WeightTable,
+    **LOADS,
 }

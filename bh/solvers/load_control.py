@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bh.solvers.branching import NO_BRANCH, Branch, onto_stable_branch
 from bh.solvers.creeping import CREEPS
+from bh.solvers.follower import conservative
 from bh.solvers.hindrance import clear_guess, found_apart, slipped, up_to_contact
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.modes import GAP, KNOWN_GAP, count_negative, neutral_mode
@@ -321,6 +322,8 @@ def jump(system: System, here: Point, there: Point, mismatch: float) -> str:
     turned = system.objection(here.q, here.lam, there.q, there.lam)
     if turned:
         return turned
+    if not conservative(system):  # what follows the sheet has no energy to tell a jump by
+        return ""
     gained = there.energy - here.energy
     taken = there.lam - here.lam
     size = max(abs(here.power), abs(there.power)) * abs(taken)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bh.scene import bodies as scene_bodies
-from bh.scene import crease_tables, moving
+from bh.scene import crease_tables, loads, moving
 from bh.scene import patterns as scene_patterns
 from bh.scene import reading as scene_tables
 from bh.scene import sheets as scene_sheets
@@ -44,6 +44,11 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: move": moving.MoveTable,
     "steps: pull": schema.PullTable,
     "steps: weight": schema.WeightTable,
+    "steps: pressure": loads.PressureTable,
+    "steps: line_force": loads.LineForceTable,
+    "steps: area_force": loads.AreaForceTable,
+    "steps: edge_moment": loads.EdgeMomentTable,
+    "springs": loads.SpringTable,
     "steps: press": scene_bodies.PressTable,
     "steps: tether": scene_bodies.TetherTable,
     "steps: until": schema.UntilTable,
@@ -81,7 +86,12 @@ def test_nothing_is_left_out() -> None:
     every = {
         kind
         for kind in (
-            vars(schema) | vars(scene_patterns) | vars(scene_bodies) | vars(moving) | vars(scene_sheets)
+            vars(schema)
+            | vars(scene_patterns)
+            | vars(scene_bodies)
+            | vars(scene_sheets)
+            | vars(loads)
+            | vars(moving)
         ).values()
         if isinstance(kind, type) and issubclass(kind, scene_tables.Table)
     }

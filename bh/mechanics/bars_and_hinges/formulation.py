@@ -18,6 +18,7 @@ from bh.loading.load_step import LoadStep
 from bh.mechanics.bars_and_hinges import remarks
 from bh.mechanics.bars_and_hinges.derivatives import BarHingeDerivatives
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
+from bh.mechanics.shared.base_system import refuse_outside
 from bh.mechanics.shared.crease_curves import refuse_curves
 from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.hinge_lock import lock_terms
@@ -82,6 +83,7 @@ class BarsAndHinges:
         if system.barrier is not None:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
         refuse_curves(system.curves)
+        refuse_outside(system.load_step)
         return BarHingeDerivatives(system, q, lam)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
@@ -128,10 +130,10 @@ class BarsAndHinges:
             mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(
                 float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum()), float(by_lock),
-                contact, dissipated,
+                contact, dissipated, 0.0 if system.outside is None else system.outside.spring_energy(x),
             ),
             dihedral_angles=angles, energy_density=density, reactions=reactions,
             crease_moments=moments, stable=stable,
-            contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
+            contact_forces={} if system.outside is None else system.outside.contact_forces(x, lam),
             crease_history=system.history_at(q, lam) if system.remembers else None,
         )  # fmt: skip

@@ -73,6 +73,8 @@ class BarsAndHingesSystem(SupportedSheet):
             ModelError: an edge is clamped, which has no meaning without slopes, or supports leave nothing to move.
         """
         mesh = model.mesh
+        if load_step.edge_couple is not None:
+            raise ModelError("bars and hinges have no slope at an edge to turn; take formulation consistent")
         if len(load_step.constraints.clamped):
             raise ModelError(
                 "bars and hinges have no slope at an edge to clamp; take formulation consistent, or hold "
@@ -134,8 +136,8 @@ class BarsAndHingesSystem(SupportedSheet):
         load = (1.0 - lam) * self.force.start + lam * self.force.end
         energy -= float(np.vdot(load, x - self.displacements.home))
         f -= load
-        if self.rigid_contact is not None:
-            energy += self.rigid_contact.forces(x, lam, f)
+        if self.outside is not None:
+            energy += self.outside.forces(x, lam, f)
         if self.barrier is not None:
             energy += self.barrier.forces(x, f)
         residual = np.empty(self.size)
@@ -150,6 +152,7 @@ class BarsAndHingesSystem(SupportedSheet):
             gap = 1e4 * max(float(np.abs(residual[self.primal :]).max()) - ROUNDING, 0.0)
             # the compliance is no excuse for an angle that is not met
             gap = max(gap, 10.0 * float(np.abs(missed).max()))
+        load = self._outer_scale(load, x, lam)
         imbalance = self._imbalance(residual, size, load, x, gap) if energy < np.inf else np.inf
         return Evaluation(energy, residual, imbalance, forces, penalty)
 
@@ -271,11 +274,9 @@ class BarsAndHingesSystem(SupportedSheet):
             self.constraints.frame_of, self.constraints.frames, data, *linear,
         )  # fmt: skip
         matrix: Matrix
-        if self.rigid_contact is not None:
+        if self.outside is not None:
             slots = pattern.slots[-1 if touching is None else -2]
-            self.rigid_contact.tangent(
-                x, lam, self.constraints.frame_of, self.constraints.frames, slots, data
-            )
+            self.outside.tangent(x, lam, self.constraints.frame_of, self.constraints.frames, slots, data)
         if touching is not None:
             axes = (self.constraints.frame_of, self.constraints.frames)
             self.contact_blocks.add(*touching, *axes, pattern.slots[-1], data)
@@ -287,6 +288,8 @@ class BarsAndHingesSystem(SupportedSheet):
             matrix = pattern.matrix(data)
         if e.prescribed:
             matrix = MultiplierMatrix(matrix, self._constraint_rows(linear.turns), e.penalty, self.compliance)
+        else:  # with imposed angles Newton's steps are those of the symmetric part, and a few more
+            matrix = self._followed(matrix, x, lam)
         return Tangent(matrix, partial(self._predicted_forces, linear))
 
     def _predicted_forces(self, linear: Linearised, forces: Array, dq: Array) -> Array:
@@ -314,8 +317,8 @@ class BarsAndHingesSystem(SupportedSheet):
         moving = self.displacements.prescribed_motion
         if moving.any():
             out += self.tangent_times(x, moving, forces, lam)
-        if self.rigid_contact is not None:
-            self.rigid_contact.force_rates(x, moving, lam, 1.0, out)
+        if self.outside is not None:
+            self.outside.force_rates(x, moving, lam, 1.0, out)
         if self.barrier is not None:
             out += self.barrier.times(x, moving)
         rate = np.empty(self.size)
@@ -336,9 +339,9 @@ class BarsAndHingesSystem(SupportedSheet):
         moment = stiffness * turn + couple  # without the lock, which knows no rest angle
         total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.displacements.home))
-        if self.rigid_contact is not None:
-            total += self.rigid_contact.power(x, lam)
-            self.rigid_contact.forces(x, lam, f)
+        if self.outside is not None:
+            total += self.outside.power(x, lam)
+            self.outside.forces(x, lam, f)
         if self.barrier is not None:
             self.barrier.forces(x, f)
         return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
@@ -359,7 +362,11 @@ class BarsAndHingesSystem(SupportedSheet):
                 out += self.barrier.times(x, moving)
             total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
             total += 2.0 * float((e.couple.rate - stiffness * e.rest.rate) @ turn)
-        return total if self.rigid_contact is None else total + self.rigid_contact.control_stiffness(x, lam)
+        if self.outside is None:
+            return total
+        rates = np.zeros_like(x)
+        self.outside.force_rates(x, moving, lam, 1.0, rates)
+        return total + float(np.vdot(rates, moving)) + self.outside.control_stiffness(x, moving, lam)
 
     def tangent_times(self, x: Array, v: Array, forces: Array, lam: float = 0.0) -> Array:
         """Tangent of all elements times v (n, 3), in global axes and with no support left out.
@@ -385,7 +392,7 @@ class BarsAndHingesSystem(SupportedSheet):
         groups: tuple[Ints, ...] = (self.elements.bars, self.elements.hinges)
         if self.constraints.rigid_body:
             groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
-        if self.rigid_contact is not None:
+        if self.outside is not None:
             groups += (self.mesh.triangles,)
         if self.barrier is not None:
             groups += (self.contact_blocks.pairs,)

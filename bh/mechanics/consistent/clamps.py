@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
 from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.patches import Patches
+from bh.model.ramp import Ramp
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -26,20 +28,29 @@ class Clamps:
         outward: (e, 3) where the sheet goes on beyond an edge that is held as it lies, mm, as long as the edge; nan
             for all others.
         couple: (e,) what a clamp that is let go of carried, N mm: it goes to zero during the step.
+        loaded: (e,) True where a couple acts, and `load` (e,) that couple from the start to the end of the step, N mm.
     """
 
     edges: NDArray[np.bool_]
     outward: Array
     couple: Array
+    loaded: NDArray[np.bool_]
+    load: Ramp
 
 
 def clamps(mesh: SheetMesh, load_step: LoadStep, start: State | None) -> Clamps:
     """The clamps of a step that begins at a state.
 
+    A couple works on the turn of the sheet at its edge, measured from where the sheet went on when the step began: a
+    clamp at that place that turns freely, with a couple on it.
+
     Args:
         mesh: the stress-free sheet.
         load_step: has the clamped edges.
         start: a state of the consistent formulation; None for the stress-free sheet.
+
+    Raises:
+        ModelError: a couple acts on an edge that is clamped.
     """
     topology, held = mesh.topology, load_step.constraints
     edges = np.zeros(len(topology.edges), dtype=bool)
@@ -48,14 +59,30 @@ def clamps(mesh: SheetMesh, load_step: LoadStep, start: State | None) -> Clamps:
     lying = np.zeros_like(edges)
     lying[rows] = held.as_it_lies
     couple = np.zeros(len(edges))
+    load, loaded = _loaded(mesh, load_step)
+    if (loaded & edges).any():
+        raise ModelError(
+            "an edge moment acts on an edge that is clamped, where nothing turns; remove one of them"
+        )
     outward = np.full((len(edges), 3), np.nan)
     if start is None or start.edge_slopes is None or start.clamp_couples is None:
-        return Clamps(edges, outward, couple)
+        return Clamps(edges | loaded, outward, couple, loaded, load)
     if load_step.releases:
-        couple = np.where(edges, 0.0, start.clamp_couples)
-    lying |= couple != 0.0
+        couple = np.where(edges | loaded, 0.0, start.clamp_couples)
+    lying |= (couple != 0.0) | loaded
     outward[lying] = _directions(mesh, start, np.flatnonzero(lying))
-    return Clamps(edges | lying, outward, couple)
+    return Clamps(edges | lying, outward, couple, loaded, load)
+
+
+def _loaded(mesh: SheetMesh, load_step: LoadStep) -> tuple[Ramp, NDArray[np.bool_]]:
+    """(e,) couples on edges, N mm, and where there are some."""
+    ends = mesh.points[mesh.topology.edges]
+    if load_step.edge_couple is None:
+        none = np.zeros(len(ends))
+        return Ramp(none, none), np.zeros(len(ends), dtype=bool)
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    start, end = load_step.edge_couple.start * length, load_step.edge_couple.end * length
+    return Ramp(start, end), (start != 0.0) | (end != 0.0)
 
 
 def _directions(mesh: SheetMesh, start: State, edges: Ints) -> Array:

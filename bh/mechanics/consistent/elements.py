@@ -62,7 +62,7 @@ class ConsistentElements:
         prescribed: (m,) prescribed dihedral angles at every hinge, rad; nan where it is not prescribed.
         lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at prescribed ones.
         rotations: how many there are.
-        let_go: (rotations,) couples of clamps that are let go of, on the rotations of their edges, N mm.
+        let_go: (rotations,) couples on edges, and of clamps that are let go of, on the rotations of those edges, N mm.
     """
 
     members: Ints
@@ -251,8 +251,8 @@ def _number_rotations(
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), their number, and couples, N mm.
 
     There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that
-    keeps its own, as those do whose clamp is let go of, with its couple; but one for a spring in the plane of a
-    symmetric sheet, and none for what lies outside of its half.
+    keeps its own, as those do whose clamp is let go of or that are turned, with their couples; but one for a spring in
+    the plane of a symmetric sheet, and none for what lies outside of its half.
     """
     count = np.ones(len(spring), dtype=np.int64)
     two_sided = spring.copy()
@@ -267,14 +267,15 @@ def _number_rotations(
     side = (joined.half_edge // 3 != triangles[joined.hinge]).astype(np.int64)
     has = (joined.hinge >= 0) & ~joined.inner
     rotation = np.where(has, both[joined.hinge, side], -1)
-    couple = held.couple[mesh.topology.triangle_edges.ravel()[joined.half_edge]]
-    let_go = (joined.kind == TURN) & (joined.hinge < 0) & (couple != 0.0)
+    edge = mesh.topology.triangle_edges.ravel()[joined.half_edge]
+    couple, load = held.couple[edge], Ramp(held.load.start[edge], held.load.end[edge])
+    let_go = (joined.kind == TURN) & (joined.hinge < 0) & ((couple != 0.0) | held.loaded[edge])
     free = ((joined.hinge < 0) & (joined.kind == OWN)) | let_go
     rotation[free] = count.sum() + np.arange(free.sum())
     rotations = int(count.sum() + free.sum())
-    couples = np.zeros(rotations)
-    couples[rotation[let_go]] = couple[let_go]
-    return rotation, both, rotations, Ramp(couples, np.zeros(rotations))
+    start, end = np.zeros(rotations), np.zeros(rotations)
+    start[rotation[let_go]], end[rotation[let_go]] = (couple + load.start)[let_go], load.end[let_go]
+    return rotation, both, rotations, Ramp(start, end)
 
 
 def _quads(mesh: SheetMesh, joined: Patches, outward: Array) -> tuple[Ints, Array]:

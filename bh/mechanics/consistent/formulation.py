@@ -26,6 +26,7 @@ from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.membrane import Measure, constant_strain, smoothed_strain
 from bh.mechanics.consistent.resultants import resultants
 from bh.mechanics.consistent.system import ConsistentSystem
+from bh.mechanics.shared.base_system import refuse_outside
 from bh.mechanics.shared.crease_curves import refuse_curves
 from bh.mechanics.shared.density import to_triangles
 from bh.mechanics.shared.kinematics import dihedral_angles
@@ -82,6 +83,7 @@ class Consistent:
         if not (system.elements.stretching.constant and system.elements.bending.constant):
             raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
         refuse_curves(system.curves)
+        refuse_outside(system.load_step)
         return ConsistentDerivatives(system, q, lam)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
@@ -129,7 +131,8 @@ class Consistent:
         return State(
             mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(
-                float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact, dissipated
+                float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact, dissipated,
+                0.0 if system.outside is None else system.outside.spring_energy(x),
             ),
             dihedral_angles=angles,
             energy_density={
@@ -140,7 +143,7 @@ class Consistent:
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable, edge_slopes=slopes, clamp_couples=couples,
             recover=partial(resultants, model.sections, mesh, e, self.material, x, now.theta),
-            contact_forces={} if system.rigid_contact is None else system.rigid_contact.contact_forces(x, lam),
+            contact_forces={} if system.outside is None else system.outside.contact_forces(x, lam),
             crease_history=system.history_at(q, lam) if system.remembers else None,
         )  # fmt: skip
 

@@ -177,7 +177,7 @@ class ConsistentSystem(TurningEdges):
         x = self.near(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
-        touched = 0.0 if self.rigid_contact is None else self.rigid_contact.forces(x, lam, now.f)
+        touched = 0.0 if self.outside is None else self.outside.forces(x, lam, now.f)
         if self.barrier is not None:
             touched += self.barrier.forces(x, now.f)
         energy = (
@@ -190,7 +190,8 @@ class ConsistentSystem(TurningEdges):
             + float(self.elements.let_go.at(lam) @ q[self.moving :])
         )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
-        imbalance = self._imbalance(residual, now.size, load, x) if energy < np.inf else np.inf
+        scale = self._outer_scale(load, x, lam)
+        imbalance = self._imbalance(residual, now.size, scale, x) if energy < np.inf else np.inf
         return Evaluation(energy, residual, imbalance, now.forces)
 
     def _imbalance(self, residual: Array, size: float, load: Array, x: Array) -> float:
@@ -232,8 +233,8 @@ class ConsistentSystem(TurningEdges):
         closing |= kernels.spring_tangent(
             x, e.hinges, stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
         )
-        if self.rigid_contact is not None:
-            self.rigid_contact.tangent(x, lam, *axes, pattern.slots[0], data)
+        if self.outside is not None:
+            self.outside.tangent(x, lam, *axes, pattern.slots[0], data)
         if touching is not None:
             self.contact_blocks.add(*touching, *axes, pattern.slots[-1], data)
         if closing or L.any():
@@ -241,6 +242,7 @@ class ConsistentSystem(TurningEdges):
         matrix: Matrix = pattern.matrix(data)
         if self.constraints.rigid_body:
             matrix = self._free_body(x, data)
+        matrix = self._followed(matrix, x, lam)
         return Tangent(matrix, partial(self._predicted_forces, x, Slopes(B, stiffness), bool(closing)))
 
     def _free_body(self, x: Array, data: Array) -> FreeBodyMatrix:
@@ -332,8 +334,8 @@ class ConsistentSystem(TurningEdges):
         kernels.spring_force_rates(x, v, e.hinges, e.turns, S, dS, f, r)
         if L.any():
             closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
-        if self.rigid_contact is not None:
-            self.rigid_contact.force_rates(x, v, lam, 1.0, f)
+        if self.outside is not None:
+            self.outside.force_rates(x, v, lam, 1.0, f)
         if self.barrier is not None:
             f += self.barrier.times(x, v)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
@@ -358,9 +360,9 @@ class ConsistentSystem(TurningEdges):
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
         total -= float(np.vdot(self.force.rate, x - self.displacements.home))
         total += float(self.elements.let_go.rate @ q[self.moving :])
-        if self.rigid_contact is not None:
-            total += self.rigid_contact.power(x, lam)
-            self.rigid_contact.forces(x, lam, now.f)
+        if self.outside is not None:
+            total += self.outside.power(x, lam)
+            self.outside.forces(x, lam, now.f)
         if self.barrier is not None:
             self.barrier.forces(x, now.f)
         unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
@@ -369,9 +371,5 @@ class ConsistentSystem(TurningEdges):
     def control_stiffness(self, q: Array, lam: float) -> float:
         """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         v = self.displacements.prescribed_motion
-        more = (
-            0.0
-            if self.rigid_contact is None
-            else self.rigid_contact.control_stiffness(self.positions(q, lam), lam)
-        )
+        more = 0.0 if self.outside is None else self.outside.control_stiffness(self.near(q, lam), v, lam)
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more

@@ -17,11 +17,13 @@ from bh.mechanics.shared import penetration as hinge_penetration
 from bh.mechanics.shared.crease_curves import CreaseCurves
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
-from bh.mechanics.shared.rigid_contact import RigidContact
+from bh.mechanics.shared.outside import Outside
 from bh.model.constraints import MOTIONS, TURNED, rigid_motions
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.model import Model
 from bh.model.ramp import Ramp
+from bh.solvers.factor import Matrix
+from bh.solvers.follower import FollowerMatrix
 from bh.solvers.outcome import Outcome
 from bh.solvers.system import System, grows_ahead
 from meshes import SheetMesh
@@ -85,9 +87,12 @@ class SupportedSheet:
 
             self.barrier, self.contact_blocks = sheet_barrier(model), ContactBlocks()
             self._check_start(start_points)
-        self.rigid_contact = (
-            RigidContact(self.mesh, load_step.bodies, start_points) if load_step.bodies else None
-        )
+        acts = load_step.bodies or load_step.pressure is not None or load_step.ground is not None
+        self.outside = Outside(self.mesh, load_step, start_points, self.displacements) if acts else None
+        if self.constraints.rigid_body and load_step.pressure is not None:
+            raise ModelError(
+                "a pressure pushes a sheet that nothing holds as a whole; add supports or springs"
+            )
 
     def _check_start(self, x: Array) -> None:
         """Raises `ModelError` where the step begins with a sheet that passes through itself."""
@@ -118,8 +123,8 @@ class SupportedSheet:
         Returns:
             N mm, of panels alone.
         """
-        if self.rigid_contact is not None:
-            self.rigid_contact.forces(x, lam, f)
+        if self.outside is not None:
+            self.outside.forces(x, lam, f)
         return 0.0 if self.barrier is None else self.barrier.forces(x, f)
 
     def _touching(self, x: Array) -> tuple[Ints, Array] | None:
@@ -133,6 +138,22 @@ class SupportedSheet:
         if not self.contact_blocks.known(found[0]):
             vars(self).pop("_pattern", None)
         return found
+
+    @property
+    def conservative(self) -> bool:
+        """Is the residual the gradient of the energy? Not under a pressure on a sheet with free edges."""
+        return self.outside is None or self.outside.conservative
+
+    def _followed(self, matrix: Matrix, x: Array, lam: float) -> Matrix:
+        """The tangent with the skew part of what follows the sheet at positions x (n, 3), where there is some."""
+        if self.outside is None or self.conservative:
+            return matrix
+        skew = self.outside.skew(x, lam, self.size)
+        return matrix if skew is None else FollowerMatrix(matrix, skew)
+
+    def _outer_scale(self, load: Array, x: Array, lam: float) -> Array:
+        """Forces whose size says what is small: dead loads (n, 3), and below them what acts from outside, N."""
+        return load if self.outside is None else self.outside.scale(load, x, lam)
 
     @property
     def remembers(self) -> bool:
@@ -241,7 +262,7 @@ class SupportedSheet:
     def rounding(self, q: Array, lam: float) -> float:
         """Largest force of rounding over the typical force of the state, see `bh.solvers.system.Rounded`."""
         x = self.near(q, lam)
-        typical = typical_force(self._size(x, q, lam), self.force.at(lam))
+        typical = typical_force(self._size(x, q, lam), self._outer_scale(self.force.at(lam), x, lam))
         return self._floor(x) / typical if typical > TINIEST else 0.0
 
     def noise(self, q: Array, lam: float) -> float:
@@ -341,6 +362,21 @@ def apart_in_shape(x: Array, y: Array) -> float:
     left, _, right = np.linalg.svd(x.T @ y)
     left[:, 2] *= np.sign(np.linalg.det(left @ right))  # no mirror image
     return float(np.linalg.norm(x @ (left @ right) - y))
+
+
+def refuse_outside(load_step: LoadStep) -> None:
+    """Raises `ModelError` where a step has what derivatives by the design do not know.
+
+    Args:
+        load_step: of the step.
+
+    Raises:
+        ModelError: a pressure, springs to the ground or couples on edges; one line.
+    """
+    if not (load_step.pressure is None and load_step.ground is None and load_step.edge_couple is None):
+        raise ModelError(
+            "sensitivities do not know pressure, springs to the ground and couples on edges; leave them out"
+        )
 
 
 def typical_force(size: float, load: Array) -> float:
