@@ -78,7 +78,7 @@ def test_consistent_has_springs_for_springs_only() -> None:
 
 
 def test_no_rotations_without_the_consistent_formulation() -> None:
-    """Bars and hinges load neither the other formulations nor what is asked for apart."""
+    """Bars and hinges load neither the other formulations nor what is asked for apart; the look for contact is there."""
     loaded = loaded_after(PULLED.format(formulation="bars-and-hinges"))
     assert "bh.mechanics.bars_and_hinges.system" in loaded
     assert not loaded & {
@@ -89,8 +89,10 @@ def test_no_rotations_without_the_consistent_formulation() -> None:
         "bh.model.refinement",
         "bh.scene.load",
     }
-    others = ("bh.mechanics.consistent", "fem", "skfem", "bh.analysis")
+    others = ("bh.mechanics.consistent", "bh.mechanics.contact", "fem", "skfem", "ipctk")
     assert not [name for name in loaded if name.startswith(others)]
+    looks = {"bh.analysis", "bh.analysis.contact", "bh.analysis.projection", "bh.analysis.triangles"}
+    assert {name for name in loaded if name.startswith("bh.analysis")} <= looks
 
 
 def test_the_consistent_formulation_loads_no_shell() -> None:
