@@ -35,8 +35,11 @@ class Limits:
         lines: of a drawing, without those that are ignored.
         vertices: of a drawing's lines, once curves are chords; numbers of its paths, values of a DXF file.
         crossings: of a drawing's lines where none has a node.
+        loose_ends: of a drawing's lines within a face, some milliseconds each to tie to its rim.
         control_points: of one spline.
         megabytes: of a drawing's file, unpacked.
+        stored_megabytes: of a path file, a journal or a data set, unpacked; most of them are held in memory.
+        stored_rows: of a table of a path file (states) or a journal (points).
     """
 
     creases: int = 1_000
@@ -54,8 +57,11 @@ class Limits:
     lines: int = 10_000
     vertices: int = 100_000
     crossings: int = 10_000
+    loose_ends: int = 1_000
     control_points: int = 2_000
     megabytes: int = 32
+    stored_megabytes: int = 500
+    stored_rows: int = 100_000
 
 
 def limits() -> Limits:

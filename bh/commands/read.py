@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
@@ -12,6 +11,7 @@ from bh.commands.occupied import FINISHED, UNFINISHED, path_file
 from bh.errors import InputError, PathFileError
 from bh.paths.path import Path
 from bh.paths.storage import PathFile, reading
+from bh.paths.stored import mapping, parsed_file
 from bh.scene.load import Scene, parse_scene
 
 
@@ -63,7 +63,7 @@ def read(folder: str | os.PathLike[str]) -> Run:
 def _result(file: FilePath) -> dict[str, object]:
     names = dict([FINISHED, UNFINISHED])
     try:
-        found = json.loads((file.parent / names[file.name]).read_text(encoding="utf-8"))
+        found = parsed_file(file.parent / names[file.name])
     except (KeyError, OSError):  # a path file of another name, or a run that was killed
         return {}
     except ValueError as error:
@@ -74,11 +74,22 @@ def _result(file: FilePath) -> dict[str, object]:
 def _scene(file: FilePath, path: Path) -> tuple[Scene | None, str]:
     with contextlib.closing(PathFile.open(file)) as stored, reading(file):
         kept = stored.meta().get("scene")
-    if kept is None:
+        kept = None if kept is None else mapping(kept, "its scene")
+    if kept is None or not {"file", "text"} <= set(kept):
         return None, "the path was not solved from a scene file"
-    source = FilePath(kept["file"])
+    source, text = FilePath(str(kept["file"])), str(kept["text"])
+    # the folder of a stranger's scene is not here, whatever the file says: drawings are looked for beside the path then
+    folder = source.parent if _is_there(source, text) else file.parent
     try:
-        scene = parse_scene(kept["text"], source.parent, source.stem)
-    except InputError as error:  # a drawing that has gone
+        scene = parse_scene(text, folder, source.stem)
+    except (InputError, ValueError) as error:  # a drawing that has gone
         return None, str(error)
     return replace(scene, model=path.model, source=source), ""
+
+
+def _is_there(source: FilePath, text: str) -> bool:
+    """Whether the scene that a path was solved from still lies where it lay."""
+    try:
+        return source.is_file() and source.stat().st_size < 2**24 and source.read_text("utf-8-sig") == text
+    except (OSError, ValueError):
+        return False

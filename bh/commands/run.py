@@ -25,6 +25,7 @@ from bh.model.serialise import fingerprint
 from bh.paths.export import FOLDED, folded_frame, write_flat, write_state
 from bh.paths.path import Path as Trace
 from bh.paths.storage import PathFile, reading
+from bh.paths.stored import parsed_file
 from bh.runtime.lock import only_writer
 from bh.runtime.progress import ProgressMeter
 from bh.scene.flat import write_flat_pattern
@@ -245,7 +246,7 @@ def _names(folder: Path, scene: Scene, resume: bool) -> tuple[str, str]:
 
 def _is_finished(folder: Path) -> bool:
     try:
-        result = json.loads((folder / FINISHED[1]).read_text(encoding="utf-8"))
+        result = parsed_file(folder / FINISHED[1])
     except (OSError, ValueError):
         return False
     return isinstance(result, dict) and result.get("outcome") == Outcome.REACHED

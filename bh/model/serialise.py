@@ -108,9 +108,9 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
         angles = {name.removeprefix("angles/"): a for name, a in arrays.items() if name.startswith("angles/")}
         mesh = SheetMesh(
             points=arrays["points"], triangles=arrays["triangles"], edge_sets=sets, corners=flat["corners"],
-            folds=flat["folds"], fold_angles=angles, spans=arrays.get("spans"), kind=flat["kind"],
+            folds=flat["folds"], fold_angles=angles, spans=arrays.get("spans"), kind=str(flat["kind"]),
             curves={name: _untagged(curve, CURVES) for name, curve in flat["curves"].items()},
-            aspect_ratio=float("nan") if flat["aspect_ratio"] is None else flat["aspect_ratio"],
+            aspect_ratio=float("nan" if flat["aspect_ratio"] is None else flat["aspect_ratio"]),
             remarks=tuple(flat.get("remarks", ())), drawn=arrays.get("drawn"),
         )  # fmt: skip
         return Model(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.model.refinement import MOST, Goal
+from bh.paths.stored import line
 from bh.solvers.outcome import Outcome
 from meshes.mesh import count
 
@@ -136,6 +137,25 @@ class Accuracy:
             asked,
             tuple(data["notes"]),
         )
+
+
+def stored(data: Mapping[str, Any]) -> Accuracy:
+    """What a path file tells of the error, its types looked at.
+
+    Args:
+        data: what `Accuracy.as_dict` has written, or somebody else.
+
+    Raises:
+        ValueError, TypeError, LookupError: it is not that.
+    """
+    found = Accuracy.from_dict(data)
+    for number in (found.estimate, found.order, found.wall_time_s):
+        if type(number) not in (int, float):
+            raise ValueError("its accuracy is no number")
+    for text in (found.formulation, found.mesh, *found.notes):
+        line(text, "what it says of its accuracy")
+    str(found), found.as_dict()
+    return found
 
 
 def _trial(data: Mapping[str, Any]) -> Trial:

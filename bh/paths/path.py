@@ -22,8 +22,9 @@ from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
 from bh.paths.advice import ADVICE
 from bh.paths.provenance import provenance_of
-from bh.paths.record import Record, StepOutcome
+from bh.paths.record import Record, StepOutcome, check_rows, check_sizes
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
+from bh.paths.stored import line, mapping
 from bh.runtime import viewer
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import ARC, CriticalPoint
@@ -340,22 +341,22 @@ class Path:
         Raises:
             PathFileError: no such file, or not a path file.
         """
-        source = PathFile.open(FilePath(file))
-        with closing(source), reading(FilePath(file)):
+        with closing(PathFile.open(FilePath(file))) as source, reading(FilePath(file)):
             meta = source.meta()
-            path = cls(rebuild(meta["model"], source.arrays()), meta["provenance"])
-            for row in source.states():
-                path.records.append(Record.of_row(row))
+            path = cls(rebuild(mapping(meta["model"], "the model"), source.arrays()), meta["provenance"])
+            rows = list(source.states())
             ends = source.steps()
+            check_rows(path.model, path.provenance, rows, ends)
+            path.records = [Record.of_row(row) for row in rows]
             path.steps = [
                 StepOutcome(Outcome(end), reason, lost) for _, (end, reason, lost) in sorted(ends.items())
             ]
-        error = meta.get("accuracy", {"told": None, "reason": ""})  # files of versions that had none
-        if error["told"] is not None:
-            from bh.paths.estimate import Accuracy
+            error = meta.get("accuracy", {"told": None, "reason": ""})  # files of versions that had none
+            if error["told"] is not None:
+                from bh.paths.estimate import stored
 
-            path.accuracy = Accuracy.from_dict(error["told"])
-        path.estimate_reason = error["reason"]
+                path.accuracy = stored(error["told"])
+            path.estimate_reason = line(error["reason"], "reason")
         return path
 
     def row(self, index: int) -> StateRow:
@@ -392,6 +393,7 @@ class Path:
                 raise ModelError(
                     f"formulation '{self.model.formulation}' has no contact; take 'consistent', or contact = False"
                 )
+            check_sizes(self.records, step, made)
             self._systems[step] = checked_system(made, self.model.formulation)
         return self._systems[step]
 

@@ -2,20 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.errors import PathFileError
+from bh.model.model import Model
 from bh.paths.storage import StateRow
+from bh.paths.stored import line, mapping
 from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.points import LOAD, CriticalPoint, Mode
+from bh.solvers.system import Remembering, System
 
 if TYPE_CHECKING:
     from bh.formulations.symmetry_reduction import Half
 
 Array = NDArray[np.float64]
+
+
+def check_rows(
+    model: Model,
+    provenance: object,
+    rows: Sequence[StateRow],
+    ends: Mapping[int, tuple[str, str, int]],
+) -> None:
+    """See that what a path file holds is a path of its model.
+
+    Args:
+        model: of the path.
+        provenance: of the path.
+        rows: its states in order.
+        ends: outcome, reason and iterations of the steps that ended.
+
+    Raises:
+        ValueError: it is not; one line.
+    """
+    told = mapping(provenance, "the provenance")
+    line(told["input"], "the input")
+    for version in mapping(told["versions"], "the versions").values():
+        line(version, "a version")
+    steps = [row.step for row in rows]
+    if steps != sorted(steps) or (steps and not 0 <= steps[0] <= steps[-1] < len(model.steps)):
+        raise ValueError("its states are of steps that its model has not")
+    if sorted(ends) != list(range(len(ends))) or len(ends) > len(model.steps):
+        raise ValueError("it tells of the end of steps that its model has not")
+    if any(outcome == Outcome.REACHED and step not in steps for step, (outcome, *_) in ends.items()):
+        raise ValueError("it has no state of a step that it calls reached")
+    if any(row.points.shape != model.mesh.points.shape for row in rows):
+        raise ValueError("its states have other nodes than its model")
 
 
 @dataclass(frozen=True)
@@ -84,3 +121,27 @@ class Record:
     def stable(self) -> bool | None:
         """True if no mode is negative, None where that was not looked at."""
         return None if self.negative is None else self.negative == 0
+
+
+def check_sizes(records: Sequence[Record], step: int, system: System) -> None:
+    """See that records of a stored path are states of a system; compiled code takes what it is given.
+
+    Args:
+        records: of the path.
+        step: whose records are looked at.
+        system: of the step.
+
+    Raises:
+        PathFileError: unknowns, or what is remembered, are of another size.
+    """
+    for record in records:
+        if record.step != step:
+            continue
+        passed = (len(array) for point in record.critical for array in (point.q, point.mode))
+        fits = {len(record.q), *passed} == {system.size}
+        if fits and record.history is not None:
+            fits = isinstance(system, Remembering) and record.history.shape == system.history.shape
+        if not fits:
+            raise PathFileError(
+                f"the path has states of another size than its model in step {step + 1}; solve it again"
+            )

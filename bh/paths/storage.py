@@ -22,11 +22,24 @@ from numpy.typing import NDArray
 
 from bh.errors import InputError, PathFileError
 from bh.model.serialise import AnyArray
+from bh.paths.stored import (
+    array,
+    check_file,
+    check_tables,
+    line,
+    lines,
+    numbers,
+    parsed,
+    real,
+    trusted,
+    whole,
+)
 
 Array = NDArray[np.float64]
 FORMAT = (
     3  # of the tables and of the model in them; raised with every change. Format 2 is that of version 0.1
 )
+MESSAGE = 600  # characters of what is said of a damaged file
 SCHEMA = """
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE arrays (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL, data BLOB NOT NULL);
@@ -144,10 +157,13 @@ class PathFile:
         file = FilePath(file)
         if not file.is_file():
             raise PathFileError(f"there is no path file '{file}'; check the name")
+        check_file(file, PathFileError)
         with reading(file):
             db = _connect(file)
-            db.execute("SELECT count(*) FROM states").fetchone()
             found = db.execute("PRAGMA user_version").fetchone()[0]
+            if found == FORMAT:
+                check_tables(db, SCHEMA, "it", PathFileError)
+                db.execute("SELECT count(*) FROM states").fetchone()
         if found != FORMAT:
             db.close()
             raise PathFileError(
@@ -214,7 +230,7 @@ class PathFile:
         Returns:
             plain data by key.
         """
-        return {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
+        return {key: parsed(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
 
     def note(self, key: str, value: Any) -> None:
         """Write a JSON value into `meta` in place of an older one.
@@ -239,10 +255,7 @@ class PathFile:
             the arrays, of the shapes and types that were stored.
         """
         rows = self._db.execute("SELECT name, dtype, shape, data FROM arrays")
-        return {
-            name: np.frombuffer(data, dtype).reshape(json.loads(shape)).copy()
-            for name, dtype, shape, data in rows
-        }
+        return {line(name, "a name"): array(dtype, shape, data) for name, dtype, shape, data in rows}
 
     def states(self) -> Iterator[StateRow]:
         """All accepted states, in order."""
@@ -251,36 +264,14 @@ class PathFile:
             "SELECT id, step, lambda, iterations, imbalance, negative, mode, jumped, wall_time_s, next_increment,"
             " stretching, bending, folding, note, cuts, unknowns, points FROM states ORDER BY id"
         )
-        for (
-            row,
-            step,
-            lam,
-            its,
-            imbalance,
-            negative,
-            mode,
-            jumped,
-            wall,
-            nxt,
-            s,
-            b,
-            f,
-            note,
-            cuts,
-            q,
-            points,
-        ) in rows:
-            yield StateRow(
-                step, lam, its, imbalance, negative, mode, bool(jumped), wall, nxt, (s, b, f), note,
-                tuple(json.loads(cuts)), _floats(q), _floats(points).reshape(-1, 3), tuple(critical.get(row, ())),
-                history.get(row),
-            )  # fmt: skip
+        for row, *values in rows:
+            yield _state_row(values, tuple(critical.get(row, ())), history.get(row))
 
     def _history(self) -> dict[int, Array]:
         """What creases remember, by the row of the state; files of versions without creases that yield have none."""
         known = self._db.execute("SELECT count(*) FROM sqlite_master WHERE name = 'history'").fetchone()[0]
         rows = self._db.execute("SELECT state, turns FROM history") if known else ()
-        return {state: _floats(turns).reshape(-1, 2) for state, turns in rows}
+        return {state: numbers(turns, "turns").reshape(-1, 2) for state, turns in rows}
 
     def _critical(self) -> dict[int, list[CriticalRow]]:
         """Critical points by the row of the state that they were passed before."""
@@ -290,7 +281,15 @@ class PathFile:
             " ORDER BY id"
         )
         for state, step, kind, lam, error, before, behind, q, mode in rows:
-            row = CriticalRow(step, kind, lam, error, (before, behind), _floats(q), _floats(mode))
+            row = CriticalRow(
+                whole(step, "step"),
+                line(kind, "kind"),
+                real(lam, "lambda"),
+                real(error, "error"),
+                (whole(before, "negative_before"), whole(behind, "negative_behind")),
+                numbers(q, "unknowns"),
+                numbers(mode, "a mode"),
+            )
             found.setdefault(state, []).append(row)
         return found
 
@@ -301,7 +300,10 @@ class PathFile:
             outcome, reason and iterations by number of the step.
         """
         rows = self._db.execute("SELECT step, outcome, reason, iterations FROM steps")
-        return {step: (outcome, reason, iterations) for step, outcome, reason, iterations in rows}
+        return {
+            whole(step, "step"): (outcome, line(reason, "reason"), whole(iterations, "iterations"))
+            for step, outcome, reason, iterations in rows
+        }
 
     def close(self) -> None:
         """Close the file; nothing is lost if it is not done."""
@@ -339,11 +341,27 @@ def reading(file: FilePath) -> Iterator[None]:
         PathFileError: the file is damaged.
     """
     try:
-        yield
+        with np.errstate(all="ignore"):  # of numbers that are refused in the end
+            yield
     except InputError as error:
-        raise PathFileError(f"'{file}': {error}") from error
-    except (sqlite3.Error, KeyError, TypeError, ValueError) as error:
-        raise PathFileError(f"'{file}' is not a path file ({error}); give one that bh has written") from error
+        raise PathFileError(f"'{file}': {_cut(str(error))}") from error
+    except (
+        sqlite3.Error,
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        ArithmeticError,
+        RecursionError,
+        MemoryError,
+    ) as error:
+        why = _cut(" ".join(str(error).split())) or type(error).__name__
+        raise PathFileError(f"'{file}' is not a path file ({why}); give one that bh has written") from error
+
+
+def _cut(text: str) -> str:
+    """What is said of a file, whose names may be of any length."""
+    return text if len(text) <= MESSAGE else f"{text[:MESSAGE]} ..."
 
 
 def _journal(file: FilePath) -> FilePath:
@@ -352,14 +370,34 @@ def _journal(file: FilePath) -> FilePath:
 
 def _connect(file: FilePath) -> sqlite3.Connection:
     db = sqlite3.connect(file, timeout=10.0)
+    trusted(db)
     # a rollback journal survives a killed process without waiting for the disk's own cache at every state
     db.execute("PRAGMA journal_mode = TRUNCATE")
     db.execute("PRAGMA synchronous = OFF")
     return db
 
 
-def _floats(data: bytes) -> Array:
-    return np.frombuffer(data, "<f8").copy()
+def _state_row(values: list[object], critical: tuple[CriticalRow, ...], history: Array | None) -> StateRow:
+    """A row of `states`, its types looked at."""
+    step, lam, its, imbalance, negative, mode, jumped, wall, nxt, s, b, f, note, cuts, q, points = values
+    return StateRow(
+        whole(step, "step"),
+        real(lam, "lambda"),
+        whole(its, "iterations"),
+        real(imbalance, "imbalance", finite=False),
+        None if negative is None else whole(negative, "negative"),
+        line(mode, "mode"),
+        bool(whole(jumped, "jumped")),
+        real(wall, "wall_time_s"),
+        real(nxt, "next_increment", finite=False),
+        (real(s, "stretching"), real(b, "bending"), real(f, "folding")),
+        line(note, "note"),
+        lines(cuts, "cuts"),
+        numbers(q, "unknowns"),
+        numbers(points, "points").reshape(-1, 3),
+        critical,
+        history,
+    )
 
 
 def _little(array: AnyArray) -> AnyArray:

@@ -26,6 +26,8 @@ from bh.studio.sheets import LONGEST, LiveSheet
 HOST = "127.0.0.1"
 STATIC = Path(__file__).with_name("static")
 LONGEST_MESSAGE = LONGEST * 4 // 3 + 4096  # bytes of a file in base64, and its name
+LONGEST_REQUEST = 65_536  # bytes of a request's body; no page takes one
+MOVES = ["fold", "percent", "pull"]  # of which only the last counts
 WINDOWS = 8  # at once
 QUIET = 0.4  # s without a wish before a finer mesh is begun
 POLICY = (
@@ -85,7 +87,7 @@ class Studio:
             raise InputError(
                 f"port {port} cannot be used ({error.strerror}); leave --port out for a free one"
             ) from error
-        server = HTTPServer(self.application())
+        server = HTTPServer(self.application(), max_body_size=LONGEST_REQUEST)
         server.add_sockets(sockets)
         return server, f"http://{HOST}:{sockets[0].getsockname()[1]}/?token={self.token}"
 
@@ -269,11 +271,11 @@ def _subject(message: str | bytes) -> tuple[object, ...] | None:
     """What a message moves, where a later one of the same makes it useless."""
     try:
         data = json.loads(message)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
-    if not isinstance(data, dict) or data.get("do") not in ("fold", "percent", "pull"):
+    if not isinstance(data, dict) or data.get("do") not in MOVES:
         return None
-    return data["do"], data.get("crease"), data.get("node")
+    return str(data["do"]), repr(data.get("crease")), repr(data.get("node"))
 
 
 def _fault(error: Exception) -> dict[str, object]:

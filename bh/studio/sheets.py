@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -29,6 +30,7 @@ LIBRARY: Mapping[str, str] = {
     'fold = ["mountain", "valley", "mountain"]',
     "strip": 'kind = "strip"\nlength = 120.0\nwidth = 60.0\ncreases = [20.0, 40.0]\nfold = ["mountain", "valley"]',
 }
+ODD = re.compile(r"[^\w .()+,=@~-]")
 ALONG, ROWS = 24, 3  # cells of the library's patterns
 
 
@@ -91,7 +93,7 @@ def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
     """
     if len(data) > LONGEST:
         raise InputError(f"'{name}' is longer than {LONGEST // 10**6} MB; fold it by `bh fold`")
-    plain = Path(name.replace("\\", "/")).name or "drawing"
+    plain = plain_name(name)
     material_of(material)
     with tempfile.TemporaryDirectory(prefix="bh-studio-") as place:
         file = Path(place) / plain
@@ -114,6 +116,20 @@ def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
             tables = _tables(offer.text)
             return replace(_live(plain, scene, tables, offer.assumed), drawing=(plain, data))
     raise failed or InputError(f"'{plain}': no mesh of it can be made; see `bh check`")
+
+
+def plain_name(name: str) -> str:
+    """A file's name that means nothing in a path, in Python or in TOML: it stands in the files that come out.
+
+    Args:
+        name: as it was given.
+
+    Returns:
+        its letters, digits and some signs, other characters as "_"; at most a hundred.
+    """
+    last = ODD.sub("_", Path(name.replace("\\", "/")).name).strip(". ")
+    stem, dot, suffix = last.rpartition(".")
+    return f"{(stem or 'drawing')[:80]}{dot}{suffix[:19]}" if dot else (last[:80] or "drawing")
 
 
 def of_model(model: Model, name: str = "model") -> LiveSheet:

@@ -278,10 +278,15 @@ def _open(file: Path, meta: Meta, resume: bool) -> Journal:
 
 def _dataset(journal: Journal) -> Dataset:
     meta = journal.meta
-    points = Points(tuple(meta["names"]), tuple(tuple(v) for v in meta["values"]), meta["grid"])
-    labels = {name: Label(unit, about, tuple(dims)) for name, (unit, about, dims) in meta["labels"].items()}
-    attributes: dict[str, object] = {"identity": meta["identity"], **meta["attributes"]}
-    return dataset(points, journal, labels, attributes)
+    try:
+        points = Points(tuple(meta["names"]), tuple(tuple(v) for v in meta["values"]), meta["grid"])
+        labels = {
+            name: Label(unit, about, tuple(dims)) for name, (unit, about, dims) in meta["labels"].items()
+        }
+        attributes: dict[str, object] = {"identity": meta["identity"], **meta["attributes"]}
+        return dataset(points, journal, labels, attributes)
+    except (TypeError, ValueError, LookupError, AttributeError) as error:
+        raise SweepError(f"'{journal.file}' is not a journal of a sweep ({error}); run it anew") from error
 
 
 def _journal(file: Path) -> Path:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.paths.data_sets import loaded
 from bh.sweep.points import Points, SweepError
 from bh.sweep.task import Finished
 from meshes.io.export import replacing
@@ -112,17 +113,10 @@ def load(file: str | Path) -> Dataset:
     Raises:
         SweepError: there is none, or it is not netCDF-4.
     """
-    xr = _xarray()
+    _xarray()
     if not Path(file).is_file():
         raise SweepError(f"there is no data set '{file}'; check the name")
-    try:
-        with xr.open_dataset(file, engine="h5netcdf") as data:
-            loaded: Dataset = data.load()
-    except (OSError, ValueError, KeyError) as error:
-        raise SweepError(
-            f"'{file}' is no data set that can be read ({' '.join(str(error).split())})"
-        ) from error
-    return loaded
+    return loaded(Path(file), SweepError)
 
 
 def _stack(name: str, rows: list[Finished], count: int) -> NDArray[np.float64] | NDArray[np.str_]:

@@ -13,6 +13,16 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TypedDict, cast
 
+from bh.paths.stored import (
+    check_file,
+    check_tables,
+    line,
+    mapping,
+    parsed,
+    real,
+    trusted,
+    whole,
+)
 from bh.sweep.points import SweepError, Value
 from bh.sweep.task import Finished
 
@@ -88,10 +98,13 @@ class Journal:
         """
         if not file.is_file():
             raise SweepError(f"there is no journal '{file}' to go on from; run without --resume")
+        check_file(file, SweepError)
         try:
             db = _connect(file)
             (version,) = db.execute("PRAGMA user_version").fetchone()
-        except sqlite3.Error as error:
+            if version == FORMAT:
+                check_tables(db, SCHEMA, f"'{file}'", SweepError)
+        except (sqlite3.Error, ValueError) as error:
             raise SweepError(f"'{file}' is not a journal of a sweep ({error})") from error
         if version != FORMAT:
             db.close()
@@ -103,7 +116,12 @@ class Journal:
     @property
     def meta(self) -> Meta:
         """What was written when the sweep began."""
-        found = {key: json.loads(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
+        try:
+            found = {key: parsed(value) for key, value in self._db.execute("SELECT key, value FROM meta")}
+        except (sqlite3.Error, ValueError) as error:
+            raise SweepError(f"'{self.file}' is not a journal of a sweep ({error})") from error
+        if not set(found) >= Meta.__required_keys__ or not isinstance(found["identity"], str):
+            raise SweepError(f"'{self.file}' is not a journal of a sweep; run the sweep anew")
         return cast(Meta, found)
 
     def done(self) -> set[int]:
@@ -136,7 +154,18 @@ class Journal:
         for i, outcome, reason, values, wall_time, attempts, worker in self._db.execute(
             "SELECT id, outcome, reason, measured, wall_time_s, attempts, worker FROM points ORDER BY id"
         ):
-            yield Finished(i, outcome, reason, json.loads(values), wall_time, attempts, worker)
+            try:
+                yield Finished(
+                    whole(i, "a point"),
+                    line(outcome, "outcome"),
+                    line(reason, "reason"),
+                    dict(mapping(parsed(values), "measured")),
+                    real(wall_time, "wall_time_s"),
+                    whole(attempts, "attempts"),
+                    line(worker, "worker"),
+                )
+            except ValueError as error:
+                raise SweepError(f"'{self.file}' is not a journal of a sweep ({error})") from error
 
     def close(self) -> None:
         """Close the file."""
@@ -145,6 +174,7 @@ class Journal:
 
 def _connect(file: Path) -> sqlite3.Connection:
     db = sqlite3.connect(file)
+    trusted(db)
     # without waiting for the disk after each point (5 to 12 ms on a busy machine)
     db.execute("PRAGMA journal_mode = WAL")
     db.execute("PRAGMA synchronous = NORMAL")

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from meshes.curves import Array
+from meshes.errors import FileFormatError
 from meshes.io.fold_frame import Frame, Side, side
+from meshes.limits import check_limit
 from meshes.topology import Ints
 
 BACK = 0.87  # cosine of the angle, 30 degrees, within which a tie would run back along its line
@@ -43,56 +45,100 @@ def tie_ends(frame: Frame, kinds: str = "C") -> Frame:
 
 def _ties(xy: Array, frame: Frame, ends: list[int]) -> list[Side]:
     """Edges from loose ends to vertices that hang together with the rim, so that no part hangs by one of them alone."""
-    import shapely
-
-    tree = shapely.STRtree(shapely.linestrings(xy[np.array(frame.edges)]))
+    check_limit("loose_ends", len(ends), "this drawing", FileFormatError)
     part = _parts(frame.edges, len(xy))
     used = np.unique(frame.edges)
-    rim = [part[a] for (a, _), letter in zip(frame.edges, frame.letters, strict=True) if letter == "B"]
-    anchored = np.isin(part[used], rim or part[used])
-    added: list[Side] = []
+    rim = {part[a] for (a, _), letter in zip(frame.edges, frame.letters, strict=True) if letter == "B"}
+    anchored = np.isin(part[used], list(rim) or part[used])
+    sight = _Sight(xy, frame.edges)
+    before = {v: a + b - v for a, b in reversed(frame.edges) for v in (a, b)}
+    tied: dict[int, set[int]] = {}  # by part, both ends of its ties
     waiting = ends
     while waiting:
         left = []
         for end in waiting:
-            if any(end in pair for pair in added):
+            if end in sight.tied:
                 continue
-            own = {v for pair in added if part[end] in part[list(pair)] for v in pair if part[end] not in rim}
-            other = _where(xy, end, used[anchored], frame, added, tree, own)
+            own = set() if part[end] in rim else tied.get(int(part[end]), set())
+            other = _where(xy, end, before[end], used[anchored], sight, own)
             if other is None:
                 left.append(end)
-            else:
-                added.append(side(end, other))
+                continue
+            sight.add(side(end, other))
+            for v in (end, other):
+                tied.setdefault(int(part[v]), set()).update((end, other))
         done = {part[end] for end in ends} - {part[end] for end in left}
         anchored |= np.isin(part[used], list(done))
         if len(left) == len(waiting):
             break
         waiting = left
-    return added
+    return sight.added
 
 
-def _where(
-    xy: Array, end: int, others: Ints, frame: Frame, added: list[Side], tree: Any, avoid: set[int]
-) -> int | None:
+def _where(xy: Array, end: int, before: int, others: Ints, sight: _Sight, avoid: set[int]) -> int | None:
     """The nearest of other vertices that a loose end sees.
 
-    If it can be helped it is none of `avoid`, to which other ends of the same lines are tied, nor lies back along them.
+    If it can be helped it is none of `avoid`, to which other ends of the same lines are tied, nor lies back along them,
+    towards the vertex `before`.
     """
-    before = next(sum(edge) - end for edge in frame.edges if end in edge)
-    nearest = others[np.argsort(((xy[others] - xy[end]) ** 2).sum(axis=1), kind="stable")]
-    joined = {side(*edge) for edge in (*frame.edges, *added)}
+    away = xy[others] - xy[end]
     along = xy[before] - xy[end]
+    order = np.argsort((away**2).sum(axis=1), kind="stable")
+    back = away @ along > BACK * np.linalg.norm(away, axis=1) * np.linalg.norm(along)
+    nearest = [(int(others[k]), not back[k] and int(others[k]) not in avoid) for k in order.tolist()]
     for fresh in (True, False):
-        for other in nearest.tolist():
-            away = xy[other] - xy[end]
-            back = away @ along > BACK * np.linalg.norm(away) * np.linalg.norm(along)
-            good = not back and other not in avoid
-            pair = side(end, other)
-            if other == end or good != fresh or pair in joined:
-                continue
-            if _sees(xy, pair, frame.edges, tree, added):
-                return int(other)
+        for other, good in nearest:
+            if other != end and good == fresh and sight.free(end, other):
+                return other
     return None
+
+
+class _Sight:
+    """What is seen from a vertex past the edges of a frame and the ties that were added to it."""
+
+    def __init__(self, xy: Array, edges: list[Side]) -> None:
+        import shapely
+
+        self.xy, self.edges = xy, edges
+        self.tree = shapely.STRtree(shapely.linestrings(xy[np.array(edges)]))
+        self.joined = {side(*edge) for edge in edges}
+        self.added: list[Side] = []
+        self.tied: set[int] = set()  # ends of ties
+        self.lines: list[Any] = []  # of the ties
+
+    def add(self, pair: Side) -> None:
+        """One more tie."""
+        import shapely
+
+        self.added.append(pair)
+        self.joined.add(pair)
+        self.tied.update(pair)
+        self.lines.append(shapely.LineString(self.xy[list(pair)]))
+
+    def free(self, end: int, other: int) -> bool:
+        """Whether a tie between two vertices that are not joined meets no line but at their own ends there."""
+        import shapely
+
+        pair = side(end, other)
+        if pair in self.joined:
+            return False
+        line = shapely.LineString(self.xy[list(pair)])
+        far = 1e-9 * line.length
+        near = [self.edges[k] for k in self.tree.query(line, predicate="dwithin", distance=far).tolist()]
+        if self.lines:
+            near += [self.added[k] for k in np.flatnonzero(shapely.dwithin(self.lines, line, far))]
+        return not any(self._blocks(pair, segment) for segment in near)
+
+    def _blocks(self, pair: Side, segment: Side) -> bool:
+        """Whether a segment that a tie touches is in its way: all but those that leave its ends otherwise."""
+        shared = set(segment) & set(pair)
+        if not shared:
+            return True
+        at = next(iter(shared))
+        a = self.xy[sum(pair) - at] - self.xy[at]
+        b = self.xy[sum(segment) - at] - self.xy[at]
+        flat = abs(a[0] * b[1] - a[1] * b[0]) <= 1e-9 * np.linalg.norm(a) * np.linalg.norm(b)
+        return bool(flat and a @ b > 0.0)
 
 
 def _parts(edges: list[Side], count: int) -> Ints:
@@ -103,25 +149,3 @@ def _parts(edges: list[Side], count: int) -> Ints:
     one, two = np.array(edges).T
     graph = coo_array((np.ones(len(one)), (one, two)), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
-
-
-def _sees(xy: Array, pair: Side, edges: list[Side], tree: Any, added: list[Side]) -> bool:
-    """Whether the segment between two vertices meets no line but at their own ends there."""
-    import shapely
-
-    line = shapely.LineString(xy[list(pair)])
-    near = tree.query(line, predicate="dwithin", distance=1e-9 * line.length)
-    for other in [*(edges[k] for k in near.tolist()), *added]:
-        shared = set(other) & set(pair)
-        segment = shapely.LineString(xy[list(other)])
-        if not shared:
-            if segment.distance(line) <= 1e-9 * line.length:
-                return False
-            continue
-        # two that share an end must not lie over each other
-        at = next(iter(shared))
-        a = xy[sum(pair) - at] - xy[at]
-        b = xy[sum(other) - at] - xy[at]
-        if abs(a[0] * b[1] - a[1] * b[0]) <= 1e-9 * np.linalg.norm(a) * np.linalg.norm(b) and a @ b > 0.0:
-            return False
-    return True

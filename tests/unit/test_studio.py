@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import asyncio
 import base64
 import io
 import json
 import struct
+import tomllib
 import zipfile
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -144,6 +146,42 @@ def test_what_cannot_be_done_is_one_line_and_the_sheet_stays(
     assert "\n" not in str(told.value)
     settled(desk)
     np.testing.assert_array_equal(desk.frame.points, before)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        'x"""\nimport os; os.system("touch it-ran")\n"""miura.svg',
+        "x\n[pattern]\nkind = 'os:system'\n#.svg",
+        "\x1b[2J\u202egvs.svg",
+        "n" * 195 + ".svg",
+        "../../.x.svg",
+        "a\0b.svg",
+        "%2e%2e%2fetc.svg",
+    ],
+)
+def test_names_of_files_mean_nothing_in_what_comes_out(name: str) -> None:
+    """A name that would end a text of Python, a comment of TOML or a path is a name still."""
+    desk = Desk()
+    data = base64.b64encode((DATA / "miura.svg").read_bytes()).decode()
+    take(desk, do="open", name=name, data=data)
+    files = {}
+    for what in ("scene", "python"):
+        (answer,) = take(desk, do="export", what=what)
+        assert "/" not in str(answer["name"])
+        files[what] = base64.b64decode(str(answer["data"]))
+    tree = ast.parse(files["python"])
+    imported = [
+        node.module if isinstance(node, ast.ImportFrom) else node.names[0].name
+        for node in tree.body
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
+    assert imported == ["bh", "bh.live"]
+    assert "os" not in {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    with zipfile.ZipFile(io.BytesIO(files["scene"])) as archive:
+        text = next(archive.read(each).decode() for each in archive.namelist() if each.endswith(".toml"))
+    assert tomllib.loads(text)["pattern"]["file"] == desk.sheet.name
+    assert desk.sheet.name.isprintable()
 
 
 def test_a_file_that_is_too_long_is_refused_before_it_is_read() -> None:
@@ -291,3 +329,5 @@ def test_only_the_last_of_many_moves_is_done() -> None:
     other = json.dumps({"do": "undo"})
     assert server.newest([*moves, other, moves[1]]) == [other, moves[1]]
     assert server.newest(["nonsense", "nonsense"]) == ["nonsense", "nonsense"]
+    odd = ["[" * 100_000, json.dumps({"do": "fold", "crease": [1]}), json.dumps({"do": ["fold"]})]
+    assert server.newest(odd) == odd

@@ -24,7 +24,7 @@ class Store:
         made_by = {"versions": environment(), "quick": quick}
         try:
             found = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             found = {}
         same = isinstance(found, dict) and found.get("made_by") == made_by
         return cls(file, found if same else {"made_by": made_by})

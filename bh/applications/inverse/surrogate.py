@@ -23,6 +23,7 @@ from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.segments import DesignError, Domain, folded, folded_transforms
 from bh.applications.inverse.simulate import SETTING, Landing, Setting, simulate
 from bh.applications.inverse.transforms import chain, matrix
+from bh.paths.data_sets import loaded as data_set
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -275,7 +276,8 @@ def loaded(file: str | Path) -> Dataset:
         DesignError: it cannot be read.
     """
     try:
-        import xarray
+        import h5netcdf  # noqa: F401
+        import xarray  # noqa: F401
     except ImportError as error:
         raise DesignError(
             f"inverse design needs xarray and h5netcdf ({error}); add the extra: "
@@ -283,9 +285,4 @@ def loaded(file: str | Path) -> Dataset:
         ) from error
     if not Path(file).is_file():
         raise DesignError(f"there is no data set '{file}'; make one: bh segments -o {file}")
-    try:
-        with xarray.open_dataset(file, engine="h5netcdf") as data:
-            found: Dataset = data.load()
-    except (OSError, ValueError) as error:
-        raise DesignError(f"'{file}' is no data set that can be read ({error})") from error
-    return found
+    return data_set(Path(file), DesignError)
