@@ -230,7 +230,9 @@ def test_curves_of_drawing_programs() -> None:
     assert [line.layer for line in flat_lines(meshes.strip(10, 5, [2.5]))][-1] == "mountain"
 
 
-@pytest.mark.parametrize("page", ['width="6in" height="3in"', 'width="576" height="288"', 'width="432pt" height="216pt"'])
+@pytest.mark.parametrize(
+    "page", ['width="6in" height="3in"', 'width="576" height="288"', 'width="432pt" height="216pt"']
+)
 def test_a_page_in_inches_or_pixels_is_its_size(tmp_path: Path, page: str) -> None:
     text = f'<svg xmlns="http://www.w3.org/2000/svg" {page} viewBox="0 0 6 3"><g fill="none" stroke-width="0.01">'
     text += '<rect width="6" height="3" stroke="black"/><path d="M0,1.5 H6" stroke="red"/></g></svg>'
