@@ -19,6 +19,7 @@ from bh.errors import ModelError
 from bh.formulations.protocols import SheetSystem
 from bh.model.step import Actuation
 from bh.paths.path import Path
+from bh.runtime.one_line import OneLine
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.factor import Factor, Matrix
 from bh.solvers.matrices import FreeBodyMatrix, IndefiniteError
@@ -31,8 +32,8 @@ NONE = 1e-6  # inverse factors below this part of the largest, of either sign, a
 DENSE = 40  # unknowns a mode up to which all modes are found at once
 
 
-@dataclass(frozen=True, eq=False)
-class BucklingMode:
+@dataclass(frozen=True, eq=False, repr=False)
+class BucklingMode(OneLine):
     """A way in which a sheet leaves its state.
 
     Attributes:

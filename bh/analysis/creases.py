@@ -20,6 +20,7 @@ from bh.analysis.generators import Generators, panel_generators
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import crease_hinges
+from bh.runtime.one_line import OneLine
 from meshes import SheetMesh
 from meshes.curves import arc_lengths
 
@@ -41,8 +42,8 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, eq=False)
-class CreaseCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class CreaseCurve(OneLine):
     """A sampled space curve and its Frenet frame.
 
     Attributes:
@@ -71,8 +72,8 @@ class CreaseCurve:
     one_sided: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
-class CreaseProfile:
+@dataclass(frozen=True, eq=False, repr=False)
+class CreaseProfile(OneLine):
     """A crease of a solved sheet, at its nodes.
 
     Attributes:

@@ -14,14 +14,15 @@ from bh.analysis.isometric_mesh import Placed, ruled_mesh, strip_mesh
 from bh.analysis.ruled import ALONG, TRIMMED, Panel
 from bh.errors import ModelError
 from bh.model.sheet import Sheet
+from bh.runtime.one_line import OneLine
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
 NONE = 1e-9  # turns in rad over the whole length that are rounding
 
 
-@dataclass(frozen=True, eq=False)
-class FoldedCrease:
+@dataclass(frozen=True, eq=False, repr=False)
+class FoldedCrease(OneLine):
     """A crease that is folded isometrically, sampled at k parameters u.
 
     Attributes:

@@ -20,6 +20,7 @@ from bh.analysis.contact import Panels
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import crease_hinges
+from bh.runtime.one_line import OneLine
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
@@ -28,8 +29,8 @@ CELLS = 2.5  # least radius of a fit, in edges of the crease
 FEWEST = 8  # triangles in a fit
 
 
-@dataclass(frozen=True, eq=False)
-class Generators:
+@dataclass(frozen=True, eq=False, repr=False)
+class Generators(OneLine):
     """Generators of one panel at a crease.
 
     Attributes:

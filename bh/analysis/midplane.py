@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
 from bh.formulations.state import State
+from bh.runtime.one_line import OneLine
 from meshes import SheetMesh
 from meshes.curves import arc_lengths, interpolated
 
@@ -22,8 +23,8 @@ STATIONS = 201
 NEAR = 0.02  # of the length, on each side of a place, for the direction of the mid-line there
 
 
-@dataclass(frozen=True, eq=False)
-class MidPlane:
+@dataclass(frozen=True, eq=False, repr=False)
+class MidPlane(OneLine):
     """The mid-plane at k stations.
 
     Attributes:

@@ -14,13 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.runtime.one_line import OneLine
+
 Array = NDArray[np.float64]
 FREE = 1e-13  # eigenvalues below this part of a typical one are rounding
 DENSE = 150  # unknowns up to which modes are found from a dense matrix
 
 
-@dataclass(frozen=True, eq=False)
-class Mode:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mode(OneLine):
     """A mode of small motion about a state.
 
     Attributes:

@@ -20,14 +20,15 @@ from bh.formulations.protocols import Data
 from bh.loading.builder import load_steps
 from bh.model.weight import Weight
 from bh.paths.path import Path
+from bh.runtime.one_line import OneLine
 from bh.runtime.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
-class NodeSensitivity:
+@dataclass(frozen=True, eq=False, repr=False)
+class NodeSensitivity(OneLine):
     """How an observable changes when nodes of the flat mesh are moved in its plane.
 
     Attributes:

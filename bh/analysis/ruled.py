@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.errors import ModelError
+from bh.runtime.one_line import OneLine
 
 Array = NDArray[np.float64]
 ALONG = 1e-9  # sines of generator angles below: generators along the crease
@@ -24,8 +25,8 @@ TRIMMED = 0.999  # of the way to the regression curve, where a panel is trimmed
 NEAR = 1e-12  # 1 - q v below: on the regression curve
 
 
-@dataclass(frozen=True, eq=False)
-class Panel:
+@dataclass(frozen=True, eq=False, repr=False)
+class Panel(OneLine):
     """The sheet on one side of a crease, along which it is sampled at k parameters.
 
     Attributes:

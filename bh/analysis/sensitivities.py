@@ -33,6 +33,7 @@ from bh.loading.load_step import crease_hinges
 from bh.model.model import Model
 from bh.model.supports import directions, select
 from bh.paths.path import Path
+from bh.runtime.one_line import OneLine
 from bh.runtime.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -233,8 +234,8 @@ class Stiffness:
         return Slope(points, rest, data)
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivity(OneLine):
     """How an observable changes with the design.
 
     Attributes:

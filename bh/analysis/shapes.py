@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bh.analysis.alignment import aligned
 from bh.errors import ModelError
 from bh.formulations.state import State
+from bh.runtime.one_line import OneLine
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
@@ -18,8 +19,8 @@ OFF = 0.05  # of the extent: sheets whose areas or boxes differ by more are not 
 CHUNK = 4_000_000  # barycentric coordinates at once
 
 
-@dataclass(frozen=True)
-class Distance:
+@dataclass(frozen=True, repr=False)
+class Distance(OneLine):
     """Between two shapes.
 
     Attributes:

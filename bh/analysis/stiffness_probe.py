@@ -29,6 +29,7 @@ from bh.analysis.modes import Mode, Response, lowest
 from bh.errors import ModelError
 from bh.model.supports import directions, select
 from bh.paths.path import Path
+from bh.runtime.one_line import OneLine
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.factor import Factor, IndefiniteError, Matrix
 from bh.solvers.matrices import FreeBodyMatrix
@@ -46,8 +47,8 @@ RANK = 1e-9  # singular values below this part of the largest are zero
 TONNE = 1e-12  # kg / m^3 in t / mm^3, which goes with N, mm and s
 
 
-@dataclass(frozen=True, eq=False)
-class Stiffness:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stiffness(OneLine):
     """Stiffness of a place against translation.
 
     Attributes:
@@ -109,7 +110,8 @@ class Probe:
     Args:
         path: a solved path, of any formulation.
         index: of the state; the last one by default.
-        hold: places whose nodes are fixed in all directions while probing, besides the supports.
+        hold: places whose nodes are fixed in all directions while probing, besides the supports; slopes stay free there
+            (`hold` of a step clamps them).
 
     Raises:
         ModelError: there is no such state, or it has more motions without stiffness than can be told apart.

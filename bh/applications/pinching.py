@@ -24,6 +24,7 @@ from bh.formulations.state import State
 from bh.model.model import Model
 from bh.model.sheet import Sheet
 from bh.paths.path import Path
+from bh.runtime.one_line import OneLine
 from bh.solving.trace import trace
 from meshes import CreasePattern
 
@@ -181,8 +182,8 @@ PATTERNS: dict[str, Callable[..., CreasePattern]] = {
 # ------------------------------------------------------------------------------- measured map and design
 
 
-@dataclass(frozen=True, eq=False)
-class ResponseMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class ResponseMap(OneLine):
     """Measured bend and twist of sheets with parallel creases.
 
     Attributes:

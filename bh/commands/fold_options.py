@@ -30,7 +30,9 @@ def fold(  # noqa: PLR0913 - the options of a command line
     material: Annotated[
         str | None,
         typer.Option(
-            "--material", help="paper, card, board, pet, pp, aluminium or steel; default card, or paper."
+            "--material",
+            help="paper, card, board, pet, pp, aluminium or steel (default card, or paper), "
+            "or of the table: card-300.",
         ),
     ] = None,
     fit: Annotated[

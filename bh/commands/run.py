@@ -130,7 +130,7 @@ def _solved(
         check_resumable(file, stored_model(file, scene.model))
         names, file = UNFINISHED, folder / UNFINISHED[0]
         shutil.copyfile(folder / FINISHED[0], file)
-    before = resume and _is_whole(file, scene)
+    before = resume and not goes_on and _is_whole(file, scene)
     solved = _solved_meshes(file)
     if not resume:  # of an earlier run that ended early; while this one runs it would tell about no path
         (folder / names[1]).unlink(missing_ok=True)

@@ -15,6 +15,7 @@ from bh.formulations import yield_criteria
 from bh.formulations.recovery import corner_values
 from bh.model.sheet import Sheet
 from bh.model.zones import Sections
+from bh.runtime.one_line import OneLine
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -58,8 +59,8 @@ class Extreme(NamedTuple):
     place: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Stress:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stress(OneLine):
     """Strains and stresses of a state; arrays (t, ...) of triangles, or (t, 3, ...) of their corners (`corners`).
 
     Components are in the axes of the flat drawing, which the sheet carries along. Stress varies linearly through the

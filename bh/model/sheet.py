@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from numbers import Real
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ TURN = 2.0 * math.pi
 STRENGTHS = ("strength", "strength2", "shear_strength")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Sheet:
     """A thin elastic sheet; its values are given by name: `Sheet(E=4000, nu=0.38, t=0.127)`.
 
@@ -66,6 +66,11 @@ class Sheet:
             shear_strength: float | str | None = None,
         ) -> None:
             """See the attributes."""
+
+    def __repr__(self) -> str:
+        """One line with what is given: "Sheet(E=4000, t=0.127, nu=0.38)"."""
+        given = ((item.name, getattr(self, item.name)) for item in fields(self))
+        return f"Sheet({', '.join(f'{name}={value:.6g}' for name, value in given if value is not None)})"
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be.

@@ -58,7 +58,7 @@ def curves(path: Path) -> Figure:
     Raises:
         PlotError: the path has no states.
     """
-    from matplotlib.figure import Figure
+    from bh.plotting.notebook import Chart
 
     if len(path) == 0:
         raise PlotError("the path has no states to plot; trace the model first")
@@ -68,7 +68,7 @@ def curves(path: Path) -> Figure:
     shown = {kind: values for kind, values in series.items() if np.any(values != 0.0)}
     if len(shown) <= 2:  # the only kind there is says all that the total would
         shown.pop("total", None)
-    figure = Figure(figsize=(7.2, 4.4), dpi=100, layout="constrained")
+    figure = Chart(figsize=(7.2, 4.4), dpi=100, layout="constrained")
     axes = figure.subplots()
     for boundary in range(1, int(np.ceil(at[-1] - 1e-12))):
         axes.axvline(boundary, color="0.85", linewidth=1.0, zorder=0)
@@ -285,9 +285,9 @@ def _states(path: Path) -> None:
 
 
 def _axes_of(x: str, y: str) -> tuple[Figure, Axes]:
-    from matplotlib.figure import Figure
+    from bh.plotting.notebook import Chart
 
-    figure = Figure(figsize=(7.2, 4.4), dpi=100, layout="constrained")
+    figure = Chart(figsize=(7.2, 4.4), dpi=100, layout="constrained")
     axes = figure.subplots()
     axes.set(xlabel=x, ylabel=y)
     axes.spines[["top", "right"]].set_visible(False)

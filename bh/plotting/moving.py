@@ -82,13 +82,16 @@ def animation(
 def _gif(pictures: Sequence[NDArray[np.uint8]], file: FilePath, fps: int) -> None:
     from PIL import Image
 
+    # a GIF counts in hundredths of a second: some frames stand one longer, so that the rate is kept
+    ends = [round(100 * (index + 1) / fps) for index in range(len(pictures))]
+    durations = [10 * (end - begin) for begin, end in zip([0, *ends], ends, strict=False)]
     images = [Image.fromarray(picture).quantize(128, dither=Image.Dither.NONE) for picture in pictures]
     images[0].save(
         file,
         format="GIF",
         save_all=True,
         append_images=images[1:],
-        duration=1000 // fps,
+        duration=durations,
         loop=0,
         optimize=False,
     )

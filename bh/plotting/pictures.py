@@ -160,19 +160,24 @@ def moving_pictures(
 
 
 def show(state: State, colour: str | None = "bending", **options: object) -> object:
-    """Show the folded sheet in a window that turns with the mouse; returns when it is closed.
+    """Show the folded sheet in a window that turns with the mouse; returns when it is closed. In a notebook: a picture.
 
     Args:
         state: of a path.
         colour: as for `picture`.
-        **options: of `pyvista.Plotter.show`.
+        **options: of `pyvista.Plotter.show`; a notebook has no use for them.
 
     Returns:
-        What `pyvista.Plotter.show` returns.
+        What `pyvista.Plotter.show` returns; in a notebook a `Still`, which a cell shows where it is its last line.
 
     Raises:
-        PlotError: not a state, an unknown colour, or there is no display.
+        PlotError: not a state, an unknown colour, or there is no display and no notebook.
     """
+    from bh.plotting.notebook import Still, in_notebook
+
+    if in_notebook():
+        with tempfile.TemporaryDirectory() as folder:
+            return Still(picture(state, FilePath(folder) / "sheet.png", colour).read_bytes())
     if not has_display():
         raise PlotError("no display to show the sheet on; use bh.plotting.picture(state, 'sheet.png')")
     import pyvista as pv

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from bh.errors import InputError
+from bh.materials.table import MATERIALS as STOCK
 from bh.scene.foldable import Found, understood
 from meshes import CreasePattern, MeshError, SheetMesh
 from meshes.cells import RuledCells
@@ -48,7 +49,8 @@ class Wish:
     Attributes:
         angle: fold angle of every crease, rad; None for what the file says, or `percent`.
         percent: of the drawn angles, or of 180 degrees; None for the drawn angles as they are, or 80 without any.
-        material: one of `MATERIALS`; None for card, or paper where card is thick for the panels.
+        material: one of `MATERIALS` or of the table of materials; None for card, or paper where card is thick for the
+            panels.
         fit: longer side of the sheet, mm.
         scale: mm a unit of the drawing.
         frame: of a FOLD file.
@@ -111,8 +113,11 @@ def proposals(file: str | os.PathLike[str], wish: Wish | None = None) -> list[Pr
 
 
 def _check(wish: Wish) -> None:
-    if wish.material is not None and wish.material not in MATERIALS:
-        raise InputError(f"material '{wish.material}' is not known; use one of {', '.join(MATERIALS)}")
+    if wish.material is not None and wish.material not in (*MATERIALS, *STOCK):
+        raise InputError(
+            f"material '{wish.material}' is not known; use one of {', '.join(MATERIALS)}, "
+            f"or of the table of materials: {', '.join(name for name in STOCK if name not in MATERIALS)}"
+        )
     if wish.angle is not None and wish.percent is not None:
         raise InputError("an angle and a percentage are both given; give one of them")
     if wish.angle is not None and not 0.0 < wish.angle < math.pi:
@@ -121,6 +126,14 @@ def _check(wish: Wish) -> None:
         )
     if wish.percent is not None and not 0.0 < wish.percent <= 100.0:
         raise InputError(f"{wish.percent:g} percent cannot be; give more than 0, up to 100")
+
+
+def _numbers(material: str) -> tuple[float, float, float, str]:
+    """(E, nu, t, about) of a name; of a grained one of the table the means, since no grain is known here."""
+    if material in MATERIALS:
+        return MATERIALS[material]
+    sheet = STOCK[material].sheet()
+    return round(sheet.E, 1), round(sheet.nu, 3), sheet.t, STOCK[material].about
 
 
 def _proposed(
@@ -140,7 +153,7 @@ def _proposed(
         )
     width = _width(found)
     material = wish.material or ("card" if MATERIALS["card"][2] <= THIN * width else "paper")
-    young, nu, t, about = MATERIALS[material]
+    young, nu, t, about = _numbers(material)
     if material != wish.material:
         assumed.append(f"{about}: no material is given")
     spring = max(width / STIFFER, t**2 / (12.0 * STRAIN * _narrowest(found, width)))

@@ -184,3 +184,17 @@ def test_frames_where_nothing_can_be_solved_between() -> None:
     shown = frames.evenly(path, 9)
     assert len(shown) == 9
     assert {state.lam for state in shown} <= {state.lam for state in path}
+
+
+@pytest.mark.parametrize("fps", [10, 24, 30, 40])
+def test_a_gif_keeps_its_rate(tmp_path: Path, fps: int) -> None:
+    """It counts in hundredths of a second, which 24 a second do not fit into."""
+    from PIL import Image, ImageSequence
+
+    shades = [np.full((8, 8, 3), 40 + 5 * at, dtype=np.uint8) for at in range(36)]
+    moving._gif(shades, tmp_path / "a.gif", fps)
+    with Image.open(tmp_path / "a.gif") as image:
+        lasting = [float(one.info["duration"]) for one in ImageSequence.Iterator(image)]
+    assert len(lasting) == 36
+    assert sum(lasting) == pytest.approx(36_000.0 / fps, abs=5.0)
+    assert max(lasting) - min(lasting) <= 10.0

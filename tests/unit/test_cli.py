@@ -1,6 +1,7 @@
 """The `bh` command: what it writes, prints and returns."""
 
 import json
+import math
 import os
 import shlex
 import signal
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bh
 import bh.runtime.progress
 import meshes
 from bh.commands.cli import ABOUT, app, main
@@ -649,3 +651,16 @@ def test_a_fault_of_the_program_is_told_as_such(
     err = capsys.readouterr().err
     assert err.startswith("bh: RuntimeError: a fault (a fault of the program")
     assert err.count("\n") == 1
+
+
+def test_resume_of_a_finished_run_whose_last_step_changed_does_not_say_that_nothing_was_left(
+    here: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    two = GOOD + '[[steps]]\nfold = { crease = "crease", to = 2.7 }\n'
+    (here / "two.toml").write_text(two)
+    (here / "other.toml").write_text(two.replace("to = 2.7", "to = 2.6"))
+    assert main(["run", "two.toml", "-o", "out", "-q"]) == 0
+    assert main(["run", "other.toml", "-o", "out", "--resume"]) == 0
+    told = capsys.readouterr().out
+    assert "nothing was left" not in told
+    assert bh.read("out").path[-1].fold_angle("crease").mean() == pytest.approx(math.pi - 2.6)

@@ -133,3 +133,18 @@ def test_run_takes_keys_and_a_formulation(
 def test_values_are_toml_or_words(text: str, value: object) -> None:
     assert value_of(text) == value
     assert type(value_of(text)) is type(value)
+
+
+def test_what_one_cannot_do_is_no_failure_unless_it_was_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Bars and hinges have no slope to clamp."""
+    file = tmp_path / "held.toml"
+    file.write_text(
+        '[pattern]\nkind = "strip"\nlength = 20.0\nwidth = 10.0\ncreases = [5.0]\n[sheet]\nE = 4000.0\nt = 0.2\n'
+        '[mesh]\nalong = 2\n[[steps]]\nfold = { crease = "crease", by = "30deg" }\n[[steps]]\nhold = "edge:start"\n'
+    )
+    pair = ["--formulation", "consistent", "--formulation", "linear-shell"]
+    assert main(["compare", str(file), "-q", *pair]) == 0
+    assert main(["compare", str(file), "-q", *pair[:2], "--formulation", "bars-and-hinges"]) == 1
+    assert "not reached by bars-and-hinges" in capsys.readouterr().err

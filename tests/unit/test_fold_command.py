@@ -169,10 +169,17 @@ class TestOneCommand:
         assert "t = 0.3" in proposals(svg(tmp_path))[0].text
         assert "t = 0.3" in proposals(svg(tmp_path, RIM + narrow), Wish(material="card"))[0].text
 
+    def test_materials_of_the_table_are_taken(self, tmp_path: Path) -> None:
+        text = proposals(svg(tmp_path), Wish(material="card-300"))[0].text
+        assert "[sheet]                          # card, 300 g/m2" in text
+        assert "E = 4242.6" in text  # the mean of 6000 and 3000 MPa
+        assert "t = 0.375" in text
+
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [
             (["--material", "jelly"], "'jelly' is not known; use one of paper"),
+            (["--material", "card300"], "steel, or of the table of materials: paper-80, card-160, card-300"),
             (["--angle", "60"], "angle of 3437.75 degrees cannot be; give 0 to 180, such as 60deg"),
             (["--angle", "60 degs"], "'--angle': \"60 degs\" is no angle: write 60deg"),
             (["--fit", "8inchs"], "'--fit': \"8inchs\" is no length: write 8in"),

@@ -67,6 +67,12 @@ def test_objects_show_what_they_hold_in_one_line() -> None:
     shown = repr(path[-1])
     assert shown.startswith("State(step 0, lambda 1, energy ")
     assert "N mm" in shown
+    assert repr(path[-1].stress()).startswith("Stress(mesh=SheetMesh(")
+    assert f"strain=<{len(MESH.triangles)} x 3>" in repr(path[-1].stress())
+    for told in (path[-1].stress(), bh.stiffness_probe.Probe(path).modes(1)[0]):
+        assert "\n" not in repr(told)
+        assert len(repr(told)) < 600
+    assert repr(SHEET) == "Sheet(E=4000, t=0.127, nu=0)"
     assert repr(bh.Path(model)) == "Path(unfinished, 0 states, 0 iterations, 0 of 1 step)"
 
 

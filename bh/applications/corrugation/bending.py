@@ -15,6 +15,7 @@ from bh.errors import ModelError
 from bh.formulations.observables import crease_nodes, depth_of
 from bh.model.actuations import Displace, Indenter, Tether
 from bh.paths.path import Path
+from bh.runtime.one_line import OneLine
 from bh.solvers.load_control import LoadControl
 from bh.solvers.outcome import Outcome
 from bh.solving.trace import trace
@@ -72,8 +73,8 @@ class Rig:
             raise ModelError(f"tape = {self.tape} cannot be; give a stiffness in N/mm, or 0")
 
 
-@dataclass(frozen=True, eq=False)
-class BendingTest:
+@dataclass(frozen=True, eq=False, repr=False)
+class BendingTest(OneLine):
     """A load-displacement curve.
 
     Attributes:

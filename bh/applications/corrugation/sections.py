@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations.observables import crease_nodes
+from bh.runtime.one_line import OneLine
 
 if TYPE_CHECKING:
     from bh.applications.corrugation.folded import Folded
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Sections:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sections(OneLine):
     """Second moments of the sections across a span.
 
     Attributes:
@@ -121,8 +122,8 @@ def top_down(folded: Folded, azimuth: float, count: int = 100, part: float = 0.8
     return section_moments(folded, azimuth, count).mean(part)
 
 
-@dataclass(frozen=True, eq=False)
-class BottomUp:
+@dataclass(frozen=True, eq=False, repr=False)
+class BottomUp(OneLine):
     """Second moments of unit sections at the bars of the mountain creases (4.4.2).
 
     Attributes:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bh.analysis.stiffness_probe import Probe
 from bh.errors import ModelError
+from bh.runtime.one_line import OneLine
 
 if TYPE_CHECKING:
     from bh.applications.corrugation.folded import Folded
@@ -20,8 +21,8 @@ Array = NDArray[np.float64]
 CLOSE = 3.0  # mm
 
 
-@dataclass(frozen=True, eq=False)
-class Directional:
+@dataclass(frozen=True, eq=False, repr=False)
+class Directional(OneLine):
     """Bending stiffness by direction.
 
     Attributes:
