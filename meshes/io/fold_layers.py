@@ -38,6 +38,9 @@ def orders_of(frame: dict[str, Any], faces: int) -> list[Order]:
         frame: a JSON object with all it inherits.
         faces: their number.
 
+    Returns:
+        two faces and 1 or -1 each.
+
     Raises:
         FileFormatError: there are none, or one cannot be; one line that names it.
     """
