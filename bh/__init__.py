@@ -12,7 +12,9 @@ from bh.runtime import viewer as _viewer
 from bh.runtime.kernel_cache import ensure as _ensure_kernel_cache
 
 if TYPE_CHECKING:
-    from bh.applications.calibration import Calibration, Measured, calibrate
+    from bh.applications.calibrated import Calibration
+    from bh.applications.calibration import calibrate
+    from bh.applications.readings import Measured, Scanned
     from bh.commands.read import Run, read
     from bh.errors import (
         InputError,
@@ -54,7 +56,9 @@ if TYPE_CHECKING:
 
 # where a name is; `tests/test_architecture.py` holds it against the imports above
 _NAMES = {
-    "bh.applications.calibration": "Calibration Measured calibrate",
+    "bh.applications.calibrated": "Calibration",
+    "bh.applications.calibration": "calibrate",
+    "bh.applications.readings": "Measured Scanned",
     "bh.commands.read": "Run read",
     "bh.errors": "InputError ModelError NotReachedError NotReachedWarning PathFileError SceneError",
     "bh.formulations.protocols": "Formulation SheetSystem",
@@ -155,6 +159,7 @@ __all__ = [
     "Remark",
     "RigidBody",
     "Run",
+    "Scanned",
     "SceneError",
     "Settling",
     "Sheet",

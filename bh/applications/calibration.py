@@ -5,15 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.errors import ModelError
-from bh.formulations.observables import OBSERVABLES
+from bh.applications.calibrated import Calibration, Part, Start
+from bh.applications.readings import Measured, Reading
+from bh.errors import InputError, ModelError
 from bh.model.model import Model
 from bh.model.sheet import Sheet
+from bh.paths.path import Path
+from bh.solving.neighbour import neighbour
 from bh.solving.trace import trace
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
+
+__all__ = ["Calibration", "Measured", "calibrate", "fit"]
 
 Array = NDArray[np.float64]
 NUDGE = 1e-3  # of a parameter's range or value: its central difference
@@ -21,143 +31,124 @@ BLIND = 0.5  # relative standard deviation from which on a combination of parame
 RANK = 1e-7  # smallest singular value over the largest, below which nothing at all is told
 
 
-@dataclass(frozen=True)
-class Measured:
-    """What was measured at the ends of steps.
-
-    Attributes:
-        observable: what, as for `Until`: "reaction_z", "displacement_z", "fold_angle", "moment", ...
-        values: one a step, in the observable's own unit.
-        of: the crease or place that it is of.
-        steps: from 0, at the ends of which it was measured; None for all steps in order.
-        sigma: standard deviation of the noise, in the unit of the values; None where it is not known: it is read
-            from the residuals then.
-    """
-
-    observable: str
-    values: Sequence[float]
-    of: str | None = None
-    steps: Sequence[int] | None = None
-    sigma: float | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse values that cannot be.
-
-        Raises:
-            ModelError: one line that names the value and what to give.
-        """
-        if self.observable not in OBSERVABLES:
-            raise ModelError(
-                f"observable '{self.observable}' is not known; use one of {', '.join(sorted(OBSERVABLES))}"
-            )
-        if len(self.values) == 0 or not np.isfinite(np.asarray(self.values, dtype=float)).all():
-            raise ModelError(f"measured {self.observable} needs finite numbers, one a step")
-        if self.sigma is not None and not 0.0 < self.sigma < math.inf:
-            raise ModelError(f"sigma = {self.sigma} cannot be; give a positive standard deviation, or None")
-
-
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """Parameters that fit the data best.
-
-    Attributes:
-        names: of the n parameters.
-        values: (n,) of them.
-        errors: (n,) standard deviations; inf where the data tell nothing.
-        intervals: (n, 2) confidence of 95 %.
-        covariance: (n, n); of what the data tell nothing about its entries are inf.
-        residuals: (m,) predicted less measured, in the units of the data.
-        unknown: combinations of parameters that the data do not tell, in words; empty where all are told.
-        solved: how often the model was solved.
-        model: with the values.
-    """
-
-    names: tuple[str, ...]
-    values: Array
-    errors: Array
-    intervals: Array
-    covariance: Array
-    residuals: Array
-    unknown: tuple[str, ...]
-    solved: int
-    model: Model | None
-
-    def __str__(self) -> str:
-        """A line a parameter, and what is not told."""
-        lines = [
-            f"{name} = {value:.5g} +- {error:.2g} (95 %: {low:.5g} to {high:.5g})"
-            for name, value, error, (low, high) in zip(
-                self.names, self.values, self.errors, self.intervals, strict=True
-            )
-        ]
-        return "\n".join((*lines, *(f"not told by the data: {combination}" for combination in self.unknown)))
-
-
 Bounds = tuple[float, float, float]
+Build = Callable[[Mapping[str, float]], Model]
+Tell = Callable[[str], None]
 
 
-def calibrate(model: Model, data: Measured | Sequence[Measured], free: Mapping[str, Bounds]) -> Calibration:
+def calibrate(
+    model: Model | Build,
+    data: Reading | Sequence[Reading],
+    free: Mapping[str, Bounds],
+    starts: int = 1,
+    seed: int = 0,
+    progress: Tell | None = None,
+) -> Calibration:
     """Find parameters of a model by what was measured at the ends of its steps.
 
-    A bounded trust region (SciPy's `least_squares`) moves all parameters at once; derivatives are central differences
-    of whole paths, so it costs 2 n + 1 solutions an iteration.
+    A bounded trust region (SciPy's `least_squares`) moves all parameters at once; derivatives are central differences,
+    whose solutions begin at the states beside them (`bh.solving.neighbour`) and take an iteration or two a step.
 
     Args:
-        model: with all its steps; data are of their ends.
-        data: what was measured.
+        model: with all its steps; data are of their ends. Or what makes it of the parameters by their names.
+        data: what was measured: `Measured`, `Scanned`, or several of them, each with its noise.
         free: by name ("sheet.E", "creases.NAME.Lstar", ...) where to begin, and the least and the largest value.
+        starts: how many beginnings are tried: the given one, and others at random between the bounds.
+        seed: of those.
+        progress: is told a line now and then.
 
     Raises:
         ModelError: a name that the model has not, bounds that cannot be, more parameters than data, data of steps that
             there are not, or a path that does not reach the end of its steps.
     """
-    sets = [data] if isinstance(data, Measured) else list(data)
+    sets: list[Reading] = [data] if not isinstance(data, Sequence) else list(data)
     names = tuple(free)
     for name in names:
-        _replaced(model, name, _checked(name, free[name])[0])
-    wanted = [_steps(model, each) for each in sets]
-    measured = np.concatenate([np.asarray(each.values, dtype=float) for each in sets])
-    if len({each.sigma is None for each in sets}) > 1 or (len(sets) > 1 and sets[0].sigma is None):
+        _checked(name, free[name])
+    build = model if not isinstance(model, Model) else partial(_changed, model)
+    first = build({name: free[name][0] for name in names})
+    for each in sets:
+        each.check(first)
+    measured = np.concatenate([each.measured() for each in sets])
+    if len({each.noise is None for each in sets}) > 1 or (len(sets) > 1 and sets[0].noise is None):
         raise ModelError("several kinds of data are weighed by their noise; give each a sigma")
-    sigma = np.concatenate([np.full(len(each.values), each.sigma or 1.0) for each in sets])
-
-    def at(values: Array) -> Model:
-        changed = model
-        for name, value in zip(names, values.tolist(), strict=True):
-            changed = _replaced(changed, name, value)
-        return changed
-
-    def predicted(values: Array) -> Array:
-        path = trace(at(values), estimate=False, warn=False).require()
-        ends = {state.step: state for state in path}
-        return np.array(
-            [
-                OBSERVABLES[each.observable](ends[step], each.of)
-                for each, steps in zip(sets, wanted, strict=True)
-                for step in steps
-            ]
+    sigma = np.concatenate([np.full(len(each.measured()), each.noise or 1.0) for each in sets])
+    solver = Solver(lambda values: build(dict(zip(names, values.tolist(), strict=True))), sets)
+    known = sets[0].noise is not None
+    fitted = fit(
+        solver.predicted, measured, sigma if known else None, free, solver.beside, starts, seed, progress
+    )
+    rows = np.cumsum([len(each.measured()) for each in sets])[:-1]
+    noise = 1.0 if known else math.sqrt(fitted.misfit / max(len(measured) - len(names), 1))
+    parts = tuple(
+        Part(each.label, each.unit, values, values + off, noise * (each.noise or 1.0))
+        for each, values, off in zip(
+            sets, np.split(measured, rows), np.split(fitted.residuals, rows), strict=True
         )
+    )
+    return replace(fitted, model=build(dict(zip(names, fitted.values.tolist(), strict=True))), parts=parts)
 
-    known = sets[0].sigma is not None
-    found = fit(predicted, measured, sigma if known else None, free)
-    return replace(found, model=at(found.values))
+
+class Solver:
+    """Predictions of a model, and those beside them that begin at its states."""
+
+    def __init__(self, build: Callable[[Array], Model], data: Sequence[Reading]) -> None:
+        """Of what makes the model of parameters (n,), and the data."""
+        self.build, self.data = build, data
+        self._paths: dict[bytes, Path] = {}
+        self._last = b""
+
+    def predicted(self, values: Array) -> Array:
+        """(m,) values of the model; inf where a path does not reach the end of its steps.
+
+        Raises:
+            ModelError: the first path does not.
+        """
+        path = trace(self.build(values), estimate=False, warn=False)
+        if not self._paths:
+            path.require()
+        elif not path.reached:
+            return np.full(sum(len(each.measured()) for each in self.data), np.inf)
+        self._last = values.tobytes()
+        self._paths = {**dict(list(self._paths.items())[-2:]), self._last: path}
+        return self._read(path)
+
+    def beside(self, values: Array, base: Array) -> Array:
+        """(m,) the same at values (n,) next to `base` (n,), where the model has been solved."""
+        model = self.build(values)
+        path = neighbour(self._paths.get(base.tobytes(), self._paths[self._last]), model)
+        return self._read(trace(model, estimate=False, warn=False).require() if path is None else path)
+
+    def _read(self, path: Path) -> Array:
+        ends = {state.step: state for state in path}
+        return np.concatenate([each.predicted(ends) for each in self.data])
 
 
 def fit(
-    predicted: Callable[[Array], Array], measured: Array, sigma: Array | None, free: Mapping[str, Bounds]
+    predicted: Callable[[Array], Array],
+    measured: Array,
+    sigma: Array | None,
+    free: Mapping[str, Bounds],
+    beside: Callable[[Array, Array], Array] | None = None,
+    starts: int = 1,
+    seed: int = 0,
+    progress: Tell | None = None,
 ) -> Calibration:
     """Parameters of any prediction that fit measured values best, and how well they are known.
 
     Args:
-        predicted: (m,) values for parameters (n,), in the order of `free`.
+        predicted: (m,) values for parameters (n,), in the order of `free`; not finite where there are none.
         measured: (m,) values.
         sigma: (m,) standard deviations of their noise; None for one noise of all that is read from the residuals.
         free: by name where to begin, and the least and the largest value.
+        beside: predictions for parameters (n,) next to others (n,) that have been asked for, where that is cheaper.
+        starts: see `calibrate`, as `seed` and `progress`.
+        seed: of the further beginnings.
+        progress: is told a line now and then.
 
     Raises:
         ModelError: more parameters than data, or bounds that cannot be.
     """
-    from scipy.optimize import least_squares
     from scipy.stats import t as student
 
     names = tuple(free)
@@ -168,33 +159,13 @@ def fit(
             f"{n} parameters cannot be found from {m} values{'' if sigma is not None else ' of unknown noise'}; "
             "measure more, or free fewer"
         )
-    scale = np.maximum(np.abs(begin), 1e-3 * (high - low))
-    noise = np.ones(m) if sigma is None else sigma
-    calls = 0
-
-    def residual(y: Array) -> Array:
-        nonlocal calls
-        calls += 1
-        return np.asarray((predicted(y * scale) - measured) / noise)
-
-    def jacobian(y: Array) -> Array:
-        out = np.empty((m, n))
-        for k in range(n):
-            step = NUDGE * max(abs(float(y[k])), NUDGE)
-            up, down = y.copy(), y.copy()
-            up[k], down[k] = min(y[k] + step, high[k] / scale[k]), max(y[k] - step, low[k] / scale[k])
-            out[:, k] = (residual(up) - residual(down)) / (up[k] - down[k])
-        return out
-
-    done = least_squares(
-        residual,
-        begin / scale,
-        jacobian,
-        bounds=(low / scale, high / scale),
-        method="trf",
-        xtol=1e-9,
-        ftol=1e-10,
-    )
+    if not 1 <= starts <= 1000:
+        raise ModelError(f"starts = {starts} cannot be; give 1 to 1000")
+    problem = _Problem(predicted, beside, measured, sigma, begin, low, high, progress)
+    tried = [problem.solve(each) for each in _beginnings(begin, low, high, starts, seed)]
+    done = min((each for each in tried if each.done is not None), key=lambda each: each.misfit).done
+    assert done is not None
+    noise, scale = problem.noise, problem.scale
     variance = 1.0 if sigma is not None else float(done.fun @ done.fun) / (m - n)
     covariance, unknown = _known(np.asarray(done.jac), np.abs(done.x), variance, names)
     covariance = covariance * scale[:, None] * scale
@@ -202,7 +173,113 @@ def fit(
     reach = errors * float(student.ppf(0.975, m - n)) if sigma is None else 1.959964 * errors
     values = done.x * scale
     intervals = np.column_stack((values - reach, values + reach))
-    return Calibration(names, values, errors, intervals, covariance, done.fun * noise, unknown, calls, None)
+    return Calibration(
+        names,
+        values,
+        errors,
+        intervals,
+        covariance,
+        done.fun * noise,
+        unknown,
+        problem.calls,
+        None,
+        misfit=float(done.fun @ done.fun),
+        bounded=tuple(name for name, side in zip(names, done.active_mask, strict=True) if side),
+        starts=tuple(each.told for each in tried) if starts > 1 else (),
+    )
+
+
+class _Found(NamedTuple):
+    """What a beginning led to; `done` is SciPy's result, or None."""
+
+    done: OptimizeResult | None
+    misfit: float
+    told: Start
+
+
+@dataclass(eq=False)
+class _Problem:
+    """Least squares in parameters over their scale."""
+
+    predicted: Callable[[Array], Array]
+    beside: Callable[[Array, Array], Array] | None
+    measured: Array
+    sigma: Array | None
+    begin: Array
+    low: Array
+    high: Array
+    progress: Tell | None
+    calls: int = 0
+
+    def __post_init__(self) -> None:
+        """Scales of parameters and data."""
+        self.scale = np.maximum(np.abs(self.begin), 1e-3 * (self.high - self.low))
+        self.noise = np.ones(len(self.measured)) if self.sigma is None else self.sigma
+
+    def residual(self, y: Array) -> Array:
+        """(m,) residuals over their noise; a value that is not finite is one that is not to be gone to."""
+        self.calls += 1
+        out = np.asarray((self.predicted(y * self.scale) - self.measured) / self.noise)
+        if self.progress is not None:
+            self.progress(f"solution {self.calls}: misfit {float(out @ out):.5g}")
+        return out
+
+    def jacobian(self, y: Array) -> Array:
+        """(m, n) central differences."""
+        out = np.empty((len(self.measured), len(y)))
+        for k in range(len(y)):
+            step = NUDGE * max(abs(float(y[k])), NUDGE)
+            up, down = y.copy(), y.copy()
+            up[k] = min(y[k] + step, self.high[k] / self.scale[k])
+            down[k] = max(y[k] - step, self.low[k] / self.scale[k])
+            out[:, k] = (self._near(up, y) - self._near(down, y)) / (self.noise * (up[k] - down[k]))
+        return out
+
+    def _near(self, y: Array, base: Array) -> Array:
+        self.calls += 1
+        return (
+            self.predicted(y * self.scale)
+            if self.beside is None
+            else self.beside(y * self.scale, base * self.scale)
+        )
+
+    def solve(self, begin: Array) -> _Found:
+        """The minimum next to a beginning (n,); the given one has to be solvable, others may not be."""
+        from scipy.optimize import least_squares
+
+        first = begin is self.begin
+        try:
+            if not (first or np.isfinite(self.predicted(begin)).all()):
+                raise ModelError("a path does not reach the end of its steps")
+            done = least_squares(
+                self.residual,
+                begin / self.scale,
+                self.jacobian,
+                bounds=(self.low / self.scale, self.high / self.scale),
+                method="trf",
+                xtol=1e-9,
+                ftol=1e-10,
+            )
+        except InputError as error:
+            if first:
+                raise
+            return _Found(
+                None, math.inf, Start(tuple(begin.tolist()), tuple(begin.tolist()), math.inf, str(error))
+            )
+        misfit, values = float(done.fun @ done.fun), done.x * self.scale
+        return _Found(done, misfit, Start(tuple(begin.tolist()), tuple(values.tolist()), misfit))
+
+
+def _beginnings(begin: Array, low: Array, high: Array, count: int, seed: int) -> list[Array]:
+    """The given beginning and others between the bounds, by their logarithm where these are far apart."""
+    rng = np.random.default_rng(seed)
+    wide = (low > 0.0) & (high > 10.0 * np.maximum(low, 1e-300))
+    found = [begin]
+    for _ in range(count - 1):
+        part = rng.uniform(size=len(begin))
+        ratio = np.where(wide, high / np.where(wide, low, 1.0), 1.0)
+        found.append(np.where(wide, low * ratio**part, low + part * (high - low)))
+    return found
 
 
 def _known(jac: Array, size: Array, variance: float, names: tuple[str, ...]) -> tuple[Array, tuple[str, ...]]:
@@ -237,15 +314,10 @@ def _checked(name: str, bounds: Bounds) -> Bounds:
     return bounds
 
 
-def _steps(model: Model, data: Measured) -> tuple[int, ...]:
-    steps = tuple(range(len(model.steps))) if data.steps is None else tuple(data.steps)
-    if len(steps) != len(data.values):
-        raise ModelError(
-            f"{len(data.values)} values of {data.observable} are no match for {len(steps)} steps; give one a step"
-        )
-    if any(not 0 <= step < len(model.steps) for step in steps):
-        raise ModelError(f"data of step {max(steps)}: the model has steps 0 to {len(model.steps) - 1}")
-    return steps
+def _changed(model: Model, values: Mapping[str, float]) -> Model:
+    for name, value in values.items():
+        model = _replaced(model, name, value)
+    return model
 
 
 def _replaced(model: Model, name: str, value: float) -> Model:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bh.commands.bend import bend
+from bh.commands.calibrate import calibrate
 from bh.commands.compare import compare
 from bh.commands.flat import export
 from bh.commands.fold_options import fold
@@ -258,10 +259,8 @@ def run(
         raise typer.Exit(1)
 
 
-app.command()(fold)
-app.command()(compare)
-app.command()(response)
-app.command()(bend)
+for _command in (fold, compare, response, bend, calibrate):
+    app.command()(_command)
 
 
 @app.command()
