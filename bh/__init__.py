@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bh.formulations.state import Energy, State
     from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
     from bh.model.crease_law import CreaseLaw
+    from bh.model.growth import Expand
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
     from bh.model.model import Model
     from bh.model.pinch import Pinch
@@ -61,6 +62,7 @@ _NAMES = {
     "bh.formulations.state": "Energy State",
     "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
     "bh.model.crease_law": "CreaseLaw",
+    "bh.model.growth": "Expand",
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
@@ -120,6 +122,7 @@ __all__ = [
     "ElasticPlastic",
     "ElementStiffness",
     "Energy",
+    "Expand",
     "Fold",
     "Force",
     "Formulation",

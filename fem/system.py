@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -20,6 +19,8 @@ from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
 from fem.creases import connectors
+from fem.growth import at_rest
+from fem.here import Here, root_mean_square
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
@@ -31,39 +32,6 @@ Array = NDArray[np.float64]
 LARGEST_TURN = 1.3  # rad that any edge may turn in one increment before the driver mistrusts it
 LARGEST_ANGLE = 2.6  # rad between an edge's sides or tangent and its frame, which begins anew with every step
 ROUNDING = 8.0 * np.finfo(float).eps
-
-
-@dataclass(frozen=True, eq=False)
-class Here:
-    """What has been computed at one (q, lambda).
-
-    Attributes:
-        q: (size,) unknowns.
-        lam: how much of the step is applied.
-        components: (k,) all components, see `Components`.
-        x: (n, 3) positions of all nodes, mm.
-        forces: (t, 6 m) forces conjugate to strains and curvatures.
-        energy: potential, N mm.
-        B: (t, 6 m, w) derivatives of strains and curvatures.
-        pull: (t, 3 n + 3 r) element forces by positions and side rotations.
-    """
-
-    q: Array
-    lam: float
-    components: Array
-    x: Array
-    forces: Array
-    energy: float
-    B: Array
-    pull: Array
-
-
-def root_mean_square(values: Array) -> float:
-    """Root mean square, also of values whose squares overflow, which a wild trial step may have."""
-    largest = float(np.abs(values).max(initial=0.0))
-    if not 0.0 < largest < np.inf:
-        return largest
-    return largest * float(np.sqrt(np.mean((values / largest) ** 2)))
 
 
 class ShellSystem:
@@ -112,6 +80,7 @@ class ShellSystem:
         step = 0 if start is None else start.step + 1
         x = mesh.nodes if start is None else start.nodes
         self.frames = flat_frames(mesh) if start is None else start.frames
+        self.rest = at_rest(elements, load_step.growth)
         flat = np.zeros((len(model.mesh.topology.hinges), elements.tables.rotations))
         beta = flat if start is None else start.fold_angles
         couple = flat if start is None else start.crease_couples
@@ -207,13 +176,29 @@ class ShellSystem:
         components = self.components.whole(q, lam)
         x = self.node_positions(components)
         gamma = self.side_rotations(components)
-        strain, curvature = e.measures(x, gamma, self.frames)
+        strain, curvature = self.elastic(x, gamma, lam)
         forces = e.forces(strain, curvature)
         energy = 0.5 * float(np.vdot(forces, np.hstack((strain, curvature))))
         B = e.gradients(x, self.frames)
         pull = np.einsum("tkj,tk->tj", B, forces)
         self._here = Here(q.copy(), lam, components, x, forces, energy, B, pull)
         return self._here
+
+    def elastic(self, x: Array, gamma: Array, lam: float) -> tuple[Array, Array]:
+        """(t, 3 m) strains and curvatures, less those at rest.
+
+        Args:
+            x: (n, 3) positions of all nodes, mm.
+            gamma: (t, 3, r) side rotations, rad.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            both.
+        """
+        strain, curvature = self.elements.measures(x, gamma, self.frames)
+        if self.rest is None:
+            return strain, curvature
+        return strain - self.rest.strain.at(lam), curvature - self.rest.curvature.at(lam)
 
     def side_rotations(self, components: Array) -> Array:
         """(t, 3, r) rotations gamma of every triangle's side of its edges, rad."""
@@ -330,14 +315,21 @@ class ShellSystem:
 
     def control_rate(self, q: Array, lam: float) -> Array:
         """(size,) derivative of the residual by lambda."""
-        out = self._times(self.at(q, lam), self.components.rate) - self.load.rate
+        here = self.at(q, lam)
+        out = self._times(here, self.components.rate) - self.load.rate
         out[self.components.first_beta :] += self.creases.gradient_rate().ravel()
+        if self.rest is not None:
+            out -= self.components.spread(
+                np.einsum("tkj,tk->tj", here.B, self.elements.forces(*self.rest.rate))
+            )
         return out[self.components.free]
 
     def power(self, q: Array, lam: float) -> float:
         """Derivative of the potential by lambda at fixed q, N mm."""
         here = self.at(q, lam)
         total = float(self.gradient(here) @ self.components.rate) - float(self.load.rate @ here.components)
+        if self.rest is not None:
+            total -= float(np.vdot(here.forces, np.hstack(self.rest.rate)))
         return total + self.creases.power(self.components.beta(here.components), lam)
 
     def control_stiffness(self, q: Array, lam: float) -> float:
@@ -345,6 +337,10 @@ class ShellSystem:
         c = self.creases
         total = float(self._times(self.at(q, lam), self.components.rate) @ self.components.rate)
         total -= 2.0 * float(self.load.rate @ self.components.rate)
+        if self.rest is not None:
+            forces, here = self.elements.forces(*self.rest.rate), self.at(q, lam)
+            moving = np.einsum("tkj,tj->tk", here.B, self.components.gather(self.components.rate))
+            total += float(np.vdot(forces, np.hstack(self.rest.rate) - 2.0 * moving))
         total += 2.0 * float(np.vdot(c.gradient_rate(), self.components.beta(self.components.rate)))
         return total + float(np.einsum("c,ci,cij,cj->", c.stiffness, c.rest.rate, c.mass, c.rest.rate))
 

@@ -17,7 +17,7 @@ from bh.model.constraints import Constraints, Prescribed, resolve
 from bh.model.crease_law import CreaseLaw
 from bh.model.hinge_laws import HingeLaw
 from bh.model.laws import PRESCRIBED, SPRING
-from bh.model.model import Model
+from bh.model.model import Model, drawn_flat
 from bh.model.ramp import Ramp
 from bh.model.sheet import Sheet
 from bh.model.step import Body, Step, Zone
@@ -177,6 +177,25 @@ class LoadStepBuilder:
         """Dead forces (n, 3) beside those of `pull`, N, in place of what was borne before."""
         self._asked.borne = np.asarray(force, dtype=float)
 
+    def grow(self, triangles: Ints, strain: Array, curvature: Array) -> None:
+        """Strain and curvature at which triangles (k,) are at rest; see `StepBuilder.grow`.
+
+        Raises:
+            ModelError: the stress-free sheet is not flat.
+        """
+        if not drawn_flat(self.mesh):
+            raise ModelError(
+                "a sheet that expands is measured from its flat shape in z = const; unfold it, or leave out expand"
+            )
+        asked = self._asked
+        if asked.growth is None:
+            asked.growth = np.zeros((2, len(self.mesh.triangles), 3, 3))
+        fresh = [row for row in triangles.tolist() if row not in self._step.grown]
+        asked.growth[:, fresh] = 0.0
+        self._step.grown.update(fresh)
+        for kind, values in enumerate((strain, curvature)):
+            asked.growth[kind, triangles] += values[:, None] if values.ndim == 2 else values
+
     def displace(self, nodes: Ints, direction: Sequence[float], by: float, further: bool = False) -> None:
         """Prescribe the displacement of nodes (k,) along a unit vector, mm; see `StepBuilder.displace`.
 
@@ -244,6 +263,7 @@ class LoadStepBuilder:
             curve=end.curve if self._laws else None,
             laws=tuple(self._laws),
             freed=freed if freed.any() else None,
+            growth=_growth(start, end),
         )
 
     def ended(self, points: Array) -> None:
@@ -270,6 +290,7 @@ class LoadStepBuilder:
         )
         asked.borne = Ramp(self._begun.borne, asked.borne).at(end.lam)
         asked.force = force - asked.borne
+        asked.growth = None if step.growth is None else step.growth.at(end.lam)
         if np.isnan(asked.rest).any() or step.freed is not None:
             raise ModelError(
                 "a prescribed crease is released in a step that ends early (until); release it in a step before"
@@ -352,6 +373,12 @@ class LoadStepBuilder:
             raise NotHeldError(f"where step {self._number} begins, {error}") from None
         self._supports.points = None  # until the end of this step is told
         return found
+
+
+def _growth(start: Asked, end: Asked) -> Ramp | None:
+    if end.growth is None:
+        return None
+    return Ramp(np.zeros_like(end.growth) if start.growth is None else start.growth, end.growth)
 
 
 def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple[LoadStep, ...]:

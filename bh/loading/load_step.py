@@ -64,6 +64,8 @@ class LoadStep:
         curve: (m,) row of `laws` of creases whose moment is no straight line, else -1; None where there is none.
         laws: those laws.
         freed: (m,) such creases whose angle was imposed up to here; what imposed it fades out during the step.
+        growth: (2, t, 3, 3) strain and curvature (1 / mm) at which triangles are at rest, at their corners, components
+            xx, yy, 2 xy in the axes of the drawing; None for a sheet that is at rest as it is drawn.
     """
 
     law: NDArray[np.int64]
@@ -80,6 +82,7 @@ class LoadStep:
     curve: Ints | None = None
     laws: tuple[HingeLaw, ...] = ()
     freed: NDArray[np.bool_] | None = None
+    growth: Ramp | None = None
 
     def prescribed_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""

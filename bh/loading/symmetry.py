@@ -228,6 +228,8 @@ def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
             raise ModelError(
                 f"{where}: a sheet that touches bodies is not solved by halves; leave out symmetry"
             )
+        if step.growth is not None:
+            raise ModelError(f"{where}: a sheet that expands is not solved by halves; leave out symmetry")
         _check_hinges(model, step, plane, where)
         for name in ("start", "end"):
             force = getattr(step.force, name)

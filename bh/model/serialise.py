@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bh.errors import PathFileError
 from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
 from bh.model.crease_law import CreaseLaw
+from bh.model.growth import Expand
 from bh.model.hinge_laws import LAWS, HingeLaw
 from bh.model.model import Model
 from bh.model.pinch import Pinch
@@ -37,6 +38,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "displace": Displace,
     "pull": Pull,
     "weight": Weight,
+    "expand": Expand,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 SUPPORTS: dict[str, type[Constraint]] = {"hold": Hold}

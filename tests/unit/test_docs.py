@@ -44,6 +44,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: move": moving.MoveTable,
     "steps: pull": schema.PullTable,
     "steps: weight": schema.WeightTable,
+    "steps: expand": schema.ExpandTable,
     "steps: press": scene_bodies.PressTable,
     "steps: tether": scene_bodies.TetherTable,
     "steps: until": schema.UntilTable,
