@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from bh.formulations.state import Energy, State
     from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
     from bh.model.crease_law import CreaseLaw
+    from bh.model.growth import Expand
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
     from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
     from bh.model.model import Model
@@ -67,6 +68,7 @@ _NAMES = {
     "bh.formulations.state": "Energy State",
     "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
     "bh.model.crease_law": "CreaseLaw",
+    "bh.model.growth": "Expand",
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
     "bh.model.loads": "AreaForce EdgeMoment LineForce Pressure",
     "bh.model.model": "Model",
@@ -130,6 +132,7 @@ __all__ = [
     "ElasticPlastic",
     "ElementStiffness",
     "Energy",
+    "Expand",
     "Fold",
     "Force",
     "Formulation",

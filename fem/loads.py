@@ -12,6 +12,7 @@ from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd
 from bh.model.actuations import Displace, Fold, Force
 from bh.model.constraints import Constraints
+from bh.model.growth import Expand
 from bh.model.loads import AreaForce, LineForce
 from bh.model.model import Model
 from bh.model.ramp import Ramp
@@ -59,7 +60,7 @@ def constraints(mesh: ElementMesh, model: Model, step: int, points: Array | None
     ends = {}
     if points is not None and any(each.looks_back for each in steps):
         ends = {step - 1: StepEnd(1.0, points, np.zeros(0))}
-    return load_steps(replace(model, mesh=mesh.linear, steps=steps), ends)[step].constraints
+    return load_steps(replace(model, mesh=mesh.linear, steps=steps, zones=()), ends)[step].constraints
 
 
 def ground(elements: ShellElements, model: Model) -> Array | None:
@@ -88,6 +89,8 @@ def ground(elements: ShellElements, model: Model) -> Array | None:
 
 def _plain(item: Actuation) -> Actuation:
     """Fold angles an edge do not fit the halved edges, and do not matter here."""
+    if isinstance(item, Expand):  # it holds nothing
+        return Expand()
     if not isinstance(item, Fold):
         return item
     if item.to is not None and not isinstance(item.to, float):

@@ -39,7 +39,7 @@ def observe(
     """
     here = system.at(q, lam)
     e, mesh, creases = system.elements, model.mesh, system.creases
-    strain, curvature = e.measures(here.x, system.side_rotations(here.components), system.frames)
+    strain, curvature = system.elastic(here.x, system.side_rotations(here.components), lam)
     membrane_forces, moments = np.hsplit(here.forces, 2)
     stretching = 0.5 * np.einsum("tk,tk->t", membrane_forces, strain)
     bending = 0.5 * np.einsum("tk,tk->t", moments, curvature)
@@ -85,26 +85,38 @@ def observe(
         crease_couples=couples,
         membrane_forces=in_plane,
         moments=bent,
-        recover=partial(resultants, model.sections, in_plane, bent),
+        recover=partial(
+            resultants,
+            model.sections,
+            in_plane,
+            bent,
+            None if system.rest is None else system.rest.mean.at(lam),
+        ),
     )
 
 
-def resultants(made_of: Sections, forces: Array, moments: Array) -> Resultants:
+def resultants(made_of: Sections, forces: Array, moments: Array, rest: Array | None = None) -> Resultants:
     """What stresses are made of; strains and curvatures are those that forces and moments belong to.
 
     Args:
         made_of: what every triangle is made of.
         forces: (t, 3) membrane forces at the middle of each triangle, N / mm.
         moments: (t, 3) moments there, N.
+        rest: (2, t, 3) strain and curvature at rest, which the others are beside.
     """
     sheet = made_of.sheets[0]
     if made_of.of is not None:
         found = by_triangle.matrices(made_of.sheets)
         strain = np.einsum("tij,tj->ti", np.linalg.inv(found.A)[made_of.of], forces)
         curvature = np.einsum("tij,tj->ti", np.linalg.inv(found.D)[made_of.of], moments)
+        if rest is not None:
+            strain, curvature = strain + rest[0], curvature + rest[1]
         return Resultants(sheet, strain, curvature, forces, moments, made_of)
     C = grain.compliance_in_drawing(sheet)
-    return Resultants(sheet, forces @ C / sheet.t, moments @ C * 12.0 / sheet.t**3, forces, moments)
+    strain, curvature = forces @ C / sheet.t, moments @ C * 12.0 / sheet.t**3
+    if rest is not None:
+        strain, curvature = strain + rest[0], curvature + rest[1]
+    return Resultants(sheet, strain, curvature, forces, moments)
 
 
 def _to_corners(system: ShellSystem, nodal: Array) -> Array:

@@ -19,6 +19,7 @@ from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
 from fem.creases import connectors
+from fem.growth import at_rest
 from fem.here import Here, root_mean_square
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
@@ -80,6 +81,7 @@ class ShellSystem:
         step = 0 if start is None else start.step + 1
         x = mesh.nodes if start is None else start.nodes
         self.frames = flat_frames(mesh) if start is None else start.frames
+        self.rest = at_rest(elements, load_step.growth)
         flat = np.zeros((len(model.mesh.topology.hinges), elements.tables.rotations))
         beta = flat if start is None else start.fold_angles
         couple = flat if start is None else start.crease_couples
@@ -176,13 +178,29 @@ class ShellSystem:
         components = self.components.whole(q, lam)
         x = self.node_positions(components)
         gamma = self.side_rotations(components)
-        strain, curvature = e.measures(x, gamma, self.frames)
+        strain, curvature = self.elastic(x, gamma, lam)
         forces = e.forces(strain, curvature)
         energy = 0.5 * float(np.vdot(forces, np.hstack((strain, curvature))))
         B = e.gradients(x, self.frames)
         pull = np.einsum("tkj,tk->tj", B, forces)
         self._here = Here(q.copy(), lam, components, x, forces, energy, B, pull)
         return self._here
+
+    def elastic(self, x: Array, gamma: Array, lam: float) -> tuple[Array, Array]:
+        """(t, 3 m) strains and curvatures, less those at rest.
+
+        Args:
+            x: (n, 3) positions of all nodes, mm.
+            gamma: (t, 3, r) side rotations, rad.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            both.
+        """
+        strain, curvature = self.elements.measures(x, gamma, self.frames)
+        if self.rest is None:
+            return strain, curvature
+        return strain - self.rest.strain.at(lam), curvature - self.rest.curvature.at(lam)
 
     def side_rotations(self, components: Array) -> Array:
         """(t, 3, r) rotations gamma of every triangle's side of its edges, rad."""
@@ -323,6 +341,10 @@ class ShellSystem:
         out[self.components.first_beta :] += self.creases.gradient_rate().ravel()
         if self.outside is not None:
             self._add_nodal(out, -self.outside.push_rate(here.x))
+        if self.rest is not None:
+            out -= self.components.spread(
+                np.einsum("tkj,tk->tj", here.B, self.elements.forces(*self.rest.rate))
+            )
         return out[self.components.free]
 
     def power(self, q: Array, lam: float) -> float:
@@ -330,6 +352,8 @@ class ShellSystem:
         here = self.at(q, lam)
         total = float(self.gradient(here) @ self.components.rate) - float(self.load.rate @ here.components)
         total += 0.0 if self.outside is None else self.outside.power(here.x)
+        if self.rest is not None:
+            total -= float(np.vdot(here.forces, np.hstack(self.rest.rate)))
         return total + self.creases.power(self.components.beta(here.components), lam)
 
     def control_stiffness(self, q: Array, lam: float) -> float:
@@ -341,6 +365,10 @@ class ShellSystem:
             moves = self.components.moves(self.components.rate)
             total -= 2.0 * float(np.vdot(self.outside.push_rate(here.x), moves))
         total -= 2.0 * float(self.load.rate @ self.components.rate)
+        if self.rest is not None:
+            forces, here = self.elements.forces(*self.rest.rate), self.at(q, lam)
+            moving = np.einsum("tkj,tj->tk", here.B, self.components.gather(self.components.rate))
+            total += float(np.vdot(forces, np.hstack(self.rest.rate) - 2.0 * moving))
         total += 2.0 * float(np.vdot(c.gradient_rate(), self.components.beta(self.components.rate)))
         return total + float(np.einsum("c,ci,cij,cj->", c.stiffness, c.rest.rate, c.mass, c.rest.rate))
 

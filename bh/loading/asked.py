@@ -40,6 +40,9 @@ class Asked:
     pinched: NDArray[np.bool_]
     curve: NDArray[np.int64]  # row of the builder's `laws` of creases that are no straight line, else -1
     displaced: dict[tuple[int, Direction], float]  # nan where it is not known yet
+    growth: Array | None = (
+        None  # (2, t, 3, 3) strain and curvature at rest at the corners, where there are some
+    )
 
     @classmethod
     def nothing(cls, mesh: SheetMesh) -> Asked:
@@ -63,7 +66,7 @@ class Asked:
 
     def copy(self) -> Asked:
         """The same in arrays of its own."""
-        return Asked(**{name: value.copy() for name, value in vars(self).items()})
+        return Asked(**{name: value.copy() for name, value in vars(self).items() if value is not None})
 
     @property
     def dead(self) -> Array:
@@ -88,6 +91,7 @@ class StepInHand:
         moved: displacements that were asked for, mm, and whether from where nodes are.
         zones: what zones ask for, and where these are.
         bodies: see `LoadStep`.
+        grown: triangles that something was asked of.
     """
 
     angles: Array
@@ -98,6 +102,7 @@ class StepInHand:
     moved: dict[tuple[int, Direction], tuple[float, bool]] = field(default_factory=dict)
     zones: dict[int, tuple[float, float]] = field(default_factory=dict)
     bodies: list[Body] = field(default_factory=list)
+    grown: set[int] = field(default_factory=set)
 
     @classmethod
     def after(cls, asked: Asked) -> StepInHand:

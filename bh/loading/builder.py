@@ -17,7 +17,7 @@ from bh.model.constraints import Constraints, Prescribed, check_held, resolve
 from bh.model.crease_law import CreaseLaw
 from bh.model.hinge_laws import HingeLaw
 from bh.model.laws import PRESCRIBED, SPRING
-from bh.model.model import Model
+from bh.model.model import Model, drawn_flat
 from bh.model.ramp import Ramp
 from bh.model.sheet import Sheet
 from bh.model.springs import ground_stiffness
@@ -187,6 +187,25 @@ class LoadStepBuilder:
         """A dead couple a length on edges of the boundary (k,), N mm / mm; see `StepBuilder.turn`."""
         self._asked.turned[edges] = couple
 
+    def grow(self, triangles: Ints, strain: Array, curvature: Array) -> None:
+        """Strain and curvature at which triangles (k,) are at rest; see `StepBuilder.grow`.
+
+        Raises:
+            ModelError: the stress-free sheet is not flat.
+        """
+        if not drawn_flat(self.mesh):
+            raise ModelError(
+                "a sheet that expands is measured from its flat shape in z = const; unfold it, or leave out expand"
+            )
+        asked = self._asked
+        if asked.growth is None:
+            asked.growth = np.zeros((2, len(self.mesh.triangles), 3, 3))
+        fresh = [row for row in triangles.tolist() if row not in self._step.grown]
+        asked.growth[:, fresh] = 0.0
+        self._step.grown.update(fresh)
+        for kind, values in enumerate((strain, curvature)):
+            asked.growth[kind, triangles] += values[:, None] if values.ndim == 2 else values
+
     def displace(self, nodes: Ints, direction: Sequence[float], by: float, further: bool = False) -> None:
         """Prescribe the displacement of nodes (k,) along a unit vector, mm; see `StepBuilder.displace`.
 
@@ -257,6 +276,7 @@ class LoadStepBuilder:
             pressure=_some(start.pressed, end.pressed),
             edge_couple=_some(start.turned, end.turned),
             ground=self._ground,
+            growth=_growth(start, end),
         )
 
     def ended(self, points: Array) -> None:
@@ -286,6 +306,7 @@ class LoadStepBuilder:
         asked.force = force - sum(asked.borne.values(), np.zeros_like(force))
         asked.pressed = Ramp(self._begun.pressed, asked.pressed).at(end.lam)
         asked.turned = Ramp(self._begun.turned, asked.turned).at(end.lam)
+        asked.growth = None if step.growth is None else step.growth.at(end.lam)
         if np.isnan(asked.rest).any() or step.freed is not None:
             raise ModelError(
                 "a prescribed crease is released in a step that ends early (until); release it in a step before"
@@ -376,6 +397,12 @@ class LoadStepBuilder:
 def _some(start: Array, end: Array) -> Ramp | None:
     """A ramp, or None where there is nothing at either end."""
     return Ramp(start, end) if start.any() or end.any() else None
+
+
+def _growth(start: Asked, end: Asked) -> Ramp | None:
+    if end.growth is None:
+        return None
+    return Ramp(np.zeros_like(end.growth) if start.growth is None else start.growth, end.growth)
 
 
 def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple[LoadStep, ...]:

@@ -68,6 +68,8 @@ class LoadStep:
         ground: (n, 3) stiffness of springs along x, y and z to where nodes lie in the stress-free sheet, N / mm; None
             where there are none.
         freed: (m,) such creases whose angle was imposed up to here; what imposed it fades out during the step.
+        growth: (2, t, 3, 3) strain and curvature (1 / mm) at which triangles are at rest, at their corners, components
+            xx, yy, 2 xy in the axes of the drawing; None for a sheet that is at rest as it is drawn.
     """
 
     law: NDArray[np.int64]
@@ -87,6 +89,7 @@ class LoadStep:
     pressure: Ramp | None = None
     edge_couple: Ramp | None = None
     ground: Array | None = None
+    growth: Ramp | None = None
 
     def prescribed_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""

@@ -19,6 +19,7 @@ from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
 from bh.model.constraints import Constraints
 from bh.model.model import Model
+from bh.model.step import Step
 from bh.model.supports import RigidBody, Support
 from meshes import Arc, SheetMesh
 from meshes.fans import places
@@ -192,6 +193,21 @@ def halved(model: Model, plane: Mirror, free: bool) -> Model:
     return replace(model, supports=(*model.supports, *extra))
 
 
+def _refuse(asked: Step, step: LoadStep, where: str) -> None:
+    """Raises `ModelError` with one line where a step has what is not solved by halves."""
+    reasons = (
+        (asked.looks_back, "whose supports change"),
+        (bool(step.bodies), "that touches bodies"),
+        (step.pressure is not None, "under pressure"),
+        (step.ground is not None, "on springs to the ground"),
+        (step.edge_couple is not None, "with couples on its edges"),
+        (step.growth is not None, "that expands"),
+    )
+    for is_so, words in reasons:
+        if is_so:
+            raise ModelError(f"{where}: a sheet {words} is not solved by halves; leave out symmetry")
+
+
 def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
     """Raises `ModelError` with one line that names what is not symmetric.
 
@@ -220,19 +236,7 @@ def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
             )
     for number, step in enumerate(steps):
         where = f"step {number + 1}"
-        if model.steps[number].looks_back:
-            raise ModelError(
-                f"{where}: a sheet whose supports change is not solved by halves; leave out symmetry"
-            )
-        if step.bodies:
-            raise ModelError(
-                f"{where}: a sheet that touches bodies is not solved by halves; leave out symmetry"
-            )
-        if step.pressure is not None or step.ground is not None or step.edge_couple is not None:
-            raise ModelError(
-                f"{where}: a sheet under pressure, on springs or with couples on its edges is not solved by halves; "
-                "leave out symmetry"
-            )
+        _refuse(model.steps[number], step, where)
         _check_hinges(model, step, plane, where)
         for name in ("start", "end"):
             force = getattr(step.force, name)

@@ -10,8 +10,11 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from bh.errors import ModelError
 from bh.model.actuations import Fold, Force, Indenter
+from bh.model.growth import Expand
 from bh.model.model import Model
 from bh.model.supports import Support, select
 from meshes import CreasePattern, SheetMesh
@@ -164,6 +167,11 @@ def _check_actuation(model: Model, item: Any, where: str) -> None:
                 raise ModelError(
                     f"{where}.{key} gives every edge of one mesh its angle; give one angle, or no accuracy"
                 )
+    elif isinstance(item, Expand):
+        if any(not isinstance(each, float) and np.ndim(each) == 2 for each in (item.by, item.through)):
+            raise ModelError(
+                f"{where} gives every triangle of one mesh its own; give one for all, or no accuracy"
+            )
     elif isinstance(item, Indenter):
         raise ModelError(
             f"{where}: the surface of a bar is as stiff as the edges of one mesh are long; give a mesh, no accuracy"

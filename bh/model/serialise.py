@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bh.errors import PathFileError
 from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
 from bh.model.crease_law import CreaseLaw
+from bh.model.growth import Expand
 from bh.model.hinge_laws import LAWS, HingeLaw
 from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
 from bh.model.model import Model
@@ -43,6 +44,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "line_force": LineForce,
     "area_force": AreaForce,
     "edge_moment": EdgeMoment,
+    "expand": Expand,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 SUPPORTS: dict[str, type[Constraint]] = {"hold": Hold}

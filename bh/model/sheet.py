@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from numbers import Real
 from typing import TYPE_CHECKING
@@ -36,6 +37,7 @@ class Sheet:
             None where it is not known. No formulation yields: states are compared with it (`State.stress`).
         strength2: the same across the grain, MPa; with a grain.
         shear_strength: the same in shear along the grain, MPa; with a grain, sqrt(strength strength2 / 3) unless given.
+        expansion: strain a kelvin (or a percent of moisture, ...), one number or (along, across the grain).
     """
 
     E: float
@@ -48,6 +50,7 @@ class Sheet:
     strength: float | None = None
     strength2: float | None = None
     shear_strength: float | None = None
+    expansion: float | tuple[float, float] | None = None
 
     if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
 
@@ -64,6 +67,7 @@ class Sheet:
             strength: float | str | None = None,
             strength2: float | str | None = None,
             shear_strength: float | str | None = None,
+            expansion: float | Sequence[float] | None = None,
         ) -> None:
             """See the attributes."""
 
@@ -87,6 +91,8 @@ class Sheet:
                 continue
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
                 raise ModelError(f"sheet {name} = {value!r} cannot be; give a positive number in {unit}")
+        if self.expansion is not None:
+            object.__setattr__(self, "expansion", _expansion(self.expansion))
         if self.grain is None and (self.strength2, self.shear_strength) != (None, None):
             raise ModelError(
                 "sheet strength2 and shear_strength are of a grain; give E2, G12 and grain, or strength alone"
@@ -107,6 +113,7 @@ class Sheet:
         grain: float | str,
         t: float | str,
         density: float | None = None,
+        expansion: float | Sequence[float] | None = None,
         **strengths: float | str | None,
     ) -> Sheet:
         """A sheet with a grain, by the names of its moduli.
@@ -119,6 +126,7 @@ class Sheet:
             grain: direction of the grain in the drawing, rad from its x axis towards its y axis.
             t: thickness, mm.
             density: kg / m^3, or None.
+            expansion: strain a unit of change, one number or (along, across the grain), or None.
             **strengths: `strength`, `strength2` and `shear_strength`, MPa (see the class).
 
         Raises:
@@ -127,7 +135,9 @@ class Sheet:
         unknown = set(strengths) - set(STRENGTHS)
         if unknown:
             raise ModelError(f"a sheet has no {sorted(unknown)[0]}; its strengths are {', '.join(STRENGTHS)}")
-        return cls(E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t, density=density, **strengths)
+        return cls(
+            E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t, density=density, expansion=expansion, **strengths
+        )
 
     def strengths(self) -> tuple[float, float, float]:
         """Stresses of yield; of a sheet without a grain von Mises's.
@@ -167,6 +177,18 @@ class Sheet:
         E = self.E if self.E2 is None else math.sqrt(self.E * self.E2)
         nu_squared = self.nu_squared if nu is None else nu**2
         return E * self.t**3 / (12.0 * (1.0 - nu_squared))
+
+
+def _expansion(value: object) -> float | tuple[float, float]:
+    """One number, or two."""
+    both = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else [value]
+    found = [float(each) for each in both if isinstance(each, Real) and math.isfinite(each)]
+    if len(found) != len(both) or len(found) not in (1, 2):
+        raise ModelError(
+            f"sheet expansion = {value!r} cannot be; give a strain a kelvin or a percent, or one along and one across "
+            "the grain"
+        )
+    return found[0] if len(found) == 1 else (found[0], found[1])
 
 
 def _check_grain(sheet: Sheet) -> None:

@@ -160,6 +160,18 @@ class StepBuilder(Protocol):
         """
         ...
 
+    def grow(self, triangles: Ints, strain: Array, curvature: Array) -> None:
+        """Strain and curvature at which triangles (k,) are at rest, in place of what was asked for there before.
+
+        Several in one step add up. Values may differ between the corners of a triangle, linear between them.
+
+        Args:
+            triangles: (k,) rows of `mesh.triangles`.
+            strain: (k, 3) or (k, 3 corners, 3) components xx, yy, 2 xy in the axes of the drawing.
+            curvature: likewise, 1 / mm, positive where the edges go up.
+        """
+        ...
+
     def displace(self, nodes: Ints, direction: Sequence[float], by: float, further: bool = False) -> None:
         """Prescribe the displacement of nodes (k,) along a unit vector (3,), mm from the stress-free position.
 

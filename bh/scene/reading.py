@@ -82,6 +82,8 @@ PerArea = Annotated[list[Pressing], Field(min_length=3, max_length=3)]
 PerLength = Annotated[
     list[Annotated[float, _ANY, spelled("line force", _ANY)]], Field(min_length=3, max_length=3)
 ]
+Amounts = Annotated[list[Number], Field(min_length=2, max_length=3)]
+Region = str | list[str] | list[Annotated[list[Number], Field(min_length=2, max_length=2)]]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Few = Annotated[int, Field(ge=1, le=1000)]
 Node = Annotated[int, Field(ge=0, le=2**62)]
@@ -98,6 +100,7 @@ ALTERNATING = FOLDS + "; alternating where it is left out"
 ALONG, ACROSS = "the side along x in mm", "the side along y in mm"
 DENSITY = "cell height across over width along the crease, a positive number, best 5 to 12"
 LSTAR = "the length scale of the crease in mm, a positive number"
+REGION = 'a region: "face:X,Y", "inside:PLACE", "layer:NAME", "all", a list of these, or a polygon [[x, y], ...] in mm'
 VECTOR = "three numbers [x, y, z]"
 
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from pydantic import Field
 
 from bh.errors import SceneError
 from bh.materials.table import material as material_of
 from bh.model.sheet import Sheet
 from bh.model.zones import SheetZone, changed
-from bh.scene.reading import Number, Positive, read_table, within
+from bh.scene.reading import REGION, Positive, Region, read_table, within
 from bh.scene.tables import SheetTable
 
-Corner = list[Number]
 OTHER_NAMES = {"E1": "E", "nu12": "nu"}
 OF_A_GRAIN = ("E2", "G12", "grain", "strength2", "shear_strength")
 
@@ -21,10 +18,7 @@ OF_A_GRAIN = ("E2", "G12", "grain", "strength2", "shear_strength")
 class ZoneTable(SheetTable):
     """A part of the sheet that is made of something else; what is left out is that of the sheet."""
 
-    where: str | list[str] | list[Corner] = Field(
-        description='a region: "face:X,Y", "inside:PLACE", "layer:NAME", "all", a list of these, or a polygon '
-        "[[x, y], ...] in mm"
-    )
+    where: Region = Field(description=REGION)
     stiff: Positive = Field(
         1.0, description="a factor of the moduli, a positive number; 1000 is as good as rigid"
     )
@@ -87,7 +81,8 @@ def _of_material(table: SheetTable, at: str) -> Sheet:
     assert table.material is not None
     with within(at):
         made = material_of(table.material).sheet(table.t, table.grain)
-        return made if table.density is None else replace(made, density=table.density)
+        more = {"density": table.density, "expansion": table.expansion}
+        return Sheet(**{**vars(made), **{key: value for key, value in more.items() if value is not None}})
 
 
 def _given(table: SheetTable) -> dict[str, float]:

@@ -19,10 +19,13 @@ from bh.scene.reading import (
     DENSITY,
     LSTAR,
     PLACE,
+    REGION,
     VECTOR,
+    Amounts,
     Closing,
     Count,
     Couple,
+    Curvature,
     Dihedral,
     Distance,
     FoldAngle,
@@ -33,6 +36,7 @@ from bh.scene.reading import (
     Place,
     Positive,
     Push,
+    Region,
     Rest,
     Scale,
     Seconds,
@@ -78,6 +82,10 @@ class SheetTable(Table):
     shear_strength: Modulus | None = Field(
         None,
         description="the stress of yield in shear in MPa, with a grain; sqrt(strength strength2 / 3) unless given",
+    )
+    expansion: Number | Amounts | None = Field(
+        None,
+        description="a strain a kelvin or a percent of moisture, or [along, across] the grain",
     )
     material: str | None = Field(
         None,
@@ -357,6 +365,25 @@ class UntilTable(Table):
         return self
 
 
+class ExpandTable(Table):
+    """Keys of `bh.Expand`."""
+
+    by: Number | Amounts = Field(
+        0.0, description="a strain up to 0.5, or [e11, e22] or [e11, e22, 2 e12] along and across the grain"
+    )
+    through: Curvature | Amounts = Field(
+        0.0,
+        description="a curvature at rest in 1/mm, or two or three of them; positive where the edges go up",
+    )
+    change: Number = Field(
+        0.0, description="a change of temperature or moisture, in the unit of the expansion of the sheet"
+    )
+    where: Region = Field("all", description=REGION)
+    axes: Turn | None = Field(
+        None, description="the direction of e11 in the drawing in rad; the grain, or the x axis, unless given"
+    )
+
+
 ACTUATIONS: dict[str, type[Table]] = {
     "fold": FoldTable,
     "pinch": PinchTable,
@@ -366,4 +393,5 @@ ACTUATIONS: dict[str, type[Table]] = {
     "pull": PullTable,
     "weight": WeightTable,
     **LOADS,
+    "expand": ExpandTable,
 }

@@ -78,7 +78,7 @@ def test_consistent_has_springs_for_springs_only() -> None:
 
 
 def test_no_rotations_without_the_consistent_formulation() -> None:
-    """Bars and hinges load neither the other formulations nor what is asked for apart; the look for contact is there."""
+    """Bars and hinges load neither the other formulations nor what is asked for apart, but the look for contact."""
     loaded = loaded_after(PULLED.format(formulation="bars-and-hinges"))
     assert "bh.mechanics.bars_and_hinges.system" in loaded
     assert not loaded & {

@@ -49,6 +49,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: area_force": loads.AreaForceTable,
     "steps: edge_moment": loads.EdgeMomentTable,
     "springs": loads.SpringTable,
+    "steps: expand": schema.ExpandTable,
     "steps: press": scene_bodies.PressTable,
     "steps: tether": scene_bodies.TetherTable,
     "steps: until": schema.UntilTable,

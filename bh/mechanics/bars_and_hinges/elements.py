@@ -64,12 +64,16 @@ def sheet_elements(
         moment_start: (m,) total moments of all hinges at the start, N mm; zero off creases.
 
     Raises:
-        ModelError: a sheet with a grain, or with zones.
+        ModelError: a sheet with a grain, with zones, or one that expands.
     """
     mesh, sheet = model.mesh, model.sheet
     if model.zones:
         raise ModelError(
             "bars and hinges are of one sheet all over; fold a sheet with zones by 'consistent' or 'shell'"
+        )
+    if load_step.growth is not None:
+        raise ModelError(
+            "bars and hinges are at rest as they are drawn; expand a sheet by 'consistent' or 'shell'"
         )
     if sheet.grain is not None:
         raise ModelError(

@@ -101,7 +101,9 @@ def _directions(mesh: SheetMesh, start: State, edges: Ints) -> Array:
     return np.asarray(np.cos(slope) * np.cross(edge, normal) + np.sin(slope) * length * normal)
 
 
-def read_slopes(mesh: SheetMesh, joined: Patches, theta: Array, moments: Array) -> tuple[Array, Array]:
+def read_slopes(
+    mesh: SheetMesh, joined: Patches, theta: Array, moments: Array, at_rest: Array | None = None
+) -> tuple[Array, Array]:
     """(e,) slopes at the boundary, rad, nan inside; and (e,) couples of clamps there, N mm, zero elsewhere.
 
     A slope is the angle from the triangle at the edge up to the sheet's tangent plane there.
@@ -111,6 +113,7 @@ def read_slopes(mesh: SheetMesh, joined: Patches, theta: Array, moments: Array) 
         joined: patches.
         theta: (c, a) their angles, rad.
         moments: (c, a) N mm.
+        at_rest: (t, 3) angles at the edges of triangles that are at rest curved, rad.
     """
     topology = mesh.topology
     of_half = topology.triangle_edges.ravel()
@@ -122,6 +125,8 @@ def read_slopes(mesh: SheetMesh, joined: Patches, theta: Array, moments: Array) 
     edge = of_half[half]
     rim = (half >= 0) & (topology.edge_hinges[edge] < 0)
     slopes[edge[rim]] = np.einsum("cha,ca->ch", joined.shares, theta)[rim]
+    if at_rest is not None:
+        slopes[edge[rim]] += at_rest.ravel()[half[rim]]
     clamp = (joined.kind == TURN) & (joined.hinge < 0)
     couples[of_half[joined.half_edge[clamp]]] = moments[clamp]
     return slopes, couples

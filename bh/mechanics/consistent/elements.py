@@ -15,6 +15,7 @@ from bh.materials import Constant, LinearElastic, Material
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.bending import Bending
 from bh.mechanics.consistent.clamps import Clamps, clamps
+from bh.mechanics.consistent.growth import Growth, sheet_growth, with_growth
 from bh.mechanics.consistent.kernels import OWN, TURN
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
 from bh.mechanics.consistent.patches import (
@@ -62,6 +63,7 @@ class ConsistentElements:
         prescribed: (m,) prescribed dihedral angles at every hinge, rad; nan where it is not prescribed.
         lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at prescribed ones.
         rotations: how many there are.
+        growth: what is at rest where, of a sheet that is not at rest as it is drawn.
         let_go: (rotations,) couples on edges, and of clamps that are let go of, on the rotations of those edges, N mm.
     """
 
@@ -90,6 +92,7 @@ class ConsistentElements:
     lock: Array
     rotations: int
     let_go: Ramp
+    growth: Growth | None = None
 
 
 def consistent_elements(
@@ -152,18 +155,22 @@ def consistent_elements(
 
     prescribed = load_step.prescribed_angles(prescribed_start)
     springs, k_fold, spring_rest, couple = _springs(mesh, load_step, spring, prescribed_start, moment_start)
+    stretching = Stretching(membrane, laws, mesh.points)
+    growth = sheet_growth(mesh, load_step.growth, stretching, maps, angle)
+    rest = with_growth(_rest(mesh, joined, law, prescribed), mesh, growth, joined.hinge, joined.half_edge)
+    spring_rest = with_growth(spring_rest, mesh, growth, springs)
     whole = ConsistentElements(
         members=np.arange(len(mesh.triangles)), triangles=mesh.triangles,
         heights=2.0 * areas[:, None] / np.linalg.norm(edges, axis=2),
-        stretching=Stretching(membrane, laws, mesh.points),
+        stretching=stretching,
         bending=Bending(joined, bending_law, maps, part_area, quad, ghost, rotation), B_triangle=B, patches=joined,
         quad=quad, ghost=ghost, place=place, rotation=rotation, column=column, width=width, nodes=nodes,
-        rest=_rest(mesh, joined, law, prescribed), springs=springs,
+        rest=rest, springs=springs,
         hinges=np.ascontiguousarray(topology.hinges[springs]), turns=turns[springs],
         spring_stiffness=k_fold, spring_rest=spring_rest,
         couple=couple,
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
-        lock=lock_stiffness(model, load_step), rotations=rotations, let_go=let_go,
+        lock=lock_stiffness(model, load_step), rotations=rotations, let_go=let_go, growth=growth,
     )  # fmt: skip
     return whole if plane is None else _half(whole, plane)
 

@@ -22,6 +22,7 @@ from bh.mechanics.consistent import remarks
 from bh.mechanics.consistent.clamps import read_slopes
 from bh.mechanics.consistent.derivatives import ConsistentDerivatives
 from bh.mechanics.consistent.elements import LINEAR
+from bh.mechanics.consistent.growth import hinge_shift
 from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.membrane import Measure, constant_strain, smoothed_strain
 from bh.mechanics.consistent.resultants import resultants
@@ -76,7 +77,7 @@ class Consistent:
         """Derivatives of a system by its element data at unknowns q (size,).
 
         Raises:
-            ModelError: the material is not linear, or panels are in contact.
+            ModelError: the material is not linear, panels are in contact, or the sheet expands.
         """
         if system.barrier is not None:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
@@ -84,6 +85,8 @@ class Consistent:
             raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
         refuse_curves(system.curves)
         refuse_outside(system.load_step)
+        if system.elements.growth is not None:
+            raise ModelError("sensitivities are those of sheets at rest as drawn; this one expands")
         return ConsistentDerivatives(system, q, lam)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
@@ -110,7 +113,7 @@ class Consistent:
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
         contact = system.press_on(x, lam, now.f)
-        stretching, bending = system.stretching_by_triangle(x), system.bending_by_triangle(now.theta)
+        stretching, bending = system.stretching_by_triangle(x, lam), system.bending_by_triangle(now.theta)
         folding, dissipated = 0.5 * e.spring_stiffness * now.turns**2, 0.0
         if system.curves is not None:
             folding, dissipated = system.curves.held(e.spring_stiffness, now.turns)
@@ -119,6 +122,8 @@ class Consistent:
         prescribed = ~np.isnan(e.prescribed.end)
         angles[prescribed] = e.prescribed.at(lam)[prescribed]
         angles[e.springs] = e.spring_rest.at(lam) + now.turns
+        if e.growth is not None:
+            angles[e.springs] -= hinge_shift(mesh, e.growth.theta.at(lam))[e.springs]
         moments = np.full(len(angles), np.nan)
         ends = mesh.points[topology.hinges[:, 1:3]]
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -127,7 +132,9 @@ class Consistent:
         by_hinge = np.zeros(len(angles))
         by_hinge[e.patches.hinge[turning]] = M[turning]
         moments[prescribed] = (by_hinge / lengths)[prescribed]
-        slopes, couples = read_slopes(mesh, e.patches, now.theta, M)
+        slopes, couples = read_slopes(
+            mesh, e.patches, now.theta, M, None if e.growth is None else e.growth.theta.at(lam)
+        )
         return State(
             mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(
@@ -142,7 +149,7 @@ class Consistent:
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable, edge_slopes=slopes, clamp_couples=couples,
-            recover=partial(resultants, model.sections, mesh, e, self.material, x, now.theta),
+            recover=partial(resultants, model.sections, mesh, e, self.material, x, now.theta, lam),
             contact_forces={} if system.outside is None else system.outside.contact_forces(x, lam),
             crease_history=system.history_at(q, lam) if system.remembers else None,
         )  # fmt: skip

@@ -60,6 +60,26 @@ def curvature_maps(edges: Array, areas: Array) -> Array:
     return np.stack((weight * y * y, weight * x * x, -2.0 * weight * x * y), axis=1)
 
 
+def turned_strains(values: Array, angle: Array, shear: float) -> Array:
+    """(k, 3) components in axes at angles (k,) to their own.
+
+    Args:
+        values: (k, 3) components xx, yy and the third.
+        angle: (k,) from their x axes to the new ones, rad.
+        shear: xy over the third component: 0.5 of strains, 1 of forces.
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    xx, yy, xy = values[:, 0], values[:, 1], shear * values[:, 2]
+    mixed = c * s * (yy - xx) + (c * c - s * s) * xy
+    return np.column_stack(
+        (
+            c * c * xx + s * s * yy + 2.0 * c * s * xy,
+            s * s * xx + c * c * yy - 2.0 * c * s * xy,
+            mixed / shear,
+        )
+    )
+
+
 def bending_matrices(maps: Array, areas: Array, moduli: Array) -> Array:
     """(t, 3, 3) B of 1/2 theta.B.theta = 1/2 A kappa.C.kappa, N mm, with moduli C of curvatures, N mm.
 

@@ -8,9 +8,14 @@ from numpy.typing import NDArray
 from bh.formulations.stress import Resultants
 from bh.materials import Material
 from bh.mechanics.consistent.elements import ConsistentElements
-from bh.mechanics.consistent.patches import curvature_maps, frame_angles, triangle_frames
+from bh.mechanics.consistent.patches import (
+    curvature_maps,
+    frame_angles,
+    triangle_frames,
+    turned_strains,
+)
 from bh.mechanics.consistent.sections import sheet_laws
-from bh.mechanics.consistent.stretching import Stretching
+from bh.mechanics.consistent.stretching import Pair, Stretching
 from bh.model.zones import Sections
 from meshes import SheetMesh
 
@@ -24,6 +29,7 @@ def resultants(
     material: Material,
     x: Array,
     theta: Array,
+    lam: float,
 ) -> Resultants:
     """What the elements measure, and what their material makes of it.
 
@@ -35,9 +41,12 @@ def resultants(
         elements: of the whole sheet.
         material: of the formulation.
         x: (n, 3) positions, mm.
-        theta: (c, a) angles of the patches there, rad.
+        theta: (c, a) angles of the patches there, less those at rest, rad.
+        lam: load parameter of the step, 0 to 1.
     """
-    strain, forces = _membrane(mesh, elements.stretching, x)
+    growth = elements.growth
+    at_rest = None if growth is None else growth.strains(lam)
+    strain, forces = _membrane(mesh, elements.stretching, x, at_rest)
     edges, areas = triangle_frames(mesh.points, mesh.triangles)
     angle = frame_angles(mesh.points, mesh.triangles)
     patches = elements.patches
@@ -47,41 +56,30 @@ def resultants(
     curvature = np.einsum("tij,tj->ti", curvature_maps(edges, areas), own)
     laws = sheet_laws(material, sections, mesh)
     moments = laws.of_triangles(np.arange(len(areas)), angle).stress(curvature)
+    curvature = turned_strains(curvature, -angle, 0.5)
+    if growth is not None:
+        curvature = curvature + growth.curvature.at(lam)
     return Resultants(
         sections.sheets[0],
         strain,
-        _turned(curvature, -angle, 0.5),
+        curvature,
         forces,
-        _turned(moments, -angle, 1.0),
+        turned_strains(moments, -angle, 1.0),
         sections,
     )
 
 
-def _membrane(mesh: SheetMesh, stretching: Stretching, x: Array) -> tuple[Array, Array]:
+def _membrane(mesh: SheetMesh, stretching: Stretching, x: Array, at_rest: Pair | None) -> tuple[Array, Array]:
     """(t, 3) strains and membrane forces: of the cells, shared with the triangles by area."""
     topology = mesh.topology
     beside = topology.edge_triangles[topology.hinge_edges]
     out = np.zeros((2, len(mesh.triangles), 3))
-    for number, (cells, strain, force) in enumerate(stretching.strains_and_forces(x)):
+    for number, (cells, strain, force) in enumerate(stretching.strains_and_forces(x, at_rest)):
         angle = -cells.angle(mesh.points)
-        both = np.stack((_turned(strain, angle, 0.5), _turned(force, angle, 1.0)))
+        both = np.stack((turned_strains(strain, angle, 0.5), turned_strains(force, angle, 1.0)))
         sides = cells.source[:, None] if number == 0 else beside[cells.source]
         for side, share in zip(sides.T, (cells.share, 1.0 - cells.share), strict=False):
             for k in range(2):
                 np.add.at(out[k], side, (share * cells.area)[:, None] * both[k])
     out /= mesh.areas[:, None]
     return out[0], out[1]
-
-
-def _turned(values: Array, angle: Array, shear: float) -> Array:
-    """(k, 3) components in axes at angles (k,) to their own; `shear` is xy over the third component."""
-    c, s = np.cos(angle), np.sin(angle)
-    xx, yy, xy = values[:, 0], values[:, 1], shear * values[:, 2]
-    mixed = c * s * (yy - xx) + (c * c - s * s) * xy
-    return np.column_stack(
-        (
-            c * c * xx + s * s * yy + 2.0 * c * s * xy,
-            s * s * xx + c * c * yy - 2.0 * c * s * xy,
-            mixed / shear,
-        )
-    )

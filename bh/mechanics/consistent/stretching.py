@@ -6,6 +6,8 @@ evaluated on the strains of all cells at once, between two compiled passes over 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,19 @@ from bh.mechanics.shared.sparsity import Slots
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
+Pair = tuple[Array, Array]  # of both kinds of cells
+
+
+class Grown(NamedTuple):
+    """What strains at rest do to a membrane of constant moduli: energy 1/2 gamma.K.gamma + forces.gamma + energy.
+
+    Attributes:
+        forces: (b,) of the bars, N / mm.
+        energy: of the drawn sheet, N mm.
+    """
+
+    forces: Array
+    energy: float
 
 
 class Stretching:
@@ -65,18 +80,22 @@ class Stretching:
             self._at = x
         return self._last
 
-    def forces(self, x: Array, f: Array, N: Array) -> tuple[float, float]:
+    def forces(self, x: Array, f: Array, N: Array, grown: Grown | None = None) -> tuple[float, float]:
         """Energy (N mm) and the sum of squared bar forces (N^2); adds the gradient to f (n, 3) and writes N.
 
         Args:
             x: (nodes, 3) positions, mm.
             f: (nodes, 3) N; the gradient is added.
             N: bar forces, N; written.
+            grown: what the sheet at rest takes off, where it is not at rest as it is drawn.
         """
         m, gamma = self.membrane, self.gamma(x)
         if self._K:
             self._by_stiffness(self._K, gamma, N)
             energy = 0.5 * float(N @ gamma)
+            if grown is not None:
+                N += grown.forces
+                energy += float(grown.forces @ gamma) + grown.energy
         else:
             N[:] = 0.0
             energy = sum(_by_law(*of, gamma, N) for of in zip(m.cells, self._laws, strict=True))
@@ -109,6 +128,17 @@ class Stretching:
             x, five.nodes, five.bars, five.owned, K[1], N, frame_of, frames, five.source, hinges, data
         )
 
+    def gamma_rates(self, x: Array, v: Array) -> Array:
+        """(b,) rates of gamma for velocities v (n, 3).
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            v: (nodes, 3) velocities.
+        """
+        rate = np.empty(len(self.membrane.bars))
+        kernels.bar_rates(x, v, self.membrane.bars, rate)
+        return rate
+
     def rates(self, x: Array, v: Array, dN: Array) -> None:
         """Writes the rates of N for velocities v (n, 3).
 
@@ -117,10 +147,7 @@ class Stretching:
             v: (nodes, 3) velocities.
             dN: rates of the bar forces; written.
         """
-        m = self.membrane
-        rate = np.empty(len(m.bars))
-        kernels.bar_rates(x, v, m.bars, rate)
-        self._by_stiffness(self.stiffness(x), rate, dN)
+        self._by_stiffness(self.stiffness(x), self.gamma_rates(x, v), dN)
 
     def force_rates(self, x: Array, v: Array, N: Array, dN: Array, f: Array) -> None:
         """Add the rate of the gradient to f (n, 3).
@@ -134,18 +161,20 @@ class Stretching:
         """
         kernels.bar_force_rates(x, v, self.membrane.bars, N, dN, f)
 
-    def by_triangle(self, x: Array, triangles: int, beside: Ints) -> Array:
+    def by_triangle(self, x: Array, triangles: int, beside: Ints, at_rest: Pair | None = None) -> Array:
         """(triangles,) energies, N mm; that of an edge is shared by area with `beside` (m, 2), the sides of hinges.
 
         Args:
             x: (nodes, 3) positions, mm.
             triangles: how many there are.
             beside: (m, 2) triangles on both sides of every hinge.
+            at_rest: strains of the cells at rest.
         """
-        gamma = self.gamma(x)
         three, five = (
-            cells.area * law.energy(cells.strains(gamma))
-            for cells, law in zip(self.membrane.cells, self._laws, strict=True)
+            cells.area * law.energy(strain)
+            for cells, law, strain in zip(
+                self.membrane.cells, self._laws, self._elastic(x, at_rest), strict=True
+            )
         )
         out = np.zeros(triangles)
         np.add.at(out, self.membrane.triangles.source, three)
@@ -154,16 +183,41 @@ class Stretching:
         np.add.at(out, sides[:, 1], (1.0 - share) * five)
         return out
 
-    def strains_and_forces(self, x: Array) -> tuple[tuple[Cells, Array, Array], ...]:
+    def _elastic(self, x: Array, at_rest: Pair | None) -> tuple[Array, ...]:
+        """Strains (c, 3) of both kinds of cells, less those at rest."""
+        gamma = self.gamma(x)
+        strains = tuple(cells.strains(gamma) for cells in self.membrane.cells)
+        return strains if at_rest is None else tuple(e - e0 for e, e0 in zip(strains, at_rest, strict=True))
+
+    def strains_and_forces(
+        self, x: Array, at_rest: Pair | None = None
+    ) -> tuple[tuple[Cells, Array, Array], ...]:
         """Of both kinds of cells these, their strains (c, 3) and membrane forces (c, 3), N / mm, in their own axes.
 
         Args:
             x: (nodes, 3) positions, mm.
+            at_rest: strains of the cells at rest.
         """
-        gamma = self.gamma(x)
-        strains = (cells.strains(gamma) for cells in self.membrane.cells)
-        each = zip(self.membrane.cells, self._laws, strains, strict=True)
-        return tuple((cells, strain, law.stress(strain)) for cells, law, strain in each)
+        whole, elastic = self._elastic(x, None), self._elastic(x, at_rest)
+        each = zip(self.membrane.cells, self._laws, whole, elastic, strict=True)
+        return tuple((cells, strain, law.stress(part)) for cells, law, strain, part in each)
+
+    def at_rest(self, one: Pair, other: Pair) -> tuple[Array, float]:
+        """What strains at rest (of both kinds of cells) take off.
+
+        Args:
+            one: strains at rest.
+            other: others, or the same.
+
+        Returns:
+            bar forces (b,) of the first, N / mm, and the energy of both together, 1/2 e.C.e if they are one, N mm.
+        """
+        N, energy = np.zeros(len(self.membrane.bars)), 0.0
+        for cells, law, e0, e1 in zip(self.membrane.cells, self._laws, one, other, strict=True):
+            force = cells.area[:, None] * law.stress(e0)
+            np.add.at(N, cells.bars, -np.einsum("cik,ci->ck", cells.strain, force))
+            energy += 0.5 * float(np.vdot(force, e1))
+        return N, energy
 
     @property
     def largest(self) -> float:

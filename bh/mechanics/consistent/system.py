@@ -148,7 +148,8 @@ class ConsistentSystem(TurningEdges):
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
         turns = np.empty(len(e.springs))
         N, M, S, L = self.split(forces)
-        stretching, size = e.stretching.forces(x, f, N)
+        grown = None if e.growth is None else e.growth.at(lam)
+        stretching, size = e.stretching.forces(x, f, N, grown)
         bending, more, closing = e.bending.forces(x, alpha, e.rest.at(lam), f, r, M, theta)
         rest, couple, stiffness, missing = e.spring_rest.at(lam), e.couple.at(lam), e.spring_stiffness, 0.0
         if self.curves is not None:
@@ -162,11 +163,18 @@ class ConsistentSystem(TurningEdges):
         size = float(np.sqrt((size + more + most) / (len(forces) - len(L))))
         return Internal(stretching, bending, springs, lock, size, f, r, forces, theta, turns)
 
-    def stretching_by_triangle(self, x: Array) -> Array:
-        """(t,) energy of stretching, N mm, of the triangles of the mesh at positions x."""
+    def stretching_by_triangle(self, x: Array, lam: float = 0.0) -> Array:
+        """(t,) energy of stretching, N mm, of the triangles of the mesh.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
         topology = self.mesh.topology
         beside = topology.edge_triangles[topology.hinge_edges]
-        return self.elements.stretching.by_triangle(x, len(self.mesh.triangles), beside)
+        growth = self.elements.growth
+        at_rest = None if growth is None else growth.strains(lam)
+        return self.elements.stretching.by_triangle(x, len(self.mesh.triangles), beside, at_rest)
 
     def bending_by_triangle(self, theta: Array) -> Array:
         """(t,) energy of bending, N mm, for the angles (c, a) of the patches."""
@@ -295,6 +303,8 @@ class ConsistentSystem(TurningEdges):
         rates, turns = np.empty(sum(self._counts)), np.empty(len(e.springs))
         N, M, S, L = self.split(rates)
         e.stretching.rates(x, v, N)
+        if e.growth is not None and controlled:
+            N += e.growth.forces.rate
         joined = e.patches
         kernels.bending_rates(
             x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, slopes.patches, M
@@ -339,6 +349,8 @@ class ConsistentSystem(TurningEdges):
         if self.barrier is not None:
             f += self.barrier.times(x, v)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
+        if e.growth is not None:
+            second += e.growth.second(e.stretching.gamma_rates(x, v))
         return f, r, second
 
     def _rest_work(self, M: Array, S: Array) -> float:
@@ -360,6 +372,8 @@ class ConsistentSystem(TurningEdges):
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
         total -= float(np.vdot(self.force.rate, x - self.displacements.home))
         total += float(self.elements.let_go.rate @ q[self.moving :])
+        if self.elements.growth is not None:
+            total += self.elements.growth.power(self.elements.stretching.gamma(x), lam)
         if self.outside is not None:
             total += self.outside.power(x, lam)
             self.outside.forces(x, lam, now.f)
