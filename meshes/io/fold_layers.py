@@ -3,7 +3,8 @@
 An order (f, g, s) says that face f lies on the side of g that its corners run round counter-clockwise (s = 1), or on
 the other one (-1). Wherever a node of one face lies over a triangle of the other, or two edges cross, as seen along the
 normal of g, the layers are asked to be a distance apart; parts that share a node are left to the crease. The smallest
-moves of the nodes that do it (their sum) are a linear programme.
+moves of the nodes that do it, and differences of moves along edges, are a linear programme (the sum of all): panels
+stay flat but next to creases.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from meshes.io.fold_faces import triangulate
 from meshes.io.fold_frame import Frame, show, side
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Order = tuple[int, int, int]
 Triangle = Sequence[int]
 Place = dict[int, float]  # a point of the sheet: its nodes and their weights
@@ -28,6 +30,7 @@ Ask = tuple[Place, Place, int, int]  # the upper and the lower point, and the fa
 
 ON = 1e-9  # weights and parts of an edge from which a point lies on a corner or a side
 LEFT = 1e-6  # of the distance: what may be wanting
+FEW = 0.1  # a move costs so much of a difference of moves
 DEAR = 1e3  # what is wanting costs so much more than a move
 
 
@@ -77,7 +80,8 @@ def untangled(frame: Frame, orders: Sequence[Order], distance: float) -> Frame:
     """
     triangles = _triangles(frame)
     asks = [ask for order in orders for ask in _asked(frame.points, triangles, order)]
-    points = _moved(frame.points, asks, _normals(frame, triangles), distance)
+    sides = sorted({side(t[k], t[k - 1]) for each in triangles for t in each for k in range(3)})
+    points = _moved(frame.points, np.array(sides), asks, _normals(frame, triangles), distance)
     # as triangles, since a corner that has moved may change which diagonal is the shorter one
     faces = [[list(triangle)] for each in triangles for triangle in each]
     own = {
@@ -159,7 +163,7 @@ def _within(flat: Array, node: int, triangle: Triangle) -> Place:
     return dict(zip(triangle, weights, strict=True)) if min(weights) >= -ON else {}
 
 
-def _moved(points: Array, asks: Sequence[Ask], normals: Array, distance: float) -> Array:
+def _moved(points: Array, sides: Ints, asks: Sequence[Ask], normals: Array, distance: float) -> Array:
     """Points after the least moves that do what is asked."""
     import scipy.sparse as sp
     from scipy.optimize import linprog
@@ -180,12 +184,19 @@ def _moved(points: Array, asks: Sequence[Ask], normals: Array, distance: float) 
             values += (weight * sign).tolist()
     size = points.size
     A = sp.coo_array((values, (rows, columns)), shape=(len(asks), size)).tocsr()
-    whole = sp.hstack([-A, A, -sp.eye_array(len(asks))]).tocsr()
-    cost = np.concatenate((np.ones(2 * size), np.full(len(asks), DEAR)))
-    found = linprog(cost, A_ub=whole, b_ub=-short, method="highs")
+    ends = sp.coo_array(
+        (np.tile([1.0, -1.0], len(sides)), (np.repeat(np.arange(len(sides)), 2), sides.ravel())),
+        shape=(len(sides), len(points)),
+    )
+    B = sp.kron(ends, sp.eye_array(3)).tocsr()  # differences of moves along the sides
+    free, rough = sp.eye_array(len(asks)), sp.eye_array(3 * len(sides))
+    whole = sp.block_array([[-A, A, -free, None], [B, -B, None, -rough], [-B, B, None, -rough]]).tocsr()
+    cost = np.concatenate((np.full(2 * size, FEW), np.full(len(asks), DEAR), np.ones(3 * len(sides))))
+    bounds = np.concatenate((-short, np.zeros(6 * len(sides))))
+    found = linprog(cost, A_ub=whole, b_ub=bounds, method="highs")
     if found.x is None:
         raise FileFormatError(f"the layers cannot be untangled ({found.message})")
-    wanting = found.x[2 * size :]
+    wanting = found.x[2 * size : 2 * size + len(asks)]
     worst = int(np.argmax(wanting))
     if wanting[worst] > LEFT * distance:
         _, _, f, g = asks[worst]

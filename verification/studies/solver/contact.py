@@ -1,6 +1,7 @@
-"""Case `contact`: a strip that wraps round a cylinder, and random sheets whose panels meet.
+"""Case `contact`: a strip that wraps round a cylinder, stacks of layers, and random sheets whose panels meet.
 
-The strip lies on two supports and is pressed in its middle: force and lift-off by the elastica. Scenes are stored one
+The strip lies on two supports and is pressed in its middle: force and lift-off by the elastica. Stacks are as high as
+their sheets are thick. Scenes are stored one
 by one, so a run that was stopped goes on; with BH_CONTACT=50:100 in the environment it plays these and counts all that
 are stored.
 """
@@ -19,6 +20,7 @@ from bh.paths.path import Path
 from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context
 from verification.studies.solver.branches import part_of, played
+from verification.studies.solver.contact_layers import layers
 from verification.studies.solver.contact_scenes import SEED, Row, play
 from verification.theory.wrapped import wrapped_by
 
@@ -150,6 +152,7 @@ def run(context: Context) -> CaseResult:
         f"{ELASTICA}; {SCENES} random scenes of seed {SEED}",
     )
     wrapping(result, context.quick)
+    layers(result)
     numbers = part_of(PART, QUICK if context.quick else SCENES, SCENES)
     known = played(context, CASE, RUNS, numbers, SCENES, play)
     meeting(result, [Row(**{**row, "told": tuple(row["told"])}) for row in known])

@@ -1,0 +1,100 @@
+"""Layers of case `contact`: a block of sheets, pleats between plates, and a carton that opens."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path as FilePath
+
+import numpy as np
+
+import bh
+import meshes
+from bh.analysis.contact import first_contact
+from bh.paths.path import Path
+from bh.scene.load import load_scene
+from verification.framework.checks import CaseResult
+
+EXAMPLES = FilePath(__file__).resolve().parents[3] / "examples"
+SHEETS, SIDE, APART, FORCE = 5, 20.0, 1.02, 0.5  # of the block: mm, thicknesses at first, N
+THICK = (0.1, 0.2, 0.4)  # mm
+TOLERANCE = 0.01
+OPENED, PANELS = ("pressed_pleats", "carton"), 4  # examples, and panels of the first
+STACK = "a stack is as high as its sheets are thick"
+
+
+def block(t: float) -> Path:
+    """Loose sheets on each other, the lowest one on a plane, that a force on the uppermost one presses.
+
+    Args:
+        t: thickness, mm.
+    """
+    one = meshes.structured(meshes.strip(SIDE, SIDE, [0.5 * SIDE], "flat"), along=1, rows=1)
+    count = len(one.points)
+    points = np.vstack([one.points + np.array([0.0, 0.0, APART * t * k]) for k in range(SHEETS)])
+    triangles = np.vstack([one.triangles + count * k for k in range(SHEETS)])
+    mesh = meshes.SheetMesh(points, triangles)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, nu=0.3, t=t), contact="thickness")
+    model = model.support(list(range(count)), "z")
+    for k in range(SHEETS):
+        model = model.support([count * k], "xy").support([count * k + 1], "y")
+    top = list(range(count * (SHEETS - 1), count * SHEETS))
+    soft = bh.Tether("all", (1.0, 1.0, 1.0))  # what holds sheets that do not touch yet
+    return bh.trace(model.step(bh.Force(top, total=(0.0, 0.0, -FORCE)), soft), warn=False, estimate=False)
+
+
+def height(path: Path) -> float:
+    """Of all middle surfaces, with half a thickness on either side, mm; nan of a path that did not reach its end."""
+    if not path.reached:
+        return math.nan
+    return float(np.ptp(path[-1].points[:, 2])) + path.model.sheet.t
+
+
+def layers(result: CaseResult) -> None:
+    """Heights of stacks, and what the carton opens to.
+
+    Args:
+        result: to which checks are added.
+    """
+    for t in THICK:
+        path = block(t)
+        result.check(
+            "height of five loose sheets that are pressed",
+            height(path),
+            unit="mm",
+            reference=SHEETS * t,
+            source=STACK,
+            tolerance=TOLERANCE,
+            params={"t": t},
+            path=path,
+        )
+    paths = {name: bh.trace(load_scene(EXAMPLES / f"{name}.toml").model, warn=False) for name in OPENED}
+    pleats, carton = (paths[name] for name in OPENED)
+    t = pleats.model.sheet.t
+    result.check(
+        "height of four pleats between plates",
+        height(pleats),
+        unit="mm",
+        reference=PANELS * t,
+        source=STACK,
+        tolerance=TOLERANCE,
+        params={"t": t},
+        path=pleats,
+    )
+    result.check(
+        "fold angle of an opened carton",
+        float(carton[-1].fold_angle("mountain").mean()) if carton.reached else math.nan,
+        unit="rad",
+        reference=0.5 * math.pi,
+        source="four panels of a sleeve are a rectangle",
+        tolerance=TOLERANCE,
+        params={},
+        path=carton,
+    )
+    result.check(
+        "states of layers that meet themselves",
+        sum(first_contact(path) is not None for path in paths.values()),
+        reference=0.0,
+        source="the predicate of bh.contact, which shares nothing with the barrier",
+        tolerance=0.0,
+        params={"states": sum(len(path) for path in paths.values())},
+    )
