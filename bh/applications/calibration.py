@@ -114,7 +114,12 @@ class Solver:
         return self._read(path)
 
     def beside(self, values: Array, base: Array) -> Array:
-        """(m,) the same at values (n,) next to `base` (n,), where the model has been solved."""
+        """(m,) the same next to a point at which the model has been solved.
+
+        Args:
+            values: (n,) of the parameters.
+            base: (n,) of that point.
+        """
         model = self.build(values)
         path = neighbour(self._paths.get(base.tobytes(), self._paths[self._last]), model)
         return self._read(trace(model, estimate=False, warn=False).require() if path is None else path)

@@ -121,6 +121,12 @@ class Measured:
     def at(self, model: Model) -> tuple[int, ...]:
         """The steps of a model at whose ends the values are.
 
+        Args:
+            model: of the test.
+
+        Returns:
+            their numbers from 0, one a value.
+
         Raises:
             ModelError: there are more or fewer than values, or the model has no such step.
         """

@@ -122,6 +122,9 @@ def array(dtype: object, shape: object, data: object) -> NDArray[np.float64] | N
         shape: JSON list of sizes.
         data: bytes.
 
+    Returns:
+        the array, of that shape.
+
     Raises:
         ValueError: they are not.
     """
@@ -209,6 +212,9 @@ def lines(value: object, what: str) -> tuple[str, ...]:
     Args:
         value: of a column.
         what: its name, for the message.
+
+    Returns:
+        the texts.
 
     Raises:
         ValueError: it is none.
