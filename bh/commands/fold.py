@@ -147,7 +147,7 @@ class _Timed:
         increment: float | None = None,
         origin: Point | None = None,
     ) -> Iterator[Increment]:
-        return self.inner.follow(cast(System, _TimedSystem(system, self.clock)), history, increment, origin)
+        return self.inner.follow(_timed(system, self.clock), history, increment, origin)
 
 
 class _TimedSystem:
@@ -155,9 +155,6 @@ class _TimedSystem:
 
     def __init__(self, system: System, clock: _Clock) -> None:
         self._system, self._clock = system, clock
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self._system, name)
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         self._clock.count(len(q))
@@ -167,6 +164,21 @@ class _TimedSystem:
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
         self._clock.count(len(q), factored=True)
         return self._system.tangent(q, lam, forces)
+
+
+def _timed(system: System, clock: _Clock) -> System:
+    """The system, which tells the clock of its work and has the abilities that it had.
+
+    What it can do beside stands in its class, as `isinstance` of a protocol looks there, not at `__getattr__`, from
+    Python 3.12 on.
+    """
+
+    def handed_on(name: str) -> property:
+        return property(lambda _: getattr(system, name))
+
+    names = (name for name in dir(system) if not name.startswith("_") and name not in vars(_TimedSystem))
+    kind = type("_TimedSystem", (_TimedSystem,), {name: handed_on(name) for name in names})
+    return cast(System, kind(system, clock))
 
 
 def fold_file(

@@ -2,8 +2,9 @@
 
 A net of spring creases has very many branches, and which of them a path turns to says little about the folded sheet.
 In place of passing limit points one by one the springs are turned on a little, and the sheet moves, damped, to where
-its energy has a minimum, never through a closed hinge. So do sheets of paper, and so do programs that relax bars and
-hinges in time (Ghassaei et al. 2018).
+its energy has a minimum, never through a closed hinge: where one is about to close the others go on
+(`bh.solvers.stops`). So do sheets of paper, and so do programs that relax bars and hinges in time (Ghassaei et al.
+2018).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted
 from bh.solvers.newton import NEAR_SADDLE, Newton, Solution, line_search, roll_off
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, Point, extrapolate, lambda_after, point
+from bh.solvers.stops import KEPT, around
 from bh.solvers.system import Evaluation, Hinged, System
 
 Array = NDArray[np.float64]
@@ -28,7 +30,6 @@ STILL = 1e-10  # relative fall of the energy in a step that no longer moves the 
 CALM = 1e-6  # imbalance of a state at rest whose energy has stopped falling, in steps as soft as rounding
 STUCK = 40  # such steps, after which a face has collapsed and what moves is rounding
 TRIED = 14  # lengths of a step downhill, before the shift is raised
-KEPT = 0.2  # of the way of a hinge to closed that a step leaves
 MISMATCH = 0.2  # of the energy gained in an increment and the work done, behind which there is a jump
 GROWTH = 1.6  # of an increment behind one that Newton's method took
 BOLDER = 2.0  # behind a motion to rest, whose steps hardly hang on how far the springs were turned
@@ -168,7 +169,7 @@ def _downhill(
         q,
         lam,
         now,
-        factor.descend(now.residual),
+        around(system, q, lam, factor.descend(now.residual), factor, now.residual),
         TRIED,
         lambda trial: _too_far(system, q, trial, lam),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 
 import numpy as np
@@ -15,6 +16,7 @@ from bh.scene.load import parse_scene
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, point
 from bh.solvers.settling import NOTE, Settling
+from bh.solvers.system import Hindered, Hinged, Limited, Remembering
 from bh.solvers.walk import Walk, walk
 from tests.unit.test_newton import Arch
 from verification.studies.solver.benchmark_systems import VonMisesTruss
@@ -104,3 +106,20 @@ def test_the_clock_is_looked_at_within_an_increment() -> None:
     with pytest.raises(TimeUpError):
         walked(VonMisesTruss(), timed)  # type: ignore[arg-type]
     assert limit < clock.spent < limit + TANGENT + EVALUATION
+
+
+def test_what_is_timed_has_the_abilities_of_its_system() -> None:
+    """From Python 3.12 on `isinstance` of a protocol looks at the class, where `__getattr__` is not asked."""
+    from bh.commands.fold import _Clock, _timed
+
+    scene = parse_scene(NET.format(strategy="settling", by=0.6), "tests/data")
+    system = bh.trace(scene.model, strategy=scene.strategy).system(0)
+    timed = _timed(system, _Clock(Silent(), 1.0, 1.0))
+    for ability in (Hinged, Remembering, Limited, Hindered):
+        assert isinstance(system, ability)
+        wanted = [name for name in vars(ability) if not name.startswith("_")]
+        assert wanted
+        assert all(inspect.getattr_static(timed, name) is not None for name in wanted)
+    q = system.start()
+    assert isinstance(timed, Hinged)
+    assert timed.left_to_close(q, q, 0.0) == 1.0

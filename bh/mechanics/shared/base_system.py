@@ -25,7 +25,7 @@ from bh.model.ramp import Ramp
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix
 from bh.solvers.outcome import Outcome
-from bh.solvers.system import System, grows_ahead
+from bh.solvers.system import Stops, System, grows_ahead
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -317,6 +317,21 @@ class SupportedSheet:
     def left_to_close(self, q: Array, q_new: Array, lam: float) -> float:
         """Least part of its way to closed that a hinge is left with, of those in the zone of the locks; 1 for none."""
         return hinge_penetration.left_to_close(self.angles(q, lam), self.angles(q_new, lam))
+
+    def stops(self, q: Array, q_new: Array, lam: float) -> Stops:
+        """Hinges that a step would close, or turn too far; see `bh.solvers.system.Hinged`."""
+        return hinge_penetration.stops(self.angles(q, lam), self.angles(q_new, lam))
+
+    def turning(self, q: Array, lam: float, hinges: Ints) -> Array:
+        """(k, size) derivatives of the dihedral angles of some hinges of the mesh by the unknowns, rad / mm."""
+        nodes = self.mesh.topology.hinges[hinges]
+        gradients = dihedral_gradients(self.near(q, lam), nodes).reshape(-1, 4, 3)
+        out = np.empty((len(hinges), self.size))
+        for row, where, gradient in zip(out, nodes, gradients, strict=True):
+            forces = np.zeros_like(self.mesh.points)
+            forces[where] = gradient
+            row[:] = self.loads(forces)
+        return out
 
     def contact(self, q: Array, lam: float) -> str:
         """Which panels have met at a hinge that is not prescribed, or an empty string.

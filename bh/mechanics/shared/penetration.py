@@ -13,10 +13,14 @@ from bh.loading.load_step import hinge_name
 from bh.mechanics.shared.assembly import add_lower, add_product, rotate
 from bh.mechanics.shared.hinge_lock import ZONE, in_zone, lock, until_closed
 from bh.mechanics.shared.kinematics import INNER_OPTIONS, OPTIONS, add_hinge_hessian, hinge_geometry
+from bh.solvers.stops import KEPT
+from bh.solvers.system import Stops
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
 LARGEST_TURN = 1.3  # rad that any hinge may turn in one increment before the driver mistrusts it
+HALF = 0.5  # of it that a hinge is left with which is held back
+SHORT_OF = 0.8  # of the largest turn, for a hinge that would turn farther
 
 
 @njit(**OPTIONS)
@@ -129,6 +133,27 @@ def left_to_close(before: Array, after: Array) -> float:
     left = np.minimum(after, 2.0 * np.pi - after)
     had = np.minimum(np.minimum(before, 2.0 * np.pi - before), ZONE)
     return float((left / np.maximum(had, 1e-300)).min(initial=1.0, where=left < ZONE))
+
+
+def stops(before: Array, after: Array) -> Stops:
+    """Hinges that pass through closed, come too near to it or turn too far, and how far they may turn.
+
+    A hinge about to close may go half of what it has left within the zone of its lock, one that turns too far nearly
+    as far as is allowed.
+
+    Args:
+        before: (m,) dihedral angles, rad.
+        after: (m,) dihedral angles behind the step, rad.
+    """
+    turn = after - before
+    left, way = until_closed(after), until_closed(before)
+    had = np.minimum(way, ZONE)
+    closing = (np.abs(turn) > np.pi) | ((left < ZONE) & (left < KEPT * had))
+    hinges = np.flatnonzero(closing | (np.abs(turn) > LARGEST_TURN))
+    to_closed = np.where(before < np.pi, -1.0, 1.0) * (way - HALF * had)
+    wanted = np.where(closing, to_closed, SHORT_OF * LARGEST_TURN * np.sign(turn))
+    taken = (turn + np.pi) % (2.0 * np.pi) - np.pi
+    return Stops(hinges, wanted[hinges], taken[hinges])
 
 
 def panels_in_contact(mesh: SheetMesh, angles: Array, reference: Array, asked: NDArray[np.bool_]) -> str:
