@@ -60,6 +60,9 @@ def structured(
         raise MeshError("this pattern has no rails to rule between; use an unstructured mesh")
     if kind not in get_args(Kind):
         raise MeshError(f"mesh kind '{kind}' is not known; use one of {', '.join(get_args(Kind))}")
+    for name, given in (("rows", rows), ("along", along)):
+        if isinstance(given, str):
+            raise MeshError(f"{name} = {given!r} cannot be; use a whole number from 1")
     if not 1 <= rows <= 1e5 or int(rows) != rows:
         raise MeshError(f"rows = {rows} cannot be; use a whole number from 1")
     widths, heights = pattern.panel_sizes

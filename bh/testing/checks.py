@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from bh.analysis.richardson import Convergence, judged
 from bh.analysis.shapes import Distance, shape_distance
 from bh.errors import ModelError
@@ -20,15 +22,16 @@ from bh.testing.levels import (
     Level,
     Maker,
     Solvable,
-    solved,
     solved_level,
     solved_levels,
+    solved_path,
     told,
     wanted,
 )
 from bh.testing.levels import sizes as sizes_of
 from bh.testing.session import running
 from bh.testing.table import Asked, complaints, line, table
+from meshes.quantities import number
 
 PARTS = ("total", "stretching", "bending", "folding")
 
@@ -119,8 +122,20 @@ def assert_converges(  # noqa: PLR0913 - as above
     __tracebackhide__ = True
     asked = Asked(name, unit, order, within, expected, frozen, frozen_within)
     found = solved_levels(of, wanted(levels))
-    values = [float(quantity(each.state)) for each in found]
+    values = [_number(quantity(each.state), name) for each in found]
     return _held(asked, values, sizes_of(found), found)
+
+
+def _number(value: object, name: str) -> float:
+    __tracebackhide__ = True
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.item()
+    if not isinstance(value, int | float | np.number):
+        shape = f" of shape {value.shape}" if isinstance(value, np.ndarray) else ""
+        raise ModelError(
+            f"{name} is a {type(value).__name__}{shape} and no number; let the function return one"
+        )
+    return float(value)
 
 
 def assert_values_converge(  # noqa: PLR0913 - as above
@@ -209,7 +224,7 @@ def assert_reached(of: Solvable) -> Path | State:
     __tracebackhide__ = True
     if isinstance(of, State):
         return of
-    path = solved(of) if isinstance(of, Model) else of
+    path = solved_path(of)
     end = "" if path.reached else told(path)
     _tell("outcome", end or "reached", path.reached, outcome=path.outcome, value=None)
     assert path.reached, end
@@ -232,7 +247,7 @@ def assert_stable(of: Solvable) -> State:
     if isinstance(of, State):
         state, stable = of, of.stable
     else:
-        path = solved(of) if isinstance(of, Model) else of
+        path = solved_path(of)
         assert path.reached, told(path)
         state, stable = path[-1], path.stable
     why = {
@@ -245,13 +260,16 @@ def assert_stable(of: Solvable) -> State:
     return state
 
 
-def assert_same_shape(one: Solvable, two: Solvable, within: float, *, in_place: bool = False) -> Distance:
+def assert_same_shape(
+    one: Solvable, two: Solvable, within: float | str, *, in_place: bool = False
+) -> Distance:
     """Two folded sheets have the same shape, whatever their meshes and formulations.
 
     Args:
         one: a model (solved first), a path (its last state) or a state.
         two: another of the same flat sheet.
-        within: the largest distance of a point of the sheet in one from the same point in the other, mm.
+        within: the largest distance of a point of the sheet in one from the same point in the other, mm,
+            or with a unit.
         in_place: compare where they are; else the second is moved rigidly onto the first before.
 
     Returns:
@@ -262,14 +280,15 @@ def assert_same_shape(one: Solvable, two: Solvable, within: float, *, in_place: 
         ModelError: they are not of the same flat sheet.
     """
     __tracebackhide__ = True
+    asked = number(within, "length")
     found = shape_distance(solved_level(one).state, solved_level(two).state, in_place=in_place)
     text = (
         f"largest distance {found.largest:.4g} mm at ({found.at[0]:.4g}, {found.at[1]:.4g}) of the flat sheet"
     )
     text += f", rms {found.rms:.4g} mm"
-    same = found.largest <= within
-    _tell("distance of shapes", text, same, value=found.largest, unit="mm", reference=0.0, tolerance=within)
-    assert same, f"shapes differ: {text}; {within:g} mm asked"
+    same = found.largest <= asked
+    _tell("distance of shapes", text, same, value=found.largest, unit="mm", reference=0.0, tolerance=asked)
+    assert same, f"shapes differ: {text}; {asked:g} mm asked"
     return found
 
 

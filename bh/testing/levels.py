@@ -72,6 +72,7 @@ def wanted(levels: Sequence[L] | None) -> tuple[L, ...]:
     Raises:
         ModelError: there are fewer, or one stands twice.
     """
+    __tracebackhide__ = True
     test = running()
     marked = None if test is None else test.levels
     found = tuple(levels) if levels is not None else cast("tuple[L, ...]", marked or LEVELS)
@@ -96,6 +97,7 @@ def solved_levels(of: Model | Maker[L], levels: Sequence[L]) -> list[Level]:
         ModelError: the levels do not refine, or the model cannot be refined by itself.
         AssertionError: a level does not reach the end of its steps.
     """
+    __tracebackhide__ = True
     maker: Maker[L] = _refining(of) if isinstance(of, Model) else of
     if not callable(maker):
         raise ModelError(
@@ -144,6 +146,7 @@ def solved_level(made: Solvable, level: object = None) -> Level:
         ModelError: it is none of them.
         AssertionError: the end of the steps is not reached.
     """
+    __tracebackhide__ = True
     if isinstance(made, State):
         return Level(level, made, len(made.mesh.triangles), made.mesh.cells)
     if not isinstance(made, Model | Path):
@@ -188,9 +191,19 @@ def told(path: Path) -> str:
 # ------------------------------------------------------------------------------------- solved levels on disk
 
 
-def solved(model: Model) -> Path:
-    """The path of a model, from the folder of solved levels where it is there."""
-    return _traced(model)[0]
+def solved_path(of: Model | Path) -> Path:
+    """The path of a model, from the folder of solved levels where it is there; a path as it is.
+
+    Args:
+        of: one of them.
+
+    Raises:
+        ModelError: it is none.
+    """
+    __tracebackhide__ = True
+    if not isinstance(of, Model | Path):
+        raise ModelError(f"a {type(of).__name__} cannot be checked; give a model, a path or a state")
+    return of if isinstance(of, Path) else _traced(of)[0]
 
 
 def _traced(model: Model) -> tuple[Path, bool]:

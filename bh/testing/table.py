@@ -6,7 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from bh.analysis.richardson import Convergence, Verdict
+from bh.errors import ModelError
 from bh.testing.levels import Level
 
 
@@ -21,6 +24,29 @@ class Asked:
     expected: float | None
     frozen: float | None
     frozen_within: float
+
+    def __post_init__(self) -> None:
+        """Refuse what nothing could be held against.
+
+        Raises:
+            ModelError: one line that names the option.
+        """
+        for key, value, positive in (
+            ("order", self.order, True),
+            ("within", self.within, True),
+            ("expected", self.expected, False),
+            ("frozen", self.frozen, False),
+            ("frozen_within", self.frozen_within, True),
+        ):
+            if value is None:
+                continue
+            numeric = isinstance(value, int | float | np.number) and math.isfinite(value)
+            if not numeric or (positive and value <= 0.0):
+                raise ModelError(f"{key} = {value!r} cannot be; give a {'positive ' * positive}number")
+        if self.within >= 1.0 and self.expected != 0.0:  # a limit of 0 is met to within a value of its unit
+            raise ModelError(
+                f"within = {self.within:g} holds for all values; it is a part of them: 0.05 is 5 %"
+            )
 
 
 def complaints(found: Convergence, asked: Asked) -> list[str]:

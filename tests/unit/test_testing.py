@@ -277,3 +277,32 @@ def test_plugin_is_registered_and_loads_nothing() -> None:
     loaded = {name.split(".")[0] for name in json.loads(done.stdout)}
     assert "bh" in loaded
     assert not loaded & {"numpy", "scipy", "numba", "meshes", "fem", "verification", "pydantic"}
+
+
+@pytest.mark.parametrize(
+    ("check", "of", "asked", "told"),
+    [
+        (assert_energy_converges, folded, {"within": 5}, "5 holds for all values; .* 0.05 is 5 %"),
+        (assert_energy_converges, folded, {"within": -1}, "within = -1 cannot be; give a positive number"),
+        (assert_energy_converges, folded, {"order": "2"}, "order = '2' cannot be; give a positive number"),
+        (
+            assert_converges,
+            folded,
+            {"quantity": lambda state: state.points, "name": "tip"},
+            r"tip is a ndarray of shape \(\d+, 3\) and no number",
+        ),
+        (assert_stable, "out", {}, "a str cannot be checked; give a model, a path or a state"),
+        (assert_reached, folded, {}, "a function cannot be checked"),
+        (assert_same_shape, folded(1), {"two": folded(2), "within": "1deg"}, '"1deg" is no length'),
+    ],
+)
+def test_wrong_use_is_one_line(check: Any, of: object, asked: dict[str, object], told: str) -> None:
+    with pytest.raises(bh.InputError, match=told) as caught:
+        check(of, **asked)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_distance_may_have_a_unit() -> None:
+    assert assert_same_shape(folded(1), folded(2), within="1mm").largest < 1.0
+    with pytest.raises(AssertionError, match=r"1e-05 mm asked"):
+        assert_same_shape(folded(1), folded(2), within="0.01um")
