@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, Tether
     from bh.model.crease_law import CreaseLaw
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
+    from bh.model.imperfection import RandomField, imperfect
     from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
     from bh.model.model import Model
     from bh.model.pinch import Pinch
@@ -67,6 +68,7 @@ _NAMES = {
     "bh.model.actuations": "Displace Fold Force Indenter Moment Pull Tether",
     "bh.model.crease_law": "CreaseLaw",
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
+    "bh.model.imperfection": "RandomField imperfect",
     "bh.model.loads": "AreaForce EdgeMoment LineForce Pressure",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
@@ -153,6 +155,7 @@ __all__ = [
     "Pinch",
     "Pressure",
     "Pull",
+    "RandomField",
     "Refinement",
     "Remark",
     "RigidBody",
@@ -175,6 +178,7 @@ __all__ = [
     "allow_plugins",
     "calibrate",
     "depth",
+    "imperfect",
     "load_scene",
     "read",
     "remarks",

@@ -107,7 +107,11 @@ class Calibration:
         return tuple(dict.fromkeys(found))
 
     def as_dict(self) -> dict[str, object]:
-        """All of it as plain data for JSON; what is not known is None."""
+        """All of it as plain data for JSON; what is not known is None.
+
+        Returns:
+            by key.
+        """
         return {
             "parameters": {
                 name: {"value": value, "error": _number(error), "interval": [_number(x) for x in interval]}

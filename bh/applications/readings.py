@@ -121,6 +121,9 @@ class Measured:
     def at(self, model: Model) -> tuple[int, ...]:
         """The steps of a model at whose ends the values are.
 
+        Returns:
+            numbers from 0, one a value.
+
         Raises:
             ModelError: there are more or fewer than values, or the model has no such step.
         """

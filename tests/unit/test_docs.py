@@ -47,6 +47,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: area_force": loads.AreaForceTable,
     "steps: edge_moment": loads.EdgeMomentTable,
     "springs": loads.SpringTable,
+    "imperfection": loads.ImperfectionTable,
     "steps: press": scene_bodies.PressTable,
     "steps: tether": scene_bodies.TetherTable,
     "steps: until": schema.UntilTable,
