@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from bh.model.crease_law import CreaseLaw
     from bh.model.growth import Expand
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
+    from bh.model.imperfection import RandomField, imperfect
     from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
     from bh.model.model import Model
     from bh.model.pinch import Pinch
@@ -70,6 +71,7 @@ _NAMES = {
     "bh.model.crease_law": "CreaseLaw",
     "bh.model.growth": "Expand",
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
+    "bh.model.imperfection": "RandomField imperfect",
     "bh.model.loads": "AreaForce EdgeMoment LineForce Pressure",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
@@ -158,6 +160,7 @@ __all__ = [
     "Pinch",
     "Pressure",
     "Pull",
+    "RandomField",
     "Refinement",
     "Remark",
     "RigidBody",
@@ -181,6 +184,7 @@ __all__ = [
     "allow_plugins",
     "calibrate",
     "depth",
+    "imperfect",
     "load_scene",
     "read",
     "remarks",

@@ -107,10 +107,10 @@ class Calibration:
         return tuple(dict.fromkeys(found))
 
     def as_dict(self) -> dict[str, object]:
-        """All of it as plain data for JSON.
+        """All of it as plain data for JSON; what is not known is None.
 
         Returns:
-            parameters, covariance and residuals by name; what is not known is None.
+            by key.
         """
         return {
             "parameters": {

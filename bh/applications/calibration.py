@@ -27,6 +27,7 @@ __all__ = ["Calibration", "Measured", "calibrate", "fit"]
 
 Array = NDArray[np.float64]
 NUDGE = 1e-3  # of a parameter's range or value: its central difference
+SAME = 1e-6  # of the largest datum: predictions by states beside and by a whole path are one
 BLIND = 0.5  # relative standard deviation from which on a combination of parameters is not told by the data
 RANK = 1e-7  # smallest singular value over the largest, below which nothing at all is told
 
@@ -46,8 +47,9 @@ def calibrate(
 ) -> Calibration:
     """Find parameters of a model by what was measured at the ends of its steps.
 
-    A bounded trust region (SciPy's `least_squares`) moves all parameters at once; derivatives are central differences,
-    whose solutions begin at the states beside them (`bh.solving.neighbour`) and take an iteration or two a step.
+    A bounded trust region (SciPy's `least_squares`) moves all parameters at once; derivatives are central differences.
+    Solutions begin at the states of those before (`bh.solving.neighbour`), of which a step takes a few iterations; the
+    last one is solved from its beginning, and where that is another state everything is.
 
     Args:
         model: with all its steps; data are of their ends. Or what makes it of the parameters by their names.
@@ -73,11 +75,19 @@ def calibrate(
     if len({each.noise is None for each in sets}) > 1 or (len(sets) > 1 and sets[0].noise is None):
         raise ModelError("several kinds of data are weighed by their noise; give each a sigma")
     sigma = np.concatenate([np.full(len(each.measured()), each.noise or 1.0) for each in sets])
-    solver = Solver(lambda values: build(dict(zip(names, values.tolist(), strict=True))), sets)
     known = sets[0].noise is not None
-    fitted = fit(
-        solver.predicted, measured, sigma if known else None, free, solver.beside, starts, seed, progress
-    )
+
+    def at(values: Array) -> Model:
+        return build(dict(zip(names, values.tolist(), strict=True)))
+
+    def fitted_by(solver: Solver) -> Calibration:
+        weights = sigma if known else None
+        return fit(solver.predicted, measured, weights, free, solver.beside, starts, seed, progress)
+
+    fitted = fitted_by(Solver(at, sets, whole=False))
+    apart = np.abs(Solver(at, sets, whole=True).predicted(fitted.values) - measured - fitted.residuals)
+    if not (apart <= (1e-3 * sigma if known else SAME * np.abs(measured).max())).all():
+        fitted = fitted_by(Solver(at, sets, whole=True))  # the way led to another branch
     rows = np.cumsum([len(each.measured()) for each in sets])[:-1]
     noise = 1.0 if known else math.sqrt(fitted.misfit / max(len(measured) - len(names), 1))
     parts = tuple(
@@ -86,15 +96,15 @@ def calibrate(
             sets, np.split(measured, rows), np.split(fitted.residuals, rows), strict=True
         )
     )
-    return replace(fitted, model=build(dict(zip(names, fitted.values.tolist(), strict=True))), parts=parts)
+    return replace(fitted, model=at(fitted.values), parts=parts)
 
 
 class Solver:
     """Predictions of a model, and those beside them that begin at its states."""
 
-    def __init__(self, build: Callable[[Array], Model], data: Sequence[Reading]) -> None:
-        """Of what makes the model of parameters (n,), and the data."""
-        self.build, self.data = build, data
+    def __init__(self, build: Callable[[Array], Model], data: Sequence[Reading], whole: bool) -> None:
+        """Of what makes the model of parameters (n,), and the data; `whole` solves every path from its beginning."""
+        self.build, self.data, self.whole = build, data, whole
         self._paths: dict[bytes, Path] = {}
         self._last = b""
 
@@ -104,7 +114,9 @@ class Solver:
         Raises:
             ModelError: the first path does not.
         """
-        path = trace(self.build(values), estimate=False, warn=False)
+        model = self.build(values)
+        path = None if self.whole or not self._paths else neighbour(self._paths[self._last], model)
+        path = trace(model, estimate=False, warn=False) if path is None else path
         if not self._paths:
             path.require()
         elif not path.reached:
@@ -114,11 +126,14 @@ class Solver:
         return self._read(path)
 
     def beside(self, values: Array, base: Array) -> Array:
-        """(m,) the same next to a point at which the model has been solved.
+        """The same at values next to others where the model has been solved.
 
         Args:
-            values: (n,) of the parameters.
-            base: (n,) of that point.
+            values: (n,) parameters.
+            base: (n,) those that have been asked for.
+
+        Returns:
+            (m,) values of the model.
         """
         model = self.build(values)
         path = neighbour(self._paths.get(base.tobytes(), self._paths[self._last]), model)

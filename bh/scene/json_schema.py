@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from bh.scene import tables
 from bh.scene.bodies import BODIES
-from bh.scene.loads import SpringTable
+from bh.scene.loads import ImperfectionTable, SpringTable
 from bh.scene.moving import MoveTable
 from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import Table
@@ -57,6 +57,7 @@ def schema() -> Schema:
         "mesh": {"anyOf": _tables(found, MESHES)},
         "supports": {"type": "array", "items": support},
         "springs": {"type": "array", "items": _table(found, SpringTable)},
+        "imperfection": _table(found, ImperfectionTable),
         "accuracy": {"anyOf": [{"type": "number"}, _table(found, tables.AccuracyTable)]},
         "contact": {
             "anyOf": [{"enum": ["thickness", "auto", False]}, {"type": "number", "exclusiveMinimum": 0}]

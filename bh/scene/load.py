@@ -27,7 +27,7 @@ from bh.scene.bodies import BODIES, body
 from bh.scene.changes import set_keys
 from bh.scene.contact import contact_of
 from bh.scene.crease_tables import crease_law
-from bh.scene.loads import check_springs, springs_of
+from bh.scene.loads import check_springs, not_flat, springs_of
 from bh.scene.meshing import Drawn, mesh_of
 from bh.scene.moving import moved
 from bh.scene.reading import (
@@ -67,6 +67,7 @@ SECTIONS = (
     "model",
     "supports",
     "springs",
+    "imperfection",
     "creases",
     "steps",
     "outputs",
@@ -226,7 +227,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     numbers = [i for i, legs in enumerate(asked) for _ in legs]
     drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data, sheet.t)
     model = Model(
-        mesh=drawn.mesh,
+        mesh=not_flat(data, drawn.mesh),
         sheet=sheet,
         zones=zones,
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),

@@ -115,7 +115,7 @@ def test_recovery_in_a_hundred_repeats() -> None:
     ends = {state.step: state for state in bh.trace(truth, estimate=False).require()}
     force = np.array([ends[k].reaction("crease:crease")[2] for k in sorted(ends)])
     angle = np.array([ends[k].fold_angle("crease").mean() for k in sorted(ends)])
-    free = {"sheet.E": (2500.0, 500.0, 20000.0), "creases.crease.Lstar": (50.0, 2.0, 200.0)}
+    free = {"sheet.E": (3000.0, 500.0, 20000.0), "creases.crease.Lstar": (30.0, 2.0, 200.0)}
     rng, inside = np.random.default_rng(11), np.zeros(2)
     for _ in range(100):
         noisy = force + 0.01 * float(force.mean()) * rng.normal(size=3), angle + 0.003 * rng.normal(size=3)

@@ -50,6 +50,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: edge_moment": loads.EdgeMomentTable,
     "springs": loads.SpringTable,
     "steps: expand": schema.ExpandTable,
+    "imperfection": loads.ImperfectionTable,
     "steps: press": scene_bodies.PressTable,
     "steps: tether": scene_bodies.TetherTable,
     "steps: until": schema.UntilTable,
