@@ -39,6 +39,7 @@ RESERVED = 0.2  # of it is left for those that follow, however far a scene has c
 # s that an evaluation of a system takes, a tangent with its factors, and an unknown of either (one core of 2.5 GHz):
 # time is counted by work, so that the scene that is kept does not hang on the machine, or on what else runs on it
 EVALUATION, TANGENT, UNKNOWN, FACTORED = 1e-4, 3e-4, 5e-7, 1e-5
+SECONDS = 150.0  # so counted, 50 to 120 s of a slow core: less than a minute of a present one
 HALFWAY = (
     0.5  # of the way: a scene that has come so far keeps the time, as the next one would have to be faster
 )
@@ -186,7 +187,7 @@ def fold_file(
     folder: Path,
     wish: Wish,
     *,
-    seconds: float = 60.0,
+    seconds: float = SECONDS,
     progress: bool | ProgressMeter = False,
     force: bool = False,
 ) -> Folded:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bh.commands.fold import Folded, fold_file
+from bh.commands.fold import SECONDS, Folded, fold_file
 from bh.errors import InputError
 from bh.runtime.progress import ProgressMeter
 from bh.scene.folding import Wish
@@ -33,7 +33,7 @@ def fold_sheets(
     folder: Path,
     wish: Wish,
     *,
-    seconds: float = 60.0,
+    seconds: float = SECONDS,
     progress: bool | ProgressMeter = False,
     force: bool = False,
 ) -> FoldedSheets:

@@ -62,9 +62,9 @@ def fold(  # noqa: PLR0913 - the options of a command line
     seconds: Annotated[
         float,
         typer.Option(
-            "--seconds", metavar="60s", parser=a_time, help="For solving; counted by work, not by the clock."
+            "--seconds", metavar="150s", parser=a_time, help="For solving; counted by work, not by the clock."
         ),
-    ] = 60.0,
+    ] = 150.0,
     force: Annotated[bool, typer.Option("--force", help="Write over a scene that is there.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
