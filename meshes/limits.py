@@ -30,7 +30,7 @@ class Limits:
         transforms: of an SVG file in the same way; some 50 microseconds each to read.
         style_characters: of the style sheets of an SVG file.
         attribute_characters: of one attribute of an SVG file that is no path, and no editor's own.
-        clips: elements of an SVG file that are clipped, some 3 ms each.
+        clips: elements of an SVG file that are clipped, some 3 ms each, and pieces that are left of them.
         clip_vertices: of clip paths, counted again for every line that they cut; up to 30 microseconds each.
         lines: of a drawing, without those that are ignored.
         vertices: of a drawing's lines, once curves are chords; numbers of its paths, values of a DXF file.

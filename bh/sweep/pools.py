@@ -340,6 +340,7 @@ def _local_cluster(kind: type[LocalCluster], workers: int, security: Security) -
     """A cluster of processes on this machine, or nothing at all where its start is interrupted."""
     import logging
 
+    import dask
     from distributed.utils import LoopRunner
 
     with (
@@ -348,17 +349,21 @@ def _local_cluster(kind: type[LocalCluster], workers: int, security: Security) -
         runner = LoopRunner()
         runner.start()
     cluster: LocalCluster = object.__new__(kind)
+    silent: dict[str, list[str]] = {
+        f"distributed.{each}.http.routes": [] for each in ("scheduler", "worker", "nanny")
+    }
     try:
-        kind.__init__(
-            cluster,
-            n_workers=workers,
-            threads_per_worker=1,
-            dashboard_address=None,
-            silence_logs=50,
-            protocol="tls://",
-            loop=runner.loop,
-            security=security,
-        )
+        with dask.config.set(silent):  # its web servers know no keys, and tell what is run
+            kind.__init__(
+                cluster,
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address=":0",
+                silence_logs=50,
+                protocol="tls://",
+                loop=runner.loop,
+                security=security,
+            )
     except KeyboardInterrupt:
         # what is half begun cannot be closed in good order, as Dask would try at exit; its processes end with this one
         cluster.shutdown_on_close = False

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from meshes.curves import Array
 from meshes.errors import FileFormatError
@@ -13,6 +14,7 @@ from meshes.io.fold_frame import Frame, Side, side
 from meshes.limits import check_limit
 from meshes.topology import Ints
 
+AT_ONCE = 64  # ways that are looked along together
 BACK = 0.87  # cosine of the angle, 30 degrees, within which a tie would run back along its line
 
 
@@ -85,12 +87,10 @@ def _where(xy: Array, end: int, before: int, others: Ints, sight: _Sight, avoid:
     along = xy[before] - xy[end]
     order = np.argsort((away**2).sum(axis=1), kind="stable")
     back = away @ along > BACK * np.linalg.norm(away, axis=1) * np.linalg.norm(along)
-    nearest = [(int(others[k]), not back[k] and int(others[k]) not in avoid) for k in order.tolist()]
-    for fresh in (True, False):
-        for other, good in nearest:
-            if other != end and good == fresh and sight.free(end, other):
-                return other
-    return None
+    good = (~back & ~np.isin(others, list(avoid)))[order]
+    nearest = others[order]
+    found = sight.first(end, nearest[good])
+    return sight.first(end, nearest[~good]) if found is None else found
 
 
 class _Sight:
@@ -99,7 +99,7 @@ class _Sight:
     def __init__(self, xy: Array, edges: list[Side]) -> None:
         import shapely
 
-        self.xy, self.edges = xy, edges
+        self.xy, self.edges = xy, np.array(edges)
         self.tree = shapely.STRtree(shapely.linestrings(xy[np.array(edges)]))
         self.joined = {side(*edge) for edge in edges}
         self.added: list[Side] = []
@@ -115,30 +115,44 @@ class _Sight:
         self.tied.update(pair)
         self.lines.append(shapely.LineString(self.xy[list(pair)]))
 
-    def free(self, end: int, other: int) -> bool:
-        """Whether a tie between two vertices that are not joined meets no line but at their own ends there."""
+    def first(self, end: int, others: Ints) -> int | None:
+        """The first of some vertices to which a tie from an end meets no line but at its own ends."""
         import shapely
 
-        pair = side(end, other)
-        if pair in self.joined:
-            return False
-        line = shapely.LineString(self.xy[list(pair)])
-        far = 1e-9 * line.length
-        near = [self.edges[k] for k in self.tree.query(line, predicate="dwithin", distance=far).tolist()]
-        if self.lines:
-            near += [self.added[k] for k in np.flatnonzero(shapely.dwithin(self.lines, line, far))]
-        return not any(self._blocks(pair, segment) for segment in near)
+        others = np.array(
+            [v for v in others.tolist() if v != end and side(end, v) not in self.joined], dtype=int
+        )
+        for start in range(0, len(others), AT_ONCE):
+            some = others[start : start + AT_ONCE]
+            ways = shapely.linestrings(
+                np.stack((np.broadcast_to(self.xy[end], (len(some), 2)), self.xy[some]), axis=1)
+            )
+            far = 1e-9 * shapely.length(ways)
+            way, edge = self.tree.query(ways, predicate="dwithin", distance=far)
+            met = way[self._in_the_way(end, some[way], self.edges[edge])]
+            for k in np.setdiff1d(np.arange(len(some)), met).tolist():
+                ties = np.array(self.added, dtype=int).reshape(-1, 2)
+                if self.lines:
+                    ties = ties[shapely.dwithin(self.lines, ways[k], far[k])]
+                if not self._in_the_way(end, np.full(len(ties), some[k]), ties).any():
+                    return int(some[k])
+        return None
 
-    def _blocks(self, pair: Side, segment: Side) -> bool:
-        """Whether a segment that a tie touches is in its way: all but those that leave its ends otherwise."""
-        shared = set(segment) & set(pair)
-        if not shared:
-            return True
-        at = next(iter(shared))
-        a = self.xy[sum(pair) - at] - self.xy[at]
-        b = self.xy[sum(segment) - at] - self.xy[at]
-        flat = abs(a[0] * b[1] - a[1] * b[0]) <= 1e-9 * np.linalg.norm(a) * np.linalg.norm(b)
-        return bool(flat and a @ b > 0.0)
+    def _in_the_way(self, end: int, others: Ints, segments: Ints) -> NDArray[np.bool_]:
+        """(m,) which segments (m, 2) that a tie from an end to another vertex (m,) touches are in its way.
+
+        All are but those that leave one of its ends in another direction.
+        """
+        own = (segments == end).any(axis=1)
+        shared = own | (segments == others[:, None]).any(axis=1)
+        at = np.where(own, end, others)
+        a = self.xy[end + others - at] - self.xy[at]
+        b = self.xy[np.where(shared, segments.sum(axis=1) - at, at)] - self.xy[at]
+        flat = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) <= 1e-9 * np.linalg.norm(
+            a, axis=1
+        ) * np.linalg.norm(b, axis=1)
+        found: NDArray[np.bool_] = ~shared | (flat & ((a * b).sum(axis=1) > 0.0))
+        return found
 
 
 def _parts(edges: list[Side], count: int) -> Ints:

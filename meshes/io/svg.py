@@ -77,7 +77,7 @@ def read_svg(path: str | os.PathLike[str]) -> Strokes:
 
 
 def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
-    number, clipping = 0, 0
+    number, clipping, pieces = 0, 0, 0
     for shape, layer, clips in _shapes(se, picture, "", ()):
         colour, unknown = _colour(shape)
         if (colour is None and not unknown) or _hidden(shape):
@@ -108,7 +108,10 @@ def _strokes(se: Any, picture: Any) -> Iterator[Stroke]:
                 "this drawing, counted for every line that is cut,",
                 FileFormatError,
             )
-            yield from _clipped(stroke, cutting)
+            left = list(_clipped(stroke, cutting))
+            pieces += len(left) if cutting else 0
+            check_limit("clips", pieces, "this drawing, once its lines are clipped,", FileFormatError)
+            yield from left
 
 
 def _segments(se: Any, shape: Any) -> Iterator[tuple[int, list[Any]]]:

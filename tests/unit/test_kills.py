@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import http.client
 import json
 import os
 import signal
@@ -327,6 +329,27 @@ def test_a_sweep_is_written_by_one(tmp_path: Path) -> None:
         bh.sweep.run(dict, points, tmp_path / "a.nc", pool=0)
 
 
+def told_by_web_servers() -> list[str]:
+    """What the web servers of this process and its children tell of Dask to who has no key."""
+    psutil = pytest.importorskip("psutil")
+    me, told = psutil.Process(), []
+    ports = {
+        connection.laddr.port
+        for process in (me, *me.children(recursive=True))
+        for connection in process.net_connections("inet")
+        if connection.status == "LISTEN"
+    }
+    assert ports
+    for port in sorted(ports):
+        for page in ("health", "info/main/workers.html", "json/counts.json", "json/identity.json", "metrics"):
+            with contextlib.suppress(OSError, http.client.HTTPException):
+                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=2.0)
+                connection.request("GET", f"/{page}")
+                if connection.getresponse().status != 404:
+                    told.append(f"{port}/{page}")
+    return told
+
+
 def test_a_cluster_of_ones_own_is_not_open_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the keys of this process nobody is let in."""
     pytest.importorskip("distributed")
@@ -338,6 +361,7 @@ def test_a_cluster_of_ones_own_is_not_open_to_others(monkeypatch: pytest.MonkeyP
         for address in (pool.address, pool.address.replace("tls://", "tcp://")):
             with pytest.raises((OSError, TypeError)):
                 reach(address)
+        assert told_by_web_servers() == []
     finally:
         pool.close()
 

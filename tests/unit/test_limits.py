@@ -11,6 +11,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import shapely
 from ezdxf.filemanagement import new
 
 import bh
@@ -19,6 +20,8 @@ from bh.sweep.file import load_sweep
 from meshes.choices import first_mesh
 from meshes.errors import FileFormatError, InputError
 from meshes.io import read_fold, read_pattern, svg
+from meshes.io.fold_frame import Frame
+from meshes.io.loose_ends import tie_ends
 from meshes.limits import Limits, limits
 
 REST = """
@@ -313,6 +316,10 @@ ANGLES = [1.01 * n * math.pi for n in range(99)]
 STAR = "M" + " L".join(f"{50 + 40 * math.cos(angle):.3f} {50 + 40 * math.sin(angle):.3f}" for angle in ANGLES)
 
 
+# a clip path of eight bars, which leave eight pieces of a line across
+COMB = CLIP.format(" ".join(f"M{i} 0 h.5 v99 h-.5 Z" for i in range(1, 9)))
+
+
 @pytest.mark.parametrize(
     ("name", "most", "inside", "words"),
     [
@@ -351,6 +358,7 @@ STAR = "M" + " L".join(f"{50 + 40 * math.cos(angle):.3f} {50 + 40 * math.sin(ang
         ("vertices", 20, f"<defs>{PATH}</defs>{9 * USE}", "vertices, more"),
         ("clips", 5, CLIP.format("M0 0 L9 0 L9 9 Z") + 9 * CLIPPED, "6 clips, more than 5"),
         ("clip_vertices", 10, CLIP.format("M0 0 L5 0 L5 5 Z") + 9 * CLIPPED, "clip vertices, more than 10"),
+        ("clips", 5, COMB + CLIPPED, "once its lines are clipped, has 8 clips, more than 5"),
         ("clips", 5, f"<style>a{{b:{'(' * 5000}{')' * 5000}}}</style>{LINE}", "brackets in brackets"),
         ("clips", 5, CLIP.format(STAR) + CLIPPED, "crosses itself more than 50 times"),
     ],
@@ -365,6 +373,25 @@ def test_svg_files_are_counted_before_they_are_read(
     )
     with pytest.raises(FileFormatError, match=words):
         svg.read_svg(file)
+
+
+def test_loose_ends_are_counted_and_many_are_tied_in_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short cuts on a sheet: every end is tied by a flat edge that crosses nothing (3 s of two hundred cuts before)."""
+    corners = [(0.0, 0.0), (20.0, 0.0), (20.0, 16.0), (0.0, 16.0)]
+    marks = [end for x in range(2, 18) for y in range(2, 14) for end in ((x, y), (x + 0.4, y + 0.2))]
+    points = np.array([(x, y, 0.0) for x, y in [*corners, *marks]])
+    edges = [(0, 1), (1, 2), (2, 3), (0, 3), *((k, k + 1) for k in range(4, len(points), 2))]
+    frame = Frame(points, edges, ["B"] * 4 + ["C"] * (len(marks) // 2), None, [])
+    began = time.process_time()
+    tied = tie_ends(frame)
+    assert time.process_time() - began < 2.0
+    assert set(np.ravel(tied.edges[len(edges) :]).tolist()) >= set(range(4, len(points)))
+    lines = shapely.linestrings(points[np.array(tied.edges), :2])
+    one, two = shapely.STRtree(lines).query(lines, predicate="crosses")
+    assert len(one) == len(two) == 0
+    monkeypatch.setenv("BH_LIMIT_LOOSE_ENDS", "100")
+    with pytest.raises(FileFormatError, match="384 loose ends, more than 100"):
+        tie_ends(frame)
 
 
 def test_what_draws_no_line_is_not_read(tmp_path: Path) -> None:
