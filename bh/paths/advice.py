@@ -16,3 +16,19 @@ ADVICE: dict[Outcome, str] = {
     Outcome.TARGET_MISSED: "let the actuation go further, or ask for a value that occurs",
     Outcome.UNFINISHED: "go on with resume",
 }
+
+LETTING_GO = (
+    "what is let go of carries much that nothing else can: fold the sheet free and hold it as it lies (hold), in place "
+    "of a support from the beginning, or let go of less at a time"
+)
+
+
+def advice(outcome: Outcome, letting_go: bool = False) -> str:
+    """What to try after an early end; empty where nothing general is known.
+
+    Args:
+        outcome: of the path.
+        letting_go: whether it ended where a step begins to release supports.
+    """
+    early = outcome in (Outcome.UNSTABLE, Outcome.STALLED, Outcome.LIMIT_POINT)
+    return LETTING_GO if letting_go and early else ADVICE.get(outcome, "")

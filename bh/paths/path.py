@@ -20,7 +20,7 @@ from bh.loading.builder import load_steps
 from bh.loading.load_step import LoadStep, StepEnd, open_ends
 from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
-from bh.paths.advice import ADVICE
+from bh.paths.advice import advice
 from bh.paths.provenance import provenance_of
 from bh.paths.record import Record, StepOutcome, check_rows, check_sizes
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
@@ -115,10 +115,10 @@ class Path:
         last = self.records[-1] if self.records else None
         lam = last.lam if last is not None and last.step == number - 1 else 0.0
         reason = f" ({self.reason})" if self.reason else ""
-        advice = ADVICE.get(self.outcome, "")
+        mend = advice(self.outcome, lam == 0.0 and bool(self.model.steps[number - 1].release))
         return (
             f"the path ended early, {self.outcome}, in step {number} of {len(self.model.steps)} at lambda {lam:.3g}"
-            f"{reason}" + (f"; {advice}" if advice else "")
+            f"{reason}" + (f"; {mend}" if mend else "")
         )
 
     def require(self) -> Path:

@@ -14,13 +14,15 @@ from bh.solvers.system import System
 
 # stiffness of a motion, in parts of the typical one, that is rounding; next to a critical point it is merely small
 FREE = 1e-15
+FALLING = -1e-9  # the same, of a motion that gains energy: no rounding any more
 
 
 def diagnose(system: System, failure: Increment) -> Increment:
     """A failed increment with the outcome that names its reason, where the last state tells it.
 
     In this order: what the system itself sees (contact of panels, loads that turn a free sheet), a motion without
-    stiffness ("mechanism"), and what the strategy has found ("limit-point", "bifurcation", "stalled").
+    stiffness ("mechanism") or with a negative one ("unstable"), and what the strategy has found ("limit-point",
+    "bifurcation", "stalled").
 
     Args:
         system: whose equilibrium is sought.
@@ -33,16 +35,19 @@ def diagnose(system: System, failure: Increment) -> Increment:
         return replace(failure, outcome=outcome, note=f"{reason}; {failure.note}")
     if failure.outcome is not Outcome.STALLED:
         return failure
-    motion = free_motion(system, failure)
-    if motion:
-        return replace(
-            failure, outcome=Outcome.MECHANISM, note=f"{motion} without resistance; {failure.note}"
-        )
-    return failure
+    motion, stiffness = free_motion(system, failure)
+    if not motion:
+        return failure
+    if stiffness < FALLING:
+        note = f"the sheet would leave its last state: {motion}, and gains energy by it; {failure.note}"
+        return replace(failure, outcome=Outcome.UNSTABLE, note=note)
+    return replace(failure, outcome=Outcome.MECHANISM, note=f"{motion} without resistance; {failure.note}")
 
 
-def free_motion(system: System, failure: Increment) -> str:
-    """The motion of the last state that nothing resists, in words, or an empty string.
+def free_motion(system: System, failure: Increment) -> tuple[str, float]:
+    """The motion of the last state that nothing resists, in words, and its stiffness in parts of the typical one.
+
+    Empty, and 0, where there is none.
 
     Args:
         system: whose equilibrium is sought.
@@ -53,8 +58,10 @@ def free_motion(system: System, failure: Increment) -> str:
     try:
         stiffness, mode = lowest_mode(matrix, system.size, system.primal)
     except IndefiniteError:
-        return ""
+        return "", 0.0
     rng = np.random.default_rng(3)
     probe = np.concatenate((rng.normal(size=system.primal), np.zeros(system.size - system.primal)))
     typical = float(np.linalg.norm((matrix @ probe)[: system.primal]) / np.linalg.norm(probe))
-    return system.describe(here.q, here.lam, mode) if stiffness < FREE * typical else ""
+    if stiffness >= FREE * typical:
+        return "", 0.0
+    return system.describe(here.q, here.lam, mode), stiffness / max(typical, 1e-300)

@@ -275,3 +275,15 @@ def test_what_cannot_be_in_python() -> None:
     path = trace(model)
     with pytest.raises(ModelError, match="supports that change"):
         Situation(path, -1)
+
+
+def test_letting_go_of_much_is_no_mechanism() -> None:
+    """An edge that was pinned flat while the sheet folded carries much: without it the sheet springs away."""
+    mesh = meshes.structured(meshes.annulus_sector(101.6, 10.0, 1.0472), along=10, rows=2)
+    model = (
+        Model(mesh, Sheet(E=4200.0, nu=0.2, t=0.3)).support("edge:start", clamp=True).fold("crease", by=0.35)
+    )
+    path = trace(model.step(release="edge:start"), warn=False, estimate=False)
+    assert path.outcome == "unstable"
+    assert "the sheet would leave its last state: node" in path.reason
+    assert "hold it as it lies (hold), in place of a support" in path.early_end
