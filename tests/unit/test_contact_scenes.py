@@ -167,6 +167,11 @@ def test_auto_goes_on_with_contact_from_the_last_clear_state(tmp_path: object) -
     assert len(stored) == len(path)
     again = bh.trace(letter("auto", 2.4), file=file, resume=True)
     assert np.array_equal(again[-1].points, path[-1].points)
+    later = letter("auto", 2.4).step(*(bh.Fold(crease, by=-0.1) for crease in path.model.mesh.creases))
+    longer = bh.trace(later, after=path)
+    assert longer.outcome == "reached"
+    assert longer.model.contact == "thickness"
+    assert len(longer) > len(path)
 
 
 def test_auto_goes_on_from_the_mesh_that_an_accuracy_has_chosen(tmp_path: Path) -> None:
