@@ -207,6 +207,7 @@ def test_a_run_that_met_itself_goes_on_with_later_steps(
     assert main(["run", "letter.toml"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "panels met without contact" in said
+    assert said.index("panels met") < said.index("point passed at")
     assert "self-contact: none" in said
     assert main(["run", "letter.toml", "--resume"]) == 0  # it is whole
     Path("letter.toml").write_text(f'{text}[[steps]]\nfold = {{ crease = "all", by = 2.3, Lstar = 5.0 }}\n')
