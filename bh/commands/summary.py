@@ -42,7 +42,7 @@ def summary(
     )
     stable = {True: "yes", False: "no", None: "was not looked at"}[path.stable]
     say(f"stable: {stable}")
-    for remark in path.remarks[:6]:
+    for remark in sorted(path.remarks, key=_last)[:6]:
         say(remark)
     model = path.model
     if model.sheet.nu != 0.0 and not takes_nu(model.formulation):
@@ -75,6 +75,11 @@ def summary(
     if path.estimate_reason:
         say(f"accuracy: no estimate: {path.estimate_reason}")
     say("files: " + " ".join(str(file) for file in written))
+
+
+def _last(remark: str) -> bool:
+    """Not among the first to be told? What contact has done is, however many critical points were passed."""
+    return not ("panels met without contact" in remark or "not prevented: " in remark)
 
 
 def scene_of_drawing(file: Path) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
@@ -120,8 +120,10 @@ class _Options:
 
 def _as_needed(model: Model, options: _Options, free: Path | None = None) -> Path:
     """A path of a model with contact = "auto", from one without that is solved first."""
-    from bh.solving.contact import go_on_as_needed, stored_model
+    from bh.solving.contact import WITH, go_on_as_needed, stored_model
 
+    if options.after is not None and options.after.model.contact == WITH:  # its panels have met
+        return options.follow(replace(model, contact=WITH))
     if free is None:
         stored = model if options.file is None else stored_model(FilePath(options.file), model)
         if options.resume and stored.stops_itself:

@@ -8,6 +8,7 @@ import pytest
 
 from verification.framework.checks import CaseResult
 from verification.studies.solver.contact import meeting, pressed, read
+from verification.studies.solver.contact_layers import block, height
 from verification.studies.solver.contact_scenes import Row, drawn, play
 from verification.theory.wrapped import wrapped, wrapped_by
 
@@ -42,6 +43,15 @@ def test_scenes_are_the_same_every_time_and_ask_for_contact() -> None:
         assert drawn(number)[0] == words
         assert np.array_equal(model.mesh.points, again.mesh.points)
         assert model.contact in (0.05, 0.1, 0.2)
+
+
+def test_a_block_is_as_high_as_its_sheets_are_thick() -> None:
+    path = block(0.1)
+    assert path.outcome == "reached"
+    assert height(path) == pytest.approx(0.5, rel=0.01)
+    assert path[0].points[:, 2].max() + 0.1 > 0.505  # they lie apart at first
+    path.steps.clear()
+    assert math.isnan(height(path))
 
 
 @pytest.mark.slow

@@ -167,6 +167,11 @@ def test_auto_goes_on_with_contact_from_the_last_clear_state(tmp_path: object) -
     assert len(stored) == len(path)
     again = bh.trace(letter("auto", 2.4), file=file, resume=True)
     assert np.array_equal(again[-1].points, path[-1].points)
+    later = letter("auto", 2.4).step(*(bh.Fold(crease, by=-0.1) for crease in path.model.mesh.creases))
+    longer = bh.trace(later, after=path)
+    assert longer.outcome == "reached"
+    assert longer.model.contact == "thickness"
+    assert len(longer) > len(path)
 
 
 def test_auto_goes_on_from_the_mesh_that_an_accuracy_has_chosen(tmp_path: Path) -> None:
@@ -202,6 +207,7 @@ def test_a_run_that_met_itself_goes_on_with_later_steps(
     assert main(["run", "letter.toml"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "panels met without contact" in said
+    assert said.index("panels met") < said.index("point passed at")
     assert "self-contact: none" in said
     assert main(["run", "letter.toml", "--resume"]) == 0  # it is whole
     Path("letter.toml").write_text(f'{text}[[steps]]\nfold = {{ crease = "all", by = 2.3, Lstar = 5.0 }}\n')

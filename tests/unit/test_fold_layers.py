@@ -152,3 +152,22 @@ def test_a_cube_opens_to_its_net(tmp_path: Path) -> None:
     assert float(path[-1].fold_angle("valley").max()) < 0.02
     assert math.dist(x[at[1, 0]], x[at[1, 4]]) == pytest.approx(4.0 * a, rel=1e-3)
     assert isinstance(mesh, meshes.SheetMesh)
+
+
+def test_a_sheet_that_is_folded_twice_across_is_refused(tmp_path: Path) -> None:
+    """The inner two of four layers would have to fold inside the crease of the outer two, where there is no room."""
+    a = 20.0
+    form = {
+        "file_spec": 1.2,
+        "frame_classes": ["foldedForm"],
+        "frame_unit": "mm",
+        "vertices_coords": [[0, 0], [a, 0], [a, a], [0, a], [a, a], [a, 0], [a, a], [0, a], [a, a]],
+        "faces_vertices": [[0, 1, 2, 3], [0, 3, 4, 5], [0, 5, 6, 7], [0, 7, 8, 1]],
+        "edges_vertices": [[0, 3], [0, 5], [0, 7], [0, 1]],
+        "edges_assignment": ["M", "V", "M", "M"],
+        "faceOrders": [[1, 0, 1], [2, 1, -1], [3, 2, 1], [2, 0, 1], [3, 0, 1], [3, 1, -1]],
+    }
+    with pytest.raises(
+        FileFormatError, match=r"do not fit between faces \d and \d.*draw nested creases apart"
+    ):
+        read_fold(written(tmp_path, form), untangle=0.3)

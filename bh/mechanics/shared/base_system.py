@@ -100,7 +100,10 @@ class SupportedSheet:
             x + (self.displacements.home - self.displacements.reference)
         ):
             met = self.barrier.meetings(x)
-            raise ModelError(f"contact: the first state meets itself ({met}); begin with panels apart")
+            raise ModelError(
+                f"contact: the first state meets itself ({met}); begin with panels apart (layers of a folded form: "
+                "untangle = true)"
+            )
 
     def _passed(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """Whether panels in contact would pass through each other on the straight way between two states."""
