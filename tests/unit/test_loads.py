@@ -20,6 +20,8 @@ from bh.mechanics.shared import outside
 from bh.scene.load import parse_scene
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix, conservative
+from verification.theory import loads as theory
+from verification.theory.plates import CLAMPED_UNIFORM
 
 Array = NDArray[np.float64]
 ALL = ("consistent", "bars-and-hinges", "shell")
@@ -176,6 +178,20 @@ def test_loads_stay_until_others_are_asked_for(tmp_path: Path) -> None:
     assert [again[i].lam for i in range(len(again))] == [whole[i].lam for i in range(len(whole))]
     assert again[-1].energy == whole[-1].energy
     assert again[-1].energy.ground > 0.0
+
+
+def test_theory_knows_its_limits_and_published_digits() -> None:
+    """Mattiasson (1981) for F L^2 / E I = 1, 5 and 10; beams of small load, without thrust, without tension."""
+    for load, down, along in ((1.0, 0.30172, 0.05643), (5.0, 0.71379, 0.38763), (10.0, 0.81061, 0.55500)):
+        assert theory.lifted_tip(load) == pytest.approx((1.0 - along, down), abs=1e-5)
+    assert theory.blown_tip(1e-3)[1] == pytest.approx(1e-3 / 8.0, rel=1e-4)
+    assert theory.beam_column(1e-3) == pytest.approx(5.0 / 384.0, rel=2e-3)
+    assert theory.held_strip(0.1, 0.1) == pytest.approx(5.0 / 384.0 * 0.1, rel=1e-3)
+    assert theory.beam_on_springs(1e-3) == pytest.approx(1e3, rel=1e-3)  # it sinks as a whole
+    small, large = theory.clamped_plate((1e-3, 402.0), 0.316)
+    assert small / (12e-3 * (1.0 - 0.316**2)) == pytest.approx(CLAMPED_UNIFORM, rel=1e-6)
+    assert large == pytest.approx(1.8559, abs=1e-4)  # 2.5 % below Levy
+    assert theory.rolled_tip(math.pi) == pytest.approx((0.0, 2.0 / math.pi), abs=1e-12)
 
 
 SCENE = """

@@ -69,6 +69,7 @@ STUDIES = (
     Study("appendix_b_sheets", "B", part_of="appendix_b", seconds=6),
     Study("shell_benchmarks", "solver"),
     Study("eigenvalues", "solver"),
+    Study("loads", "solver"),
     Study("published", "solver", seconds=250),
     Study("peers", "solver", seconds=15),
     Study("tables4", "4", seconds=1),
