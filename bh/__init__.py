@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from bh.model.crease_law import CreaseLaw
     from bh.model.growth import Expand
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
+    from bh.model.laminate import laminate
     from bh.model.model import Model
     from bh.model.pinch import Pinch
     from bh.model.refinement import Goal, Refinement
@@ -64,6 +65,7 @@ _NAMES = {
     "bh.model.crease_law": "CreaseLaw",
     "bh.model.growth": "Expand",
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
+    "bh.model.laminate": "laminate",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
     "bh.model.refinement": "Goal Refinement",
@@ -167,6 +169,7 @@ __all__ = [
     "allow_plugins",
     "calibrate",
     "depth",
+    "laminate",
     "load_scene",
     "read",
     "remarks",

@@ -13,6 +13,7 @@ from bh.errors import ModelError
 from bh.formulations.observables import OBSERVABLES
 from bh.model.model import Model
 from bh.model.sheet import Sheet
+from bh.model.zones import changed as other_sheet
 from bh.solving.trace import trace
 
 Array = NDArray[np.float64]
@@ -256,7 +257,7 @@ def _replaced(model: Model, name: str, value: float) -> Model:
     """
     kind, _, key = name.partition(".")
     if kind == "sheet" and key in {f.name for f in fields(Sheet)} and getattr(model.sheet, key) is not None:
-        return replace(model, sheet=replace(model.sheet, **{key: value}))
+        return replace(model, sheet=other_sheet(model.sheet, **{key: value}))
     crease, _, what = key.rpartition(".")
     if kind == "creases" and crease.endswith(".law") and crease.removesuffix(".law") in model.creases:
         crease = crease.removesuffix(".law")

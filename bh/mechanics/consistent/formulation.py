@@ -76,13 +76,15 @@ class Consistent:
         """Derivatives of a system by its element data at unknowns q (size,).
 
         Raises:
-            ModelError: the material is not linear, panels are in contact, or the sheet expands.
+            ModelError: the material is not linear, panels are in contact, the sheet expands or couples.
         """
         if system.barrier is not None:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
         if not (system.elements.stretching.constant and system.elements.bending.constant):
             raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
         refuse_curves(system.curves)
+        if system.elements.coupling is not None:
+            raise ModelError("sensitivities are those of sheets whose stretching and bending are not coupled")
         if system.elements.growth is not None:
             raise ModelError("sensitivities are those of sheets at rest as drawn; this one expands")
         return ConsistentDerivatives(system, q, lam)
@@ -111,7 +113,10 @@ class Consistent:
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
         contact = 0.0 if system.barrier is None else system.barrier.forces(x, now.f)
-        stretching, bending = system.stretching_by_triangle(x, lam), system.bending_by_triangle(now.theta)
+        stretching, bending = (
+            system.stretching_by_triangle(x, lam),
+            system.bending_by_triangle(now.theta, x, lam),
+        )
         folding, dissipated = 0.5 * e.spring_stiffness * now.turns**2, 0.0
         if system.curves is not None:
             folding, dissipated = system.curves.held(e.spring_stiffness, now.turns)
