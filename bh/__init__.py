@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from bh.model.growth import Expand
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
     from bh.model.imperfection import RandomField, imperfect
+    from bh.model.laminate import laminate
     from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
     from bh.model.model import Model
     from bh.model.pinch import Pinch
@@ -73,6 +74,7 @@ _NAMES = {
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
     "bh.model.imperfection": "RandomField imperfect",
     "bh.model.loads": "AreaForce EdgeMoment LineForce Pressure",
+    "bh.model.laminate": "laminate",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
     "bh.model.refinement": "Goal Refinement",
@@ -185,6 +187,7 @@ __all__ = [
     "calibrate",
     "depth",
     "imperfect",
+    "laminate",
     "load_scene",
     "read",
     "remarks",

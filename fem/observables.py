@@ -105,10 +105,9 @@ def resultants(made_of: Sections, forces: Array, moments: Array, rest: Array | N
         rest: (2, t, 3) strain and curvature at rest, which the others are beside.
     """
     sheet = made_of.sheets[0]
-    if made_of.of is not None:
+    if by_triangle.needed(made_of):
         found = by_triangle.matrices(made_of.sheets)
-        strain = np.einsum("tij,tj->ti", np.linalg.inv(found.A)[made_of.of], forces)
-        curvature = np.einsum("tij,tj->ti", np.linalg.inv(found.D)[made_of.of], moments)
+        strain, curvature = by_triangle.strains(found, made_of, forces, moments)
         if rest is not None:
             strain, curvature = strain + rest[0], curvature + rest[1]
         return Resultants(sheet, strain, curvature, forces, moments, made_of)
@@ -187,22 +186,21 @@ def stresses(
     eps = np.einsum("tjm,m,jab->tab", strain.reshape(len(X), 3, -1), middle, STRAINS)
     inverse = np.linalg.inv(F)
     eps = np.einsum("tac,tab,tbd->tcd", inverse, eps, inverse)
-    N = _forces(eps, made_of)
     m = np.einsum("tjm,m,jab->tab", moments.reshape(len(X), 3, -1), middle, MOMENTS)
     m = np.einsum("tca,tab,tdb->tcd", F, m, F) / np.linalg.det(F)[:, None, None] ** 2
     pick = ([0, 1, 0], [0, 1, 1])
-    return N[:, pick[0], pick[1]], m[:, pick[0], pick[1]]
+    bent = m[:, pick[0], pick[1]]
+    return _forces(eps, bent, made_of), bent
 
 
-def _forces(eps: Array, made_of: Sections) -> Array:
-    """(t, 2, 2) membrane forces of strains (t, 2, 2), N / mm."""
-    sheet = made_of.sheets[0]
-    if made_of.of is not None:
-        A = by_triangle.matrices(made_of.sheets).A[made_of.of]
-        rows = np.column_stack((eps[:, 0, 0], eps[:, 1, 1], 2.0 * eps[:, 0, 1]))
-        n = np.einsum("tij,tj->ti", A, rows)
-        return np.stack((n[:, [0, 2]], n[:, [2, 1]]), axis=1)
+def _forces(eps: Array, moments: Array, made_of: Sections) -> Array:
+    """(t, 3) membrane forces of strains (t, 2, 2), N / mm; of a laminate those beside moments (t, 3)."""
+    sheet, pick = made_of.sheets[0], ([0, 1, 0], [0, 1, 1])
+    if by_triangle.needed(made_of):
+        rows = eps[:, pick[0], pick[1]] * [1.0, 1.0, 2.0]
+        return by_triangle.membrane_forces(by_triangle.matrices(made_of.sheets), made_of, rows, moments)
     if sheet.grain is not None:
-        return grain.forces(eps, sheet)
+        return np.asarray(grain.forces(eps, sheet)[:, pick[0], pick[1]])
     trace = np.einsum("taa->t", eps)[:, None, None] * np.eye(2)
-    return np.asarray(sheet.E * sheet.t / (1.0 - sheet.nu**2) * ((1.0 - sheet.nu) * eps + sheet.nu * trace))
+    N = sheet.E * sheet.t / (1.0 - sheet.nu**2) * ((1.0 - sheet.nu) * eps + sheet.nu * trace)
+    return np.asarray(N[:, pick[0], pick[1]])

@@ -36,10 +36,64 @@ def matrices(sheets: tuple[Sheet, ...]) -> Matrices:
     Args:
         sheets: of any kind.
     """
-    Q = [np.linalg.inv(grain.compliance_in_drawing(sheet)) for sheet in sheets]
-    A = np.array([sheet.t * q for sheet, q in zip(sheets, Q, strict=True)])
-    D = np.array([sheet.t**3 / 12.0 * q for sheet, q in zip(sheets, Q, strict=True)])
-    return Matrices(A, None, D)
+    out = np.zeros((3, len(sheets), 3, 3))
+    for number, sheet in enumerate(sheets):
+        plies = (sheet,) if sheet.plies is None else sheet.plies
+        top = 0.5 * sheet.t
+        for ply in reversed(plies):  # Simpson's rule is exact for z^2
+            Q = np.linalg.inv(grain.compliance_in_drawing(ply))
+            z = np.array([top - ply.t, top - 0.5 * ply.t, top])
+            weight = ply.t / 6.0 * np.array([1.0, 4.0, 1.0])
+            out[:, number] += np.einsum("p,pk,ij->kij", weight, z[:, None] ** np.arange(3), Q)
+            top -= ply.t
+    A, B, D = out
+    couples = any(sheet.plies is not None for sheet in sheets)
+    couples = couples and bool(np.abs(B).max() > 1e-12 * np.sqrt(np.abs(A).max() * np.abs(D).max()))
+    return Matrices(A, B if couples else None, D)
+
+
+def needed(sections: Sections) -> bool:
+    """Do matrices differ, or are they those of a laminate?"""
+    return sections.of is not None or sections.sheets[0].plies is not None
+
+
+def strains(found: Matrices, sections: Sections, forces: Array, moments: Array) -> tuple[Array, Array]:
+    """Strains and curvatures (t, 3) that membrane forces and moments (t, 3) belong to.
+
+    Args:
+        found: of the sheets.
+        sections: which of them a triangle is of.
+        forces: (t, 3) N / mm.
+        moments: (t, 3) N.
+
+    Returns:
+        both.
+    """
+    B = np.zeros_like(found.A) if found.B is None else found.B
+    whole = np.block([[found.A, -B], [-B, found.D]])
+    inverse = _each(np.asarray(np.linalg.inv(whole), dtype=float), sections)
+    both = np.einsum(
+        "tij,tj->ti", np.broadcast_to(inverse, (len(forces), 6, 6)), np.hstack((forces, moments))
+    )
+    return both[:, :3], both[:, 3:]
+
+
+def membrane_forces(found: Matrices, sections: Sections, strain: Array, moments: Array) -> Array:
+    """(t, 3) membrane forces, N / mm, of strains (t, 3) where the moments are (t, 3): (A - B D^-1 B) e - B D^-1 m.
+
+    Args:
+        found: of the sheets.
+        sections: which of them a triangle is of.
+        strain: (t, 3).
+        moments: (t, 3) N.
+    """
+    left, mixed = found.A, np.zeros_like(found.A)
+    if found.B is not None:
+        mixed = found.B @ np.linalg.inv(found.D)
+        left = found.A - mixed @ found.B
+    shape = (len(strain), 3, 3)
+    S, P = (np.broadcast_to(_each(each, sections), shape) for each in (left, mixed))
+    return np.asarray(np.einsum("tij,tj->ti", S, strain) - np.einsum("tij,tj->ti", P, moments))
 
 
 def in_drawing(F: Array, tensors: Array, covariant: bool) -> Array:

@@ -48,6 +48,7 @@ class ShellElements:
         lengths: (e,) lengths of the (curved) edges, mm.
         areas: (t,) of the flat triangles, mm^2.
         edge_fit: (e, r, p) rotations of edges whose angles at the points of the edge come nearest to given ones.
+        coupling: (t, 3 m, 3 m) energy strain . coupling . curvature of laminates, or None.
     """
 
     mesh: ElementMesh
@@ -59,6 +60,7 @@ class ShellElements:
     lengths: Array
     areas: Array
     edge_fit: Array
+    coupling: Array | None = None
 
     @property
     def moves(self) -> int:
@@ -100,13 +102,19 @@ class ShellElements:
             strain: (t, 3 m).
             curvature: (t, 3 m), 1/mm.
         """
-        return np.concatenate(
+        out = np.concatenate(
             (
                 (self.membrane @ strain[:, :, None])[..., 0],
                 (self.bending @ curvature[:, :, None])[..., 0],
             ),
             axis=1,
         )
+        if self.coupling is not None:
+            other = np.swapaxes(self.coupling, 1, 2)
+            out += np.hstack(
+                ((self.coupling @ curvature[:, :, None])[..., 0], (other @ strain[:, :, None])[..., 0])
+            )
+        return out
 
     def tangent(self, x: Array, forces: Array, B: Array, frames: Frames) -> Array:
         """(t, w, w) element tangents with the given forces (t, 6 m) in their geometric part.
@@ -119,6 +127,10 @@ class ShellElements:
         """
         K = np.zeros((len(self.areas), self.width, self.width))
         kernels.add_material(B, self.membrane, self.bending, K)
+        if self.coupling is not None:
+            stretch, bend = np.split(B, 2, axis=1)
+            mixed = np.swapaxes(stretch, 1, 2) @ self.coupling @ bend
+            K += mixed + np.swapaxes(mixed, 1, 2)
         kernels.add_geometric(x, forces, self.loops, frames, K)
         return K
 
@@ -162,15 +174,18 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet, zones: tuple[SheetZone, ...]
         across=table.across,
         turn=table.turn,
     )
+    membrane, bending, coupling = _stiffness(table, F, J, sections(mesh.sheet, sheet, zones))
     elements = ShellElements(
         mesh,
         table,
         loops,
-        *_stiffness(table, F, J, sections(mesh.sheet, sheet, zones)),
+        membrane,
+        bending,
         np.zeros((len(edges), table.measures)),
         lengths,
         J @ table.weights,
         _edge_fit(table, rim, edges, sides),
+        coupling,
     )
     frames = flat_frames(mesh)
     strain0, _ = elements.measures(mesh.nodes, np.zeros((len(edges), 3, table.rotations)), frames)
@@ -178,22 +193,21 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet, zones: tuple[SheetZone, ...]
     return elements
 
 
-def _stiffness(table: Tables, F: Array, J: Array, made_of: Sections) -> tuple[Array, Array]:
-    """Of membrane and bending, (t, 3 m, 3 m) each, with F (t, q, 2, 2) and J (t, q) of the flat sheet."""
+def _stiffness(table: Tables, F: Array, J: Array, made_of: Sections) -> tuple[Array, Array, Array | None]:
+    """Of membrane, bending and both, (t, 3 m, 3 m) each, with F (t, q, 2, 2) and J (t, q) of the flat sheet."""
     sheet = made_of.sheets[0]
-    if made_of.of is not None:
+    if by_triangle.needed(made_of):
         bases = _basis(table, STRAINS), _basis(table, MOMENTS)
-        membrane, bending, _ = by_triangle.stiffness(
-            *bases, table.weights, F, J, by_triangle.matrices(made_of.sheets), made_of
-        )
-        return membrane, bending
+        found = by_triangle.matrices(made_of.sheets)
+        return by_triangle.stiffness(*bases, table.weights, F, J, found, made_of)
     if sheet.grain is not None:
         return (
             grain.membrane_stiffness(_basis(table, STRAINS), table.weights, F, J, sheet),
             grain.bending_stiffness(_basis(table, MOMENTS), table.weights, F, J, sheet),
+            None,
         )
     metric = np.einsum("tqca,tqcb->tqab", F, F)
-    return membrane_stiffness(table, metric, J, sheet), bending_stiffness(table, metric, J, sheet)
+    return membrane_stiffness(table, metric, J, sheet), bending_stiffness(table, metric, J, sheet), None
 
 
 def _edge_fit(table: Tables, rim: Array, edges: Ints, sides: Array) -> Array:

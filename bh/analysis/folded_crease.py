@@ -186,7 +186,7 @@ class FoldedCrease(OneLine):
         Raises:
             ModelError: the strip reaches a regression curve (unless `trim`), or the sheet has a grain.
         """
-        if sheet.grain is not None:
+        if sheet.directed:
             raise ModelError("the bending energy of a ruled strip is that of a sheet without a grain")
         D = sheet.bending_stiffness(nu)
         return sum(

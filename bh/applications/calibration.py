@@ -16,6 +16,7 @@ from bh.applications.readings import Measured, Reading
 from bh.errors import InputError, ModelError
 from bh.model.model import Model
 from bh.model.sheet import Sheet
+from bh.model.zones import changed as other_sheet
 from bh.paths.path import Path
 from bh.solving.neighbour import neighbour
 from bh.solving.trace import trace
@@ -348,7 +349,7 @@ def _replaced(model: Model, name: str, value: float) -> Model:
     """
     kind, _, key = name.partition(".")
     if kind == "sheet" and key in {f.name for f in fields(Sheet)} and getattr(model.sheet, key) is not None:
-        return replace(model, sheet=replace(model.sheet, **{key: value}))
+        return replace(model, sheet=other_sheet(model.sheet, **{key: value}))
     crease, _, what = key.rpartition(".")
     if kind == "creases" and crease.endswith(".law") and crease.removesuffix(".law") in model.creases:
         crease = crease.removesuffix(".law")

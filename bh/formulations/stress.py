@@ -103,7 +103,13 @@ class Stress(OneLine):
 
         Args:
             side: "top", "middle" or "bottom".
+
+        Raises:
+            ModelError: of a laminate, whose plies have stresses of their own.
         """
+        sheets = (self.sheet,) if self.sections is None else self.sections.sheets
+        if any(sheet.plies is not None for sheet in sheets):
+            raise ModelError("stresses of laminates are not told; read forces, moments and strain_at")
         t = self._each(lambda sheet: sheet.t)
         return np.asarray(self.forces / t - 12.0 / t**2 * _height(side) * self.moments)
 

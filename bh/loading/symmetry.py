@@ -219,21 +219,7 @@ def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
     Raises:
         ModelError: the grain, a support, a crease or an actuation has no image in the plane.
     """
-    sections = model.sections
-    if sections.of is not None and (sections.of != sections.of[plane.triangle]).any():
-        x, y, _ = model.mesh.points[
-            model.mesh.triangles[np.argmax(sections.of != sections.of[plane.triangle])]
-        ].mean(axis=0)
-        raise ModelError(f"the zones are not mirror-symmetric (at ({x:.4g}, {y:.4g}) mm); {ADVICE}")
-    for grain in (sheet.grain for sheet in sections.sheets):
-        if grain is None:
-            continue
-        along = math.cos(grain) * plane.normal[0] + math.sin(grain) * plane.normal[1]
-        if min(abs(along), math.sqrt(max(1.0 - along**2, 0.0))) > 1e-7:
-            raise ModelError(
-                f"the grain at {math.degrees(grain):.6g} degrees is not mirror-symmetric: it runs neither along nor "
-                f"across the plane; {ADVICE}"
-            )
+    _check_sheets(model, plane)
     for number, step in enumerate(steps):
         where = f"step {number + 1}"
         _refuse(model.steps[number], step, where)
@@ -250,6 +236,27 @@ def check(model: Model, steps: Sequence[LoadStep], plane: Mirror) -> None:
         clamped = model.mesh.topology.find_edges(step.constraints.clamped)
         if set(plane.edge[clamped].tolist()) != set(clamped.tolist()):
             raise ModelError(f"{where}: the clamped edges are not mirror-symmetric; {ADVICE}")
+
+
+def _check_sheets(model: Model, plane: Mirror) -> None:
+    """Zones, grains and laminates."""
+    sections = model.sections
+    if sections.of is not None and (sections.of != sections.of[plane.triangle]).any():
+        x, y, _ = model.mesh.points[
+            model.mesh.triangles[np.argmax(sections.of != sections.of[plane.triangle])]
+        ].mean(axis=0)
+        raise ModelError(f"the zones are not mirror-symmetric (at ({x:.4g}, {y:.4g}) mm); {ADVICE}")
+    if any(sheet.plies is not None for sheet in sections.sheets):
+        raise ModelError("a laminate is not solved by halves; leave out symmetry")
+    for grain in (sheet.grain for sheet in sections.sheets):
+        if grain is None:
+            continue
+        along = math.cos(grain) * plane.normal[0] + math.sin(grain) * plane.normal[1]
+        if min(abs(along), math.sqrt(max(1.0 - along**2, 0.0))) > 1e-7:
+            raise ModelError(
+                f"the grain at {math.degrees(grain):.6g} degrees is not mirror-symmetric: it runs neither along nor "
+                f"across the plane; {ADVICE}"
+            )
 
 
 def _check_hinges(model: Model, step: LoadStep, plane: Mirror, where: str) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.model import laminate
 from bh.model.sheet import Sheet
 
 Array = NDArray[np.float64]
@@ -58,17 +59,21 @@ class LinearElastic:
     """Isotropic, or orthotropic in the axes of the sheet's grain.
 
     Isotropic: 1/2 E t / (1 - nu^2) ((1 - nu) e:e + nu tr(e)^2), and with D = E t^3 / (12 (1 - nu^2)) for curvatures.
-    With a grain 1/2 t e.Q.e and 1/2 t^3 / 12 k.Q.k of `orthotropic`.
+    With a grain 1/2 t e.Q.e and 1/2 t^3 / 12 k.Q.k of `orthotropic`; of a laminate A and D (`bh.model.laminate`).
     """
 
     def stretching(self, sheet: Sheet) -> Constant:
         """Plane stress, N / mm."""
+        if sheet.plies is not None:
+            return Anisotropic(laminate.matrices(sheet.plies)[0])
         if sheet.grain is not None:
             return Anisotropic(sheet.t * _in_drawing(sheet, sheet.grain))
         return Constant(sheet.E * sheet.t / (1.0 - sheet.nu**2) * isotropic(sheet.nu))
 
     def bending(self, sheet: Sheet) -> Constant:
         """Plate bending, N mm."""
+        if sheet.plies is not None:
+            return Anisotropic(laminate.matrices(sheet.plies)[2])
         if sheet.grain is not None:
             return Anisotropic(sheet.t**3 / 12.0 * _in_drawing(sheet, sheet.grain))
         return Constant(sheet.bending_stiffness() * isotropic(sheet.nu))

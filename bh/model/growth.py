@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.model.laminate import free_strain, in_drawing
 from bh.model.sheet import Sheet
 from bh.model.step import Actuation, StepBuilder
 from bh.model.zones import triangles_in
@@ -107,59 +108,6 @@ class Expand(Actuation):
         if self.axes is not None:
             return self.axes
         return 0.0 if sheet.grain is None else sheet.grain
-
-
-def free_strain(sheet: Sheet, change: float) -> tuple[Array, Array]:
-    """Strain (xx, yy, 2 xy) and curvature (3,) of a free sheet whose temperature or moisture changes.
-
-    Args:
-        sheet: with an expansion of its own.
-        change: in the unit of that.
-
-    Returns:
-        strain, and curvature in 1 / mm, in the axes of the drawing.
-
-    Raises:
-        ModelError: it has no expansion.
-    """
-    return change * in_drawing(np.array([[*coefficients(sheet), 0.0]]), sheet.grain or 0.0)[0], np.zeros(3)
-
-
-def coefficients(sheet: Sheet) -> tuple[float, float]:
-    """Expansion along and across the grain, a unit of change.
-
-    Args:
-        sheet: of which it is.
-
-    Returns:
-        both.
-
-    Raises:
-        ModelError: it has none.
-    """
-    if sheet.expansion is None:
-        raise ModelError(
-            "expand change: the sheet has no expansion; give expansion (strain a kelvin or a percent) with it, or by"
-        )
-    return sheet.expansion if isinstance(sheet.expansion, tuple) else (sheet.expansion, sheet.expansion)
-
-
-def in_drawing(rows: Array, angle: float) -> Array:
-    """(k, 3) components xx, yy, 2 xy in the drawing of strains (11, 22, 2 12) in axes at an angle to it.
-
-    Args:
-        rows: (k, 3).
-        angle: from the drawing's x axis to the first of theirs, rad.
-    """
-    c, s = math.cos(angle), math.sin(angle)
-    one, two, shear = rows.T
-    return np.column_stack(
-        (
-            c * c * one + s * s * two - c * s * shear,
-            s * s * one + c * c * two + c * s * shear,
-            2.0 * c * s * (one - two) + (c * c - s * s) * shear,
-        )
-    )
 
 
 def _amount(name: str, value: object) -> Array:

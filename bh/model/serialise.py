@@ -150,7 +150,8 @@ def _plain(item: Any) -> dict[str, Any]:
 
 
 def _sheet(sheet: Sheet) -> dict[str, object]:
-    return {name: value for name, value in _plain(sheet).items() if value is not None}
+    found = {name: value for name, value in _plain(sheet).items() if value is not None and name != "plies"}
+    return found if sheet.plies is None else {**found, "plies": [_sheet(ply) for ply in sheet.plies]}
 
 
 def _zone(zone: SheetZone) -> dict[str, object]:

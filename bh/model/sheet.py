@@ -37,6 +37,8 @@ class Sheet:
             None where it is not known. No formulation yields: states are compared with it (`State.stress`).
         strength2: the same across the grain, MPa; with a grain.
         shear_strength: the same in shear along the grain, MPa; with a grain, sqrt(strength strength2 / 3) unless given.
+        plies: of a laminate, from the bottom to the top (the side that faces +z), each a sheet with a t and, where it
+            has one, a grain of its own: `bh.laminate`. E, nu and t are those of an equivalent sheet then.
         expansion: strain a kelvin (or a percent of moisture, ...), one number or (along, across the grain).
     """
 
@@ -51,6 +53,7 @@ class Sheet:
     strength2: float | None = None
     shear_strength: float | None = None
     expansion: float | tuple[float, float] | None = None
+    plies: tuple[Sheet, ...] | None = None
 
     if TYPE_CHECKING:  # texts with units are taken, too, and kept as numbers
 
@@ -68,6 +71,7 @@ class Sheet:
             strength2: float | str | None = None,
             shear_strength: float | str | None = None,
             expansion: float | Sequence[float] | None = None,
+            plies: Sequence[Sheet] | None = None,
         ) -> None:
             """See the attributes."""
 
@@ -91,6 +95,8 @@ class Sheet:
                 continue
             if not (isinstance(value, Real) and math.isfinite(value) and float(value) > 0.0):
                 raise ModelError(f"sheet {name} = {value!r} cannot be; give a positive number in {unit}")
+        if self.plies is not None:
+            _check_plies(self)
         if self.expansion is not None:
             object.__setattr__(self, "expansion", _expansion(self.expansion))
         if self.grain is None and (self.strength2, self.shear_strength) != (None, None):
@@ -136,7 +142,17 @@ class Sheet:
         if unknown:
             raise ModelError(f"a sheet has no {sorted(unknown)[0]}; its strengths are {', '.join(STRENGTHS)}")
         return cls(
-            E=E1, E2=E2, G12=G12, nu=nu12, grain=grain, t=t, density=density, expansion=expansion, **strengths
+            E=E1,
+            E2=E2,
+            G12=G12,
+            nu=nu12,
+            grain=grain,
+            t=t,
+            density=density,
+            expansion=expansion,
+            strength=strengths.get("strength"),
+            strength2=strengths.get("strength2"),
+            shear_strength=strengths.get("shear_strength"),
         )
 
     def strengths(self) -> tuple[float, float, float]:
@@ -161,7 +177,7 @@ class Sheet:
     @property
     def directed(self) -> bool:
         """Does it depend on the direction?"""
-        return self.grain is not None
+        return self.grain is not None or self.plies is not None
 
     @property
     def nu_squared(self) -> float:
@@ -177,6 +193,24 @@ class Sheet:
         E = self.E if self.E2 is None else math.sqrt(self.E * self.E2)
         nu_squared = self.nu_squared if nu is None else nu**2
         return E * self.t**3 / (12.0 * (1.0 - nu_squared))
+
+
+def _check_plies(sheet: Sheet) -> None:
+    """Plies as frozen sheets, whose thickness is that of the laminate."""
+    assert sheet.plies is not None
+    plies = tuple(Sheet(**ply) if isinstance(ply, dict) else ply for ply in sheet.plies)  # as files have them
+    if not plies or any(not isinstance(ply, Sheet) or ply.plies is not None for ply in plies):
+        raise ModelError(
+            "the plies of a laminate are sheets, one or more, and no laminates; give bh.Sheet for each"
+        )
+    if sheet.grain is not None or sheet.expansion is not None:
+        raise ModelError("grain and expansion of a laminate are those of its plies; give them there")
+    thick = sum(ply.t for ply in plies)
+    if abs(thick - sheet.t) > 1e-9 * thick:
+        raise ModelError(
+            f"a laminate of {len(plies)} plies is {thick:g} mm thick, not {sheet.t:g}; change the plies, not t"
+        )
+    object.__setattr__(sheet, "plies", plies)
 
 
 def _expansion(value: object) -> float | tuple[float, float]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.model.laminate import laminate
 from bh.model.sheet import Sheet
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -109,6 +110,8 @@ def changed(sheet: Sheet, stiff: float = 1.0, **values: float | str | None) -> S
     out = Sheet(**{**vars(sheet), **values})
     if stiff == 1.0:
         return out
+    if out.plies is not None:
+        return laminate([changed(ply, stiff) for ply in out.plies])
     moduli = {name: getattr(out, name) for name in STIFFER}
     return replace(out, **{name: stiff * value for name, value in moduli.items() if value is not None})
 

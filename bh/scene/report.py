@@ -30,6 +30,8 @@ SHOWN = 12  # creases or places in a list
 
 
 def _grain(sheet: Sheet) -> str:
+    if sheet.plies is not None:
+        return f", {len(sheet.plies)} plies"
     if sheet.grain is None:
         return ""
     return f", grain at {degrees(sheet.grain):.4g} degrees (E {sheet.E:.4g} along, {sheet.E2:.4g} MPa across)"

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from bh.errors import SceneError
 from bh.materials.table import material as material_of
+from bh.model.laminate import laminate
 from bh.model.sheet import Sheet
 from bh.model.zones import SheetZone, changed
 from bh.scene.reading import REGION, Positive, Region, read_table, within
@@ -25,7 +26,7 @@ class ZoneTable(SheetTable):
 
     def names(self) -> None:
         """Check that nothing is given by two names; the moduli may be left out."""
-        if self.material is not None or self.E is not None or self.E1 is not None:
+        if self.plies is not None or self.material is not None or self.E is not None or self.E1 is not None:
             super().names()
 
 
@@ -38,13 +39,25 @@ def sheet_of(data: object) -> Sheet:
     Raises:
         SceneError: keys or values that cannot be; one line.
     """
-    table = read_table(SheetTable, data, "sheet")
+    return _read(data, "sheet")
+
+
+def _read(data: object, at: str) -> Sheet:
+    table = read_table(SheetTable, data, at)
+    if table.plies is not None:
+        return _laminate(table.plies, at)
     if table.material is not None:
-        return _of_material(table, "sheet")
+        return _of_material(table, at)
     if table.t is None:
-        raise SceneError("sheet.t is missing; give the thickness in mm, a positive number")
-    with within("sheet"):
-        return Sheet(**_given(table))
+        raise SceneError(f"{at}.t is missing; give the thickness in mm, a positive number")
+    with within(at):
+        return changed(Sheet(E=1.0, t=1.0), **_given(table))
+
+
+def _laminate(plies: list[dict[str, object]], at: str) -> Sheet:
+    found = [_read(ply, f"{at}.plies[{i}]") for i, ply in enumerate(plies)]
+    with within(at):
+        return laminate(found)
 
 
 def zones_of(data: list[object], sheet: Sheet) -> tuple[SheetZone, ...]:
@@ -69,6 +82,10 @@ def _zone(item: object, sheet: Sheet, at: str) -> SheetZone:
         made = _of_material(table, at)
         with within(at):
             return SheetZone(table.where, changed(made, table.stiff))
+    if table.plies is not None:
+        made = _laminate(table.plies, at)
+        with within(at):
+            return SheetZone(table.where, changed(made, table.stiff))
     given: dict[str, float | None] = {**_given(table)}
     alike = (table.E is not None or "nu" in given) and not any(key in given for key in ("E2", "G12", "grain"))
     if alike and sheet.grain is not None:  # E and nu alone are a sheet that is alike in all directions
@@ -87,5 +104,5 @@ def _of_material(table: SheetTable, at: str) -> Sheet:
 
 def _given(table: SheetTable) -> dict[str, float]:
     """What a table gives, by the names of `Sheet`."""
-    given = {key: getattr(table, key) for key in SheetTable.model_fields if key != "material"}
+    given = {key: getattr(table, key) for key in SheetTable.model_fields if key not in ("material", "plies")}
     return {OTHER_NAMES.get(key, key): value for key, value in given.items() if value is not None}

@@ -83,6 +83,10 @@ class SheetTable(Table):
         None,
         description="the stress of yield in shear in MPa, with a grain; sqrt(strength strength2 / 3) unless given",
     )
+    plies: list[dict[str, object]] | None = Field(
+        None,
+        description="the plies of a laminate from the bottom to the top, tables with the keys of a sheet; alone",
+    )
     expansion: Number | Amounts | None = Field(
         None,
         description="a strain a kelvin or a percent of moisture, or [along, across] the grain",
@@ -100,6 +104,15 @@ class SheetTable(Table):
 
     def names(self) -> None:
         """Check that the modulus is there, and that nothing is given by two names."""
+        if self.plies is not None:
+            given = [name for name in SheetTable.model_fields if getattr(self, name) is not None]
+            if given != ["plies"]:
+                raise ValueError(f"has plies and {given[0]}, which each ply has; remove one of them")
+            return
+        self.one_name_each()
+
+    def one_name_each(self) -> None:
+        """The same of a sheet that is no laminate."""
         if self.material is not None:
             for name in ("E", "E1", "E2", "G12", "nu", "nu12", "strength", "strength2", "shear_strength"):
                 if getattr(self, name) is not None:

@@ -75,7 +75,7 @@ def sheet_elements(
         raise ModelError(
             "bars and hinges are at rest as they are drawn; expand a sheet by 'consistent' or 'shell'"
         )
-    if sheet.grain is not None:
+    if sheet.directed:
         raise ModelError(
             "bars and hinges are alike in all directions; fold a sheet with a grain in the formulation 'consistent' or "
             "'shell', or leave out E2, G12 and grain"

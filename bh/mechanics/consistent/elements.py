@@ -15,6 +15,7 @@ from bh.materials import Constant, LinearElastic, Material
 from bh.mechanics.bars_and_hinges.stiffness import bending_hinge_stiffness, folding_hinge_stiffness
 from bh.mechanics.consistent.bending import Bending
 from bh.mechanics.consistent.clamps import Clamps, clamps
+from bh.mechanics.consistent.coupling import Coupling, sheet_coupling
 from bh.mechanics.consistent.growth import Growth, sheet_growth, with_growth
 from bh.mechanics.consistent.kernels import OWN, TURN
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
@@ -26,7 +27,7 @@ from bh.mechanics.consistent.patches import (
     patches,
     triangle_frames,
 )
-from bh.mechanics.consistent.sections import sheet_laws
+from bh.mechanics.consistent.sections import SheetLaws, sheet_laws
 from bh.mechanics.consistent.stretching import Stretching
 from bh.mechanics.shared.hinge_lock import ZONE, until_closed
 from bh.mechanics.shared.kinematics import dihedral_angles
@@ -64,6 +65,7 @@ class ConsistentElements:
         lock: (m,) stiffness of the locks of hinges that close, N mm / rad; zero at prescribed ones.
         rotations: how many there are.
         growth: what is at rest where, of a sheet that is not at rest as it is drawn.
+        coupling: of laminates; triangles are then patches of their own.
         let_go: (rotations,) couples on edges, and of clamps that are let go of, on the rotations of those edges, N mm.
     """
 
@@ -93,6 +95,7 @@ class ConsistentElements:
     rotations: int
     let_go: Ramp
     growth: Growth | None = None
+    coupling: Coupling | None = None
 
 
 def consistent_elements(
@@ -134,7 +137,7 @@ def consistent_elements(
     )
     held, spring = clamps(mesh, load_step, start), law == SPRING
     part = None if plane is None else plane.triangle_weight
-    condense = isinstance(laws.bending[0], Constant)
+    condense = isinstance(laws.bending[0], Constant) and laws.coupling is None
     joined = patches(mesh, B, spring, held.edges, triangle_ranks(mesh), group=part, condense=condense)
     if plane is not None:
         from bh.mechanics.consistent.half import half_patches
@@ -171,8 +174,26 @@ def consistent_elements(
         couple=couple,
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
         lock=lock_stiffness(model, load_step), rotations=rotations, let_go=let_go, growth=growth,
+        coupling=_coupling(model, laws, stretching, maps, angle, growth, plane),
     )  # fmt: skip
     return whole if plane is None else _half(whole, plane)
+
+
+def _coupling(
+    model: Model,
+    laws: SheetLaws,
+    stretching: Stretching,
+    maps: Array,
+    angle: Array,
+    growth: Growth | None,
+    plane: Mirror | None,
+) -> Coupling | None:
+    if laws.coupling is None:
+        return None
+    if plane is not None:
+        raise ModelError("a laminate that couples is not solved by halves; leave out symmetry")
+    B = np.broadcast_to(model.sections.each(list(laws.coupling)), (len(maps), 3, 3))
+    return sheet_coupling(model.mesh, B, stretching, maps, angle, growth)
 
 
 def _springs(

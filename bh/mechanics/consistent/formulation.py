@@ -77,7 +77,7 @@ class Consistent:
         """Derivatives of a system by its element data at unknowns q (size,).
 
         Raises:
-            ModelError: the material is not linear, panels are in contact, or the sheet expands.
+            ModelError: the material is not linear, panels are in contact, the sheet expands or couples.
         """
         if system.barrier is not None:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
@@ -85,6 +85,8 @@ class Consistent:
             raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
         refuse_curves(system.curves)
         refuse_outside(system.load_step)
+        if system.elements.coupling is not None:
+            raise ModelError("sensitivities are those of sheets whose stretching and bending are not coupled")
         if system.elements.growth is not None:
             raise ModelError("sensitivities are those of sheets at rest as drawn; this one expands")
         return ConsistentDerivatives(system, q, lam)
@@ -113,7 +115,10 @@ class Consistent:
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
         contact = system.press_on(x, lam, now.f)
-        stretching, bending = system.stretching_by_triangle(x, lam), system.bending_by_triangle(now.theta)
+        stretching, bending = (
+            system.stretching_by_triangle(x, lam),
+            system.bending_by_triangle(now.theta, x, lam),
+        )
         folding, dissipated = 0.5 * e.spring_stiffness * now.turns**2, 0.0
         if system.curves is not None:
             folding, dissipated = system.curves.held(e.spring_stiffness, now.turns)

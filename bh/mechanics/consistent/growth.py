@@ -32,7 +32,7 @@ class Growth:
     Attributes:
         strain: of cells with three and with five bars (c, 3), in their own axes.
         theta: (t, 3) angles at the edges of triangles that have their curvature at rest, rad.
-        curvature: (t, 3) at rest, in the axes of the drawing, 1 / mm.
+        curvature: (t, 3) at rest, in the axes of the drawing, 1 / mm; `mean` (t, 3) the strain there.
         forces: (b,) N0 of the bars, N / mm.
         energies: c at lambda = 0, its mixed part, and at 1: c = (1 - l)^2 c0 + 2 l (1 - l) c01 + l^2 c1, N mm.
     """
@@ -40,6 +40,7 @@ class Growth:
     strain: tuple[Ramp, Ramp]
     theta: Ramp
     curvature: Ramp
+    mean: Ramp
     forces: Ramp
     energies: tuple[float, float, float]
 
@@ -105,6 +106,7 @@ def sheet_growth(
         (Ramp(cells[0][0], cells[1][0]), Ramp(cells[0][1], cells[1][1])),
         Ramp(*theta),
         Ramp(means[0][1], means[1][1]),
+        Ramp(means[0][0], means[1][0]),
         Ramp(N0, N1),
         (c0, mixed, c1),
     )

@@ -56,7 +56,12 @@ def resultants(
     curvature = np.einsum("tij,tj->ti", curvature_maps(edges, areas), own)
     laws = sheet_laws(material, sections, mesh)
     moments = laws.of_triangles(np.arange(len(areas)), angle).stress(curvature)
-    curvature = turned_strains(curvature, -angle, 0.5)
+    moments, curvature = turned_strains(moments, -angle, 1.0), turned_strains(curvature, -angle, 0.5)
+    if laws.coupling is not None:
+        B = np.broadcast_to(sections.each(list(laws.coupling)), (len(areas), 3, 3))
+        elastic = strain if growth is None else strain - growth.mean.at(lam)
+        forces = forces - np.einsum("tij,tj->ti", B, curvature)
+        moments = moments - np.einsum("tij,tj->ti", B, elastic)
     if growth is not None:
         curvature = curvature + growth.curvature.at(lam)
     return Resultants(
@@ -64,7 +69,7 @@ def resultants(
         strain,
         curvature,
         forces,
-        turned_strains(moments, -angle, 1.0),
+        moments,
         sections,
     )
 

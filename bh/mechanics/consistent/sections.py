@@ -11,6 +11,7 @@ from bh.errors import ModelError
 from bh.materials import Constant, Directed, Law, Material
 from bh.materials.protocols import in_axes
 from bh.mechanics.consistent.membrane import Cells
+from bh.model.laminate import matrices
 from bh.model.sheet import Sheet
 from bh.model.zones import Sections
 from meshes import SheetMesh
@@ -27,6 +28,7 @@ class SheetLaws:
         stretching: of the strain, one for each sheet of `Sections`.
         bending: of the curvature, likewise.
         of: (t,) which of them a triangle has; None for one alone.
+        coupling: (s, 3, 3) B of the sheets, N; None where nothing couples.
         beside: (m,) the first triangle of every hinge; a cell of an edge has the same zone on both sides.
     """
 
@@ -34,6 +36,7 @@ class SheetLaws:
     bending: tuple[Law, ...]
     of: Ints | None
     beside: Ints
+    coupling: Array | None = None
 
     def of_cells(self, cells: Cells, points: Array) -> Law:
         """Law of the strain in the axes of every cell.
@@ -77,7 +80,8 @@ def sheet_laws(material: Material, sections: Sections, mesh: SheetMesh) -> Sheet
         )
     topology = mesh.topology
     beside = topology.edge_triangles[topology.hinge_edges, 0]
-    return SheetLaws(tuple(s for s, _ in laws), tuple(b for _, b in laws), sections.of, beside)
+    coupling = _coupling(sections, all(isinstance(law, Constant) for pair in laws for law in pair))
+    return SheetLaws(tuple(s for s, _ in laws), tuple(b for _, b in laws), sections.of, beside, coupling)
 
 
 def laws_of(material: Material, sheet: Sheet) -> tuple[Law, Law]:
@@ -99,6 +103,16 @@ def laws_of(material: Material, sheet: Sheet) -> tuple[Law, Law]:
             f"the material {type(material).__name__} is alike in all directions; take a sheet without grain, E2 and G12"
         )
     return laws
+
+
+def _coupling(sections: Sections, constant: bool) -> Array | None:
+    """(s, 3, 3) B of the sheets, N, or None."""
+    found = [None if sheet.plies is None else matrices(sheet.plies)[1] for sheet in sections.sheets]
+    if all(B is None for B in found):
+        return None
+    if not constant:
+        raise ModelError("laminates that couple are those of linear materials; the moduli of this one change")
+    return np.array([np.zeros((3, 3)) if B is None else B for B in found])
 
 
 def _placed(laws: tuple[Law, ...], of: Ints, angle: Array) -> Constant:

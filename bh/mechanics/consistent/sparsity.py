@@ -32,7 +32,7 @@ def rotation_pattern(
         e: its elements.
         displacements: their unknowns.
         ground: triangle that is held against rigid motions, or None.
-        contact: (p, 2) pairs of nodes in contact, whose slots come last, or None.
+        contact: (p, 2) pairs of nodes in contact, whose slots come last but for those of a coupling, or None.
     """
     number, _ = displacements.pattern_nodes(())
     n, moving = len(number), int(number.max()) + 1
@@ -57,6 +57,9 @@ def rotation_pattern(
         groups += (mesh.triangles[[ground]],)
     if contact is not None:
         groups += (contact,)
+    if e.coupling is not None:
+        six = e.coupling.nodes
+        groups += (np.hstack((np.where(six >= 0, six, none), np.where(has, n + e.rotation, none))),)
     pattern = build_pattern(table, displacements.pattern_nodes(groups)[1], places)
     triangles, wide, wide_springs, *rest = pattern.slots
     # of a rotation's three rows there only the first exists
@@ -67,6 +70,9 @@ def rotation_pattern(
     c, a = np.nonzero(has)
     rows[c, e.column[c, a]] = 3 * (corners.shape[1] + a)
     of_spring = np.tile(np.append(np.arange(13), 15), (len(springs), 1))
+    if e.coupling is not None:
+        twenty_one = np.tile(np.append(np.arange(19), [21, 24]), (len(e.rotation), 1))
+        rest[-1] = _some_rows(rest[-1], twenty_one, np.full(len(twenty_one), 21))
     slots = (
         triangles,
         _some_rows(wide, rows, e.width),

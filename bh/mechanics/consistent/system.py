@@ -15,6 +15,7 @@ from bh.mechanics.consistent import kernels
 from bh.mechanics.consistent.elements import LINEAR, consistent_elements, lock_stiffness
 from bh.mechanics.consistent.forces import ElementForces, Internal
 from bh.mechanics.consistent.membrane import Measure, smoothed_strain
+from bh.mechanics.consistent.membrane_kernels import bar_forces
 from bh.mechanics.consistent.rotations import Slopes, TurningEdges
 from bh.mechanics.consistent.sparsity import rotation_pattern
 from bh.mechanics.shared import penetration as closings
@@ -151,6 +152,8 @@ class ConsistentSystem(TurningEdges):
         grown = None if e.growth is None else e.growth.at(lam)
         stretching, size = e.stretching.forces(x, f, N, grown)
         bending, more, closing = e.bending.forces(x, alpha, e.rest.at(lam), f, r, M, theta)
+        if e.coupling is not None:
+            bending += self._coupled(x, theta, lam, f, r, N, M)
         rest, couple, stiffness, missing = e.spring_rest.at(lam), e.couple.at(lam), e.spring_stiffness, 0.0
         if self.curves is not None:
             stiffness, couple, missing = self.curves.straight(stiffness, couple, self.turns(x, alpha, lam))
@@ -162,6 +165,18 @@ class ConsistentSystem(TurningEdges):
         lock = closings.lock_forces(x, self.hinges, e.lock, f, L) if closing or too else 0.0
         size = float(np.sqrt((size + more + most) / (len(forces) - len(L))))
         return Internal(stretching, bending, springs, lock, size, f, r, forces, theta, turns)
+
+    def _coupled(self, x: Array, theta: Array, lam: float, f: Array, r: Array, N: Array, M: Array) -> float:
+        """Energy of the coupling of laminates, N mm; adds its gradient to f and r, and its forces to N and M."""
+        e = self.elements
+        assert e.coupling is not None
+        membrane = e.stretching.membrane
+        energy, more, turning = e.coupling.forces(e.stretching.gamma(x), theta, lam)
+        bar_forces(x, membrane.bars, membrane.rest_square, more, f)
+        kernels.bending_gradient(x, e.patches.kind, e.quad, e.ghost, e.rotation, turning, f, r)
+        N += more
+        M += turning
+        return energy
 
     def stretching_by_triangle(self, x: Array, lam: float = 0.0) -> Array:
         """(t,) energy of stretching, N mm, of the triangles of the mesh.
@@ -176,9 +191,19 @@ class ConsistentSystem(TurningEdges):
         at_rest = None if growth is None else growth.strains(lam)
         return self.elements.stretching.by_triangle(x, len(self.mesh.triangles), beside, at_rest)
 
-    def bending_by_triangle(self, theta: Array) -> Array:
-        """(t,) energy of bending, N mm, for the angles (c, a) of the patches."""
-        return self.elements.bending.by_triangle(theta, self.elements.B_triangle)
+    def bending_by_triangle(self, theta: Array, x: Array | None = None, lam: float = 0.0) -> Array:
+        """(t,) energy of bending, N mm, and of the coupling of laminates.
+
+        Args:
+            theta: (c, a) angles of the patches, rad.
+            x: (nodes, 3) positions, mm, of a laminate.
+            lam: load parameter of the step, 0 to 1.
+        """
+        e = self.elements
+        out = e.bending.by_triangle(theta, e.B_triangle)
+        if e.coupling is not None and x is not None:
+            out += np.einsum("ta,ta->t", e.coupling.forces(e.stretching.gamma(x), theta, lam)[2], theta)
+        return out
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         """Energy, residual (size,) and element forces (`split`) at q (size,)."""
@@ -237,6 +262,8 @@ class ConsistentSystem(TurningEdges):
             x, joined.kind, e.quad, e.ghost, e.place, e.rotation, e.column, e.width, B, M, e.nodes, *axes,
             pattern.slots[1], data,
         )  # fmt: skip
+        if e.coupling is not None:
+            e.coupling.tangent(x, joined, e.quad, e.ghost, e.rotation, *axes, pattern.slots[-1], data)
         stiffness = self.slopes(x, q, lam)
         closing |= kernels.spring_tangent(
             x, e.hinges, stiffness, S, self._spring_nodes, *axes, pattern.slots[2], data
@@ -244,7 +271,8 @@ class ConsistentSystem(TurningEdges):
         if self.outside is not None:
             self.outside.tangent(x, lam, *axes, pattern.slots[0], data)
         if touching is not None:
-            self.contact_blocks.add(*touching, *axes, pattern.slots[-1], data)
+            last = -1 if e.coupling is None else -2
+            self.contact_blocks.add(*touching, *axes, pattern.slots[last], data)
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
         matrix: Matrix = pattern.matrix(data)
@@ -309,6 +337,10 @@ class ConsistentSystem(TurningEdges):
         kernels.bending_rates(
             x, v, w, joined.kind, e.quad, e.ghost, by * e.rest.rate, e.rotation, slopes.patches, M
         )
+        if e.coupling is not None:
+            dN, dM = e.coupling.rates(e.stretching.gamma_rates(x, v), self._turning(x, v, w, by), controlled)
+            N += dN
+            M += dM
         kernels.spring_rates(
             x,
             v,
@@ -325,6 +357,14 @@ class ConsistentSystem(TurningEdges):
         if closing:
             closings.lock_rates(x, v, self.hinges, e.lock, L)
         return rates, turns
+
+    def _turning(self, x: Array, v: Array, w: Array, by: float) -> Array:
+        """(c, a) rates of the angles of patches, rest angles included where `by` is 1."""
+        e, out = self.elements, np.empty(self.elements.rotation.shape)
+        unit = np.tile(np.eye(3), (len(out), 1, 1))  # of single triangles
+        rest = by * e.rest.rate
+        kernels.bending_rates(x, v, w, e.patches.kind, e.quad, e.ghost, rest, e.rotation, unit, out)
+        return out
 
     def _gradient_rates(self, q: Array, lam: float) -> tuple[Array, Array, float]:
         """Rates with lambda at fixed q of the gradient: f (n, 3) and r; and the second derivative of the energy.
@@ -351,6 +391,9 @@ class ConsistentSystem(TurningEdges):
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         if e.growth is not None:
             second += e.growth.second(e.stretching.gamma_rates(x, v))
+        if e.coupling is not None:
+            turning = self._turning(x, v, np.zeros(e.rotations), 1.0)
+            second += float(np.vdot(e.coupling.moments.rate, turning))
         return f, r, second
 
     def _rest_work(self, M: Array, S: Array) -> float:
@@ -374,6 +417,8 @@ class ConsistentSystem(TurningEdges):
         total += float(self.elements.let_go.rate @ q[self.moving :])
         if self.elements.growth is not None:
             total += self.elements.growth.power(self.elements.stretching.gamma(x), lam)
+        if self.elements.coupling is not None:
+            total += float(np.vdot(self.elements.coupling.moments.rate, now.theta))
         if self.outside is not None:
             total += self.outside.power(x, lam)
             self.outside.forces(x, lam, now.f)
