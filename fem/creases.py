@@ -27,7 +27,7 @@ from bh.loading.load_step import LoadStep
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
 from bh.model.ramp import Ramp
-from fem.shell import edge_tangents
+from fem.shell import ShellElements, edge_tangents
 from fem.spaces import tables
 from meshes.curved import ElementMesh
 from meshes.topology import Ints
@@ -178,3 +178,31 @@ def connectors(
         np.where(prescribed, 0.0, load_step.moment.end[hinges]),
     )
     return Connectors(hinges, edges, of_edge, prescribed, angle, mass, stiffness, rest, load)
+
+
+def spring_entries(
+    creases: Connectors, elements: ShellElements, turns: int, slots: NDArray[np.int32]
+) -> tuple[Ints, Array]:
+    """Where the stiffness of elastic creases goes, and its values.
+
+    Args:
+        creases: of the step.
+        elements: of the sheet.
+        turns: rotations of an edge.
+        slots: (t, entries) of the lower entries of every element in the matrix, -1 where there is none.
+
+    Returns:
+        (k,) places, and (k,) values, N mm / rad.
+    """
+    places, values = [], []
+    triangle = elements.mesh.sheet.topology.edge_triangles[creases.edges, 0]
+    local = np.argmax(elements.loops.edges[triangle] == creases.edges[:, None], axis=1)
+    swapped = elements.loops.sides[triangle, local] < 0
+    first = elements.width
+    for i, j in zip(*np.tril_indices(turns), strict=True):
+        row, column = first + turns * local + i, first + turns * local + j
+        end = np.where(swapped, turns - 1 - i, i), np.where(swapped, turns - 1 - j, j)
+        places.append(slots[triangle, row * (row + 1) // 2 + column])
+        values.append(creases.stiffness * creases.mass[np.arange(len(creases)), end[0], end[1]])
+    place, value = np.concatenate(places), np.concatenate(values)
+    return place[place >= 0], value[place >= 0]

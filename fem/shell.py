@@ -321,3 +321,23 @@ def carried_frames(mesh: ElementMesh, frames: Frames, x: Array, alpha: Array) ->
     angle = alpha @ tables(mesh.degree).turn
     turned = np.cos(angle)[..., None] * d - np.sin(angle)[..., None] * np.cross(t, d)
     return Frames(t, unit(turned))
+
+
+def flat_stiffness(e: ShellElements, mesh: ElementMesh) -> tuple[float, float, float]:
+    """Of the flat sheet, from element stiffness that is never formed as a whole.
+
+    Args:
+        e: its elements.
+        mesh: they are of.
+
+    Returns:
+        a scale of energy, N mm, and the largest force, N, and moment on an edge, N mm, a mm of displacement of a node.
+    """
+    B = e.gradients(mesh.nodes, flat_frames(mesh))
+    count, moves = e.tables.measures, e.moves
+    stretch, move, turn = B[:, :count, :moves], B[:, count:, :moves], B[:, count:, moves:]
+    moments = e.bending @ turn
+    # no entry of a semi-definite matrix is larger than the largest on its diagonal
+    push = (stretch * (e.membrane @ stretch)).sum(axis=1) + (move * (e.bending @ move)).sum(axis=1)
+    couple = np.abs(moments.transpose(0, 2, 1) @ move)
+    return 0.5 * float((turn * moments).sum()), float(push.max()), float(couple.max())

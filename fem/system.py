@@ -18,14 +18,14 @@ from bh.solvers.system import Evaluation, Tangent, grows_ahead
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
-from fem.creases import connectors
+from fem.creases import connectors, spring_entries
 from fem.growth import at_rest
 from fem.here import Here, root_mean_square
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
 from fem.outside import shell_outside
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
-from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, unit
+from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, flat_stiffness, unit
 from fem.state import ShellState
 from meshes.topology import Ints
 
@@ -252,7 +252,7 @@ class ShellSystem:
         moves = self.components.free < self.components.first_alpha
         eps = ROUNDING * float(np.abs(here.x).max())
         load = self.load.at(here.lam)
-        floors = (eps * self._stiffest[0], eps * self._stiffest[1])
+        floors = [eps * stiffest for stiffest in self._flat_stiffness[1:]]
         couples = self.creases.largest(self.components.beta(here.components), here.lam)
         first, width = self.components.first_alpha, self.elements.moves
         acting = float(np.abs(load[:first]).max())
@@ -273,23 +273,10 @@ class ShellSystem:
                 worst = max(worst, largest / max(root_mean_square(inner), outer, 1e-300))
         return worst
 
-    @property
-    def _stiffest(self) -> tuple[float, float]:
-        """Largest force, N, and moment on an edge, N mm, per mm of displacement of one node."""
-        return self._flat_stiffness[1:]
-
     @cached_property
     def _flat_stiffness(self) -> tuple[float, float, float]:
-        """Of the flat sheet: `energy_scale` and `_stiffest`, from element stiffness that is never formed as a whole."""
-        e = self.elements
-        B = e.gradients(self.mesh.nodes, flat_frames(self.mesh))
-        count, moves = e.tables.measures, e.moves
-        stretch, move, turn = B[:, :count, :moves], B[:, count:, :moves], B[:, count:, moves:]
-        moments = e.bending @ turn
-        # no entry of a semi-definite matrix is larger than the largest on its diagonal
-        push = (stretch * (e.membrane @ stretch)).sum(axis=1) + (move * (e.bending @ move)).sum(axis=1)
-        couple = np.abs(moments.transpose(0, 2, 1) @ move)
-        return 0.5 * float((turn * moments).sum()), float(push.max()), float(couple.max())
+        """`energy_scale`, and the largest force and moment on an edge a mm of displacement, of the flat sheet."""
+        return flat_stiffness(self.elements, self.mesh)
 
     def element_tangents(self, here: Here, forces: Array) -> Array:
         """(t, w, w) element tangents at a state, with the given forces in their geometric part.
@@ -433,20 +420,7 @@ class ShellSystem:
     @cached_property
     def _springs(self) -> tuple[Ints, Array]:
         """Slots and values of the stiffness of elastic creases."""
-        c = self.creases
-        slots, values = [], []
-        triangle = self.mesh.sheet.topology.edge_triangles[c.edges, 0]
-        local = np.argmax(self.elements.loops.edges[triangle] == c.edges[:, None], axis=1)
-        swapped = self.elements.loops.sides[triangle, local] < 0
-        turns, first = self.components.rotations, self.elements.width
-        for i, j in zip(*np.tril_indices(turns), strict=True):
-            row, column = first + turns * local + i, first + turns * local + j
-            slot = self._pattern.slots[triangle, row * (row + 1) // 2 + column]
-            end = np.where(swapped, turns - 1 - i, i), np.where(swapped, turns - 1 - j, j)
-            slots.append(slot)
-            values.append(c.stiffness * c.mass[np.arange(len(c)), end[0], end[1]])
-        slot, value = np.concatenate(slots), np.concatenate(values)
-        return slot[slot >= 0], value[slot >= 0]
+        return spring_entries(self.creases, self.elements, self.components.rotations, self._pattern.slots)
 
     @cached_property
     def _ground_triangle(self) -> int:

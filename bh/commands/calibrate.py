@@ -25,7 +25,7 @@ def calibrate(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
-    """Find numbers of a scene by what was measured, with their intervals of 95 %."""
+    """Find numbers of a scene by what was measured."""
     from bh.applications import calibration, calibration_picture
     from bh.commands.calibrate_file import load_task
 

@@ -17,7 +17,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.analysis.contact import first_contact
+from bh.analysis.contact import Contact, first_contact
 from bh.commands.occupied import FINISHED, UNFINISHED
 from bh.commands.result import result
 from bh.commands.run import make_folder, remove_extras, solve, take_back, write_extras
@@ -61,6 +61,7 @@ class Folded:
         written: the files, the scene first.
         notes: what was tried before, and why it was left; one line each.
         seconds: processor time of all of it.
+        contact: the first self-contact of the path, if any.
     """
 
     path: Trace
@@ -69,6 +70,7 @@ class Folded:
     written: tuple[Path, ...]
     notes: tuple[str, ...]
     seconds: float
+    contact: Contact | None
 
 
 class _Clock:
@@ -292,9 +294,10 @@ def _kept(
         shutil.rmtree(each, ignore_errors=True)
     with replacing(target) as draft:
         draft.write_text(offer.text, encoding="utf-8")
-    text = result(path, scene, first_contact(path)) | {"assumed": list(offer.assumed), "tried": list(notes)}
+    contact = first_contact(path)
+    text = result(path, scene, contact) | {"assumed": list(offer.assumed), "tried": list(notes)}
     with replacing(folder / FINISHED[1]) as draft:
         draft.write_text(json.dumps(text, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     written = [target, *(folder / name for name in FINISHED)]
     written += write_extras(path, scene, folder)
-    return Folded(path, scene, offer, tuple(written), notes, time.process_time() - began)
+    return Folded(path, scene, offer, tuple(written), notes, time.process_time() - began, contact)

@@ -65,6 +65,9 @@ def fold(  # noqa: PLR0913 - the options of a command line
             "--seconds", metavar="150s", parser=a_time, help="For solving; counted by work, not by the clock."
         ),
     ] = 150.0,
+    contact: Annotated[
+        bool, typer.Option("--contact", help="Panels of nets stop each other, too: takes its time.")
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Write over a scene that is there.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
@@ -76,7 +79,7 @@ def fold(  # noqa: PLR0913 - the options of a command line
 
     number = int(frame) if frame is not None and frame.isdigit() else frame
     one = sheet if isinstance(sheet, int) else None
-    wish = Wish(angle, percent, material, fit, scale, number, one, tuple(write or ()))
+    wish = Wish(angle, percent, material, fit, scale, number, one, tuple(write or ()), contact)
     folder = Path(f"{file.stem}-folded") if output is None else output
     if sheet == "all":
         together = fold_sheets(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
@@ -106,7 +109,7 @@ def _told(done: Folded, name: str, quiet: bool) -> bool:
         for line in done.notes:
             say(f"tried: {line}")
         say(f"mesh: {done.proposal.mesh}; {done.path.model.formulation}")
-        summary(done.path, done.scene, done.written, None)
+        summary(done.path, done.scene, done.written, done.contact)
     if not done.path.reached:
         say(
             f"bh: {name}: folded to {100 * done.path[-1].lam:.0f} % of what was wanted ({done.notes[-1]}); "

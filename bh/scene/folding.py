@@ -56,6 +56,7 @@ class Wish:
         frame: of a FOLD file.
         sheet: which of several sheets that are drawn, from 1.
         write: formats of the folded sheet, such as "glb".
+        contact: panels of a net of faces stop each other, too, which takes its time; other sheets do so anyway.
     """
 
     angle: float | None = None
@@ -66,6 +67,10 @@ class Wish:
     frame: int | str | None = None
     sheet: int | None = None
     write: tuple[str, ...] = ()
+    contact: bool = False
+
+
+PASSING = "panels of a net may pass through each other; without this line they stop, which takes its time"
 
 
 @dataclass(frozen=True)
@@ -168,6 +173,11 @@ def _proposed(
             f"# {file.name} folded by `bh fold`; edit it, and run it by `bh run`. mm, N, rad; docs/scenes.md.",
             *(f"# assumed: {line}" for line in (*assumed, words)),
             "",
+            *(
+                [f"contact = false                  # {PASSING}", ""]
+                if formulation and not wish.contact
+                else []
+            ),
             *([mesh, ""] if mesh.startswith("accuracy") else []),
             "[pattern]",
             f"file = {_quoted(file.name)}",

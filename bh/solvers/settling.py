@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.factor import Factor
+from bh.solvers.hinged import Hinged
 from bh.solvers.load_control import jump
 from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted
 from bh.solvers.newton import NEAR_SADDLE, Newton, Solution, line_search, roll_off
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, Point, extrapolate, lambda_after, point
 from bh.solvers.stops import KEPT, around
-from bh.solvers.system import Evaluation, Hinged, System
+from bh.solvers.system import Evaluation, System
 
 Array = NDArray[np.float64]
 NOTE = "settled: moved downhill to rest"

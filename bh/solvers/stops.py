@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.solvers.factor import Descent, Factor
-from bh.solvers.system import Hinged, System, limited
+from bh.solvers.hinged import Hinged
+from bh.solvers.system import System, limited
 
 Array = NDArray[np.float64]
 KEPT = 0.2  # of the way of a hinge to closed that a step downhill leaves

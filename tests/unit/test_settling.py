@@ -13,10 +13,11 @@ from bh.mechanics.shared.hinge_lock import ZONE
 from bh.mechanics.shared.penetration import left_to_close
 from bh.runtime.progress import Silent
 from bh.scene.load import parse_scene
+from bh.solvers.hinged import Hinged
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, point
 from bh.solvers.settling import NOTE, Settling
-from bh.solvers.system import Hindered, Hinged, Limited, Remembering
+from bh.solvers.system import Hindered, Limited, Remembering
 from bh.solvers.walk import Walk, walk
 from tests.unit.test_newton import Arch
 from verification.studies.solver.benchmark_systems import VonMisesTruss

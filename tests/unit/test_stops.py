@@ -23,6 +23,7 @@ from bh.solvers.system import System
 
 CELLS, SEED = 6, 4
 SCENE = """
+contact = false
 [pattern]
 file = "net.fold"
 [sheet]

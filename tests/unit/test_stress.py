@@ -74,9 +74,9 @@ def test_pulled_at_an_angle_to_the_grain(name: str) -> None:
 P = 0.01  # N
 
 
-def lifted(name: str, along: int, P: float = P, **more: float) -> bh.Path:
+def lifted(name: str, along: int, P: float = P, strength: float | None = None) -> bh.Path:
     """A clamped strip (40 x 10 x 0.2 mm, nu = 0) with a force at its end."""
-    sheet = Sheet(E=193_000.0, nu=0.0, t=0.2, **more)
+    sheet = Sheet(E=193_000.0, nu=0.0, t=0.2, strength=strength)
     model = Model(strip(40.0, 10.0, along, along // 10), sheet, formulation=name)
     return bh.trace(
         model.support("edge:start", "xyz", clamp=True).step(Force("edge:end", total=(0.0, 0.0, P)))

@@ -24,8 +24,9 @@ from bh.model.model import Model
 from bh.model.ramp import Ramp
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix
+from bh.solvers.hinged import Stops
 from bh.solvers.outcome import Outcome
-from bh.solvers.system import Stops, System, grows_ahead
+from bh.solvers.system import System, grows_ahead
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -322,7 +323,7 @@ class SupportedSheet:
         return hinge_penetration.left_to_close(self.angles(q, lam), self.angles(q_new, lam))
 
     def stops(self, q: Array, q_new: Array, lam: float) -> Stops:
-        """Hinges that a step would close, or turn too far; see `bh.solvers.system.Hinged`."""
+        """Hinges that a step would close, or turn too far; see `bh.solvers.hinged.Hinged`."""
         return hinge_penetration.stops(self.angles(q, lam), self.angles(q_new, lam))
 
     def turning(self, q: Array, lam: float, hinges: Ints) -> Array:

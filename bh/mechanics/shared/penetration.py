@@ -13,8 +13,8 @@ from bh.loading.load_step import hinge_name
 from bh.mechanics.shared.assembly import add_lower, add_product, rotate
 from bh.mechanics.shared.hinge_lock import ZONE, in_zone, lock, until_closed
 from bh.mechanics.shared.kinematics import INNER_OPTIONS, OPTIONS, add_hinge_hessian, hinge_geometry
+from bh.solvers.hinged import Stops
 from bh.solvers.stops import KEPT
-from bh.solvers.system import Stops
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
