@@ -272,6 +272,29 @@ def test_perforated_creases_are_joined_with_one_remark(tmp_path: Path) -> None:
     assert np.abs(80.0 - sample(crease.curve)[:, 1] - exact).max() < 0.2
 
 
+def test_a_perforated_fan_comes_back_up_to_its_tip(tmp_path: Path) -> None:
+    """Seven creases of dashes and gaps of 3 and 1 mm that meet at (60, 0) on the rim, mountains and valleys in turn."""
+    rays = []
+    for k in range(7):
+        angle = np.pi * (k + 1) / 8
+        along = np.array([np.cos(angle), np.sin(angle)])
+        reach = min(60.0 / max(abs(along[0]), 1e-9), 80.0 / along[1])
+        dashes = [
+            "M{:.3f},{:.3f} L{:.3f},{:.3f}".format(*(60.0, 0.0) + s * along, *(60.0, 0.0) + e * along)
+            for s, e in ((s, min(s + 3.0, reach)) for s in np.arange(0.0, reach, 4.0).tolist())
+        ]
+        rays.append(f'<path d="{" ".join(dashes)}" stroke="{("red", "blue")[k % 2]}"/>')
+    pattern = read_pattern(svg(tmp_path, RIM + "".join(rays)))
+    (remark,) = pattern.remarks
+    assert remark.endswith("dashes in line are taken as 7 perforated creases")
+    assert [crease.fold for crease in pattern.creases].count("mountain") == 4
+    assert len(pattern.creases) == 7
+    for crease in pattern.creases:
+        ends = sample(crease.curve)[[0, -1]]
+        assert np.linalg.norm(ends - [60.0, 80.0], axis=1).min() < 0.01  # the tip, seen from +z
+        assert np.linalg.norm(ends[1] - ends[0]) > 59.0
+
+
 def test_creases_in_line_that_meet_others_are_no_dashes(tmp_path: Path) -> None:
     lines = "".join(f"M{20 * k},40 h10 M{20 * k + 10},0 v80 M{20 * k + 20},0 v80" for k in range(6))
     pattern = read_pattern(svg(tmp_path, RIM + f'<path d="{lines}" stroke="red"/>'))
