@@ -139,7 +139,7 @@ class Accuracy:
         )
 
 
-def stored(data: Mapping[str, Any]) -> Accuracy:
+def stored(data: Mapping[str, object]) -> Accuracy:
     """What a path file tells of the error, its types looked at.
 
     Args:
