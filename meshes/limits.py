@@ -26,6 +26,7 @@ class Limits:
         triangles: of a mesh; gmsh makes some twenty thousand a second, a million take gigabytes to solve.
         entities: of a drawing's file, every <use> and block written out; rows of a .cp file; vertices, edges or
             faces of a frame of a FOLD file.
+        frames: of a FOLD file; each may inherit from all the others.
         attributes: of an SVG file, those of groups counted again for every element in them, since they are handed down.
         transforms: of an SVG file in the same way; some 50 microseconds each to read.
         style_characters: of the style sheets of an SVG file.
@@ -48,6 +49,7 @@ class Limits:
     entries: int = 100_000
     triangles: int = 250_000
     entities: int = 20_000
+    frames: int = 1_000
     attributes: int = 1_000_000
     transforms: int = 60_000
     style_characters: int = 100_000

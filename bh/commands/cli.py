@@ -26,7 +26,7 @@ from bh.commands.flat import export
 from bh.commands.fold_options import fold
 from bh.commands.response import response
 from bh.runtime.consent import take_options
-from bh.runtime.terminal import say
+from bh.runtime.terminal import say, shortened
 
 if TYPE_CHECKING:
     from bh.paths.path import Path as Trace
@@ -141,7 +141,7 @@ def _explain(error: Exception, debug: bool) -> int:
 def _fail(message: str, code: int, debug: bool) -> int:
     if debug:
         traceback.print_exc()
-    say("bh: " + " ".join(message.split()), err=True)
+    say("bh: " + shortened(" ".join(message.split())), err=True)
     return code
 
 

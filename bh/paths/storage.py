@@ -118,6 +118,7 @@ class PathFile:
         if file.exists() and not replace:
             raise PathFileError(f"'{file}' exists; resume it, remove it or choose another name")
         draft = file.with_name(file.name + ".part")
+        db = None
         try:
             for old in (draft, _journal(draft)):
                 old.unlink(missing_ok=True)
@@ -141,8 +142,11 @@ class PathFile:
             draft.replace(file)
             return cls(file, _connect(file))
         except (OSError, sqlite3.Error) as error:
-            with suppress(OSError):
-                draft.unlink(missing_ok=True)
+            if db is not None:
+                db.close()
+            for left in (draft, _journal(draft)):
+                with suppress(OSError):
+                    left.unlink(missing_ok=True)
             raise PathFileError(
                 f"cannot write '{file}' ({error}); choose a folder that can be written"
             ) from error

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TypedDict, cast
 
@@ -74,6 +75,7 @@ class Journal:
             SweepError: the folder cannot be written.
         """
         draft = file.with_name(file.name + ".part")  # a kill leaves no file, or one that can be gone on from
+        db = None
         try:
             for old in (draft, *_logs(draft), file, *_logs(file)):
                 old.unlink(missing_ok=True)
@@ -87,6 +89,11 @@ class Journal:
             draft.replace(file)
             return cls(file, _connect(file))
         except (OSError, sqlite3.Error) as error:
+            if db is not None:
+                db.close()
+            for left in (draft, *_logs(draft)):
+                with suppress(OSError):
+                    left.unlink(missing_ok=True)
             raise SweepError(f"cannot write '{file}' ({error}); choose another output with -o") from error
 
     @classmethod

@@ -145,6 +145,7 @@ def select(data: dict[str, Any], frame: int | str | None) -> dict[str, Any]:
         FileFormatError: there is no such frame, or frames inherit in a circle.
     """
     frames = [data, *_list(data, "file_frames")]
+    check_limit("frames", len(frames), "this file", FileFormatError)
     for number, each in enumerate(frames):
         if not isinstance(each, dict):
             raise FileFormatError(f"file_frames[{number - 1}] is {show(each)}; a frame is an object {{...}}")

@@ -351,6 +351,18 @@ def test_wrong_command_lines(capsys: pytest.CaptureFixture[str], words: Any, tol
     assert told in err
 
 
+def test_a_name_of_any_length_is_told_in_a_short_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = "z" * 1_000_000
+    (tmp_path / "bad.toml").write_text(text_of(model=f'[model]\nformulation = "{name}"'))
+    code, err, _ = command(capsys, "check", tmp_path / "bad.toml", "--no-picture")
+    assert code == 2
+    assert "model.formulation" in err
+    assert "use one of" in err
+    assert len(err) < 2500
+
+
 def test_traceback_only_with_debug(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "bad.toml").write_text("[sheet")
     assert main(["run", str(tmp_path / "bad.toml"), "--debug"]) == 2

@@ -188,6 +188,19 @@ def test_vertices_edges_and_faces_of_a_fold_file_are_counted_first(tmp_path: Pat
             read_fold(file)
 
 
+def test_frames_of_a_fold_file_are_counted_first(tmp_path: Path) -> None:
+    """Each inherits from the one before: 100,000 of them took minutes."""
+    chain = [{"frame_inherit": True, "frame_parent": number} for number in range(5_000)]
+    sheet = {"vertices_coords": [[0, 0], [1, 0], [1, 1]], "faces_vertices": [[0, 1, 2]]}
+    (tmp_path / "bomb.fold").write_text(json.dumps({**sheet, "file_frames": chain}), encoding="utf-8")
+    with pytest.raises(FileFormatError, match="5,001 frames, more than 1,000"):
+        read_fold(tmp_path / "bomb.fold")
+    (tmp_path / "long.fold").write_text(json.dumps({**sheet, "file_frames": chain[:999]}), encoding="utf-8")
+    began = time.process_time()
+    assert len(read_fold(tmp_path / "long.fold").triangles) == 1
+    assert time.process_time() - began < 2.0
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
 def test_a_pipe_is_no_fold_file(tmp_path: Path) -> None:
     """It would be waited for."""

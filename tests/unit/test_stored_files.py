@@ -19,7 +19,7 @@ from bh.applications.inverse.surrogate import loaded
 from bh.commands.cli import main
 from bh.errors import InputError
 from bh.paths.stored import parsed
-from bh.sweep.journal import Journal
+from bh.sweep.journal import Journal, Meta
 
 SCENE = """
 [pattern]
@@ -273,15 +273,8 @@ def test_texts_of_a_data_set_are_counted_as_they_are_read(
 
 def test_a_journal_that_lies_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "x.points"
-    details = {
-        "identity": "i",
-        "names": ["t"],
-        "values": [[1.0]],
-        "grid": True,
-        "labels": {},
-        "attributes": {},
-    }
-    Journal.create(file, details).close()  # type: ignore[arg-type]
+    details = Meta(identity="i", names=["t"], values=[[1.0]], grid=True, labels={}, attributes={})
+    Journal.create(file, details).close()
     with closing(Journal.open(file)) as journal:
         assert journal.meta["identity"] == "i"
     with closing(sqlite3.connect(file)) as db, db:
@@ -296,3 +289,23 @@ def test_a_journal_that_lies_is_refused(tmp_path: Path) -> None:
         db.execute("CREATE TRIGGER t AFTER INSERT ON points BEGIN SELECT 1; END")
     with pytest.raises(InputError, match="not of this format"):
         Journal.open(file)
+
+
+def test_a_full_disk_leaves_nothing_behind(
+    tmp_path: Path, solved: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neither half a file, nor its journal, nor the folder that was made for it."""
+    plain = sqlite3.connect
+
+    def small(file: Path, timeout: float = 5.0) -> sqlite3.Connection:
+        db = plain(file, timeout)
+        db.execute("PRAGMA max_page_count = 3")
+        return db
+
+    monkeypatch.setattr("sqlite3.connect", small)
+    out = tmp_path / "out"
+    assert "disk is full" in refused(capsys, "run", solved / "scene.toml", "-o", out, "-q", "--no-estimate")
+    details = Meta(identity="i", names=["x" * 20_000], values=[], grid=True, labels={}, attributes={})
+    with pytest.raises(InputError, match="disk is full"):
+        Journal.create(tmp_path / "x.points", details)
+    assert list(tmp_path.iterdir()) == []
