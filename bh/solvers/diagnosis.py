@@ -45,13 +45,14 @@ def diagnose(system: System, failure: Increment) -> Increment:
 
 
 def free_motion(system: System, failure: Increment) -> tuple[str, float]:
-    """The motion of the last state that nothing resists, in words, and its stiffness in parts of the typical one.
-
-    Empty, and 0, where there is none.
+    """The motion of the last state that nothing resists.
 
     Args:
         system: whose equilibrium is sought.
         failure: the increment that failed.
+
+    Returns:
+        it in words, and its stiffness in parts of the typical one; empty and 0 where there is none.
     """
     here = failure.point
     matrix = system.tangent(here.q, here.lam, here.forces).matrix

@@ -144,7 +144,9 @@ def test_what_one_cannot_do_is_no_failure_unless_it_was_named(
         '[pattern]\nkind = "strip"\nlength = 20.0\nwidth = 10.0\ncreases = [5.0]\n[sheet]\nE = 4000.0\nt = 0.2\n'
         '[mesh]\nalong = 2\n[[steps]]\nfold = { crease = "crease", by = "30deg" }\n[[steps]]\nhold = "edge:start"\n'
     )
-    pair = ["--formulation", "consistent", "--formulation", "linear-shell"]
-    assert main(["compare", str(file), "-q", *pair]) == 0
-    assert main(["compare", str(file), "-q", *pair[:2], "--formulation", "bars-and-hinges"]) == 1
+    assert main(["compare", str(file), "--json", str(tmp_path / "all.json"), "-q"]) == 0
+    members = json.loads((tmp_path / "all.json").read_text())["formulations"]
+    assert {m["formulation"]: m["outcome"] for m in members}["bars-and-hinges"] == "refused"
+    pair = ["--formulation", "consistent", "--formulation", "bars-and-hinges"]
+    assert main(["compare", str(file), "-q", *pair]) == 1
     assert "not reached by bars-and-hinges" in capsys.readouterr().err
