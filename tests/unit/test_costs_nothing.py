@@ -53,7 +53,7 @@ def test_no_folding_arrays_without_creases() -> None:
         evaluation = system.evaluate(system.start(), 0.5)
         assert len(evaluation.forces) == len(e.bars) + e.bending
         assert isinstance(system.tangent(system.start(), 0.5, evaluation.forces).matrix, BandMatrix)
-        assert system.rigid_contact is None
+        assert system.outside is None
 
 
 def test_folding_arrays_are_those_of_the_crease() -> None:

@@ -111,8 +111,8 @@ def shaken(formulation: str, seed: int) -> tuple[BarsAndHingesSystem | Consisten
 def test_derivatives(formulation: str) -> None:
     """Gradient, Hessian, rate with lambda and power against central differences."""
     system, q, lam = shaken(formulation, 3)
-    assert system.rigid_contact is not None
-    assert np.abs(system.rigid_contact.contact_forces(system.positions(q, lam), lam)["bar"]).max() > 1.0
+    assert system.outside is not None
+    assert np.abs(system.outside.contact_forces(system.positions(q, lam), lam)["bar"]).max() > 1.0
     now, h = system.evaluate(q, lam), 1e-6
     matrix = system.tangent(q, lam, now.forces).matrix
     rng = np.random.default_rng(5)

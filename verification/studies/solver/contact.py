@@ -50,9 +50,9 @@ def read(path: Path) -> tuple[float, float, float]:
     """Deflection of the middle, mm, force of the cylinder, N, and the arm of its force on a half, mm."""
     system, _ = path.solved()
     assert isinstance(system, ConsistentSystem)
-    assert system.rigid_contact is not None
+    assert system.outside is not None
     x, nodal = path[-1].points, np.zeros_like(path[-1].points)
-    system.rigid_contact.forces(x, 1.0, nodal)
+    system.outside.forces(x, 1.0, nodal)
     down = nodal[:, 2]
     arm = float(np.abs(x[:, 0] - HALF) @ down / down.sum())
     middle = path.model.mesh.nodes(f"near:{HALF},{0.5 * WIDE}")
