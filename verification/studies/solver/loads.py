@@ -231,9 +231,9 @@ def run(context: Context) -> CaseResult:
         result.check("Levy's deflection", levy, unit="t", reference=exact, params={"load": load})
     result.notes.append(
         "Levy's table (1942, NACA TN 847; a series that was cut off, three digits) was to be the reference of the "
-        "plate with large deflections, to 2 %. The finest meshes of both formulations came out 2.1 and 2.4 % below "
-        "it at the largest load, next to each other; Karman's equations solved by Ritz say that the table is 0.5, 1.4 "
-        "and 2.5 % too large there, so these are the reference, to 1 %."
+        "plate with large deflections, to 2 %. The finest meshes of both formulations came out 2.1 and 2.4 % below it "
+        "at the largest load, next to each other; Karman's equations solved by Ritz say that the table is 0.5, 1.4 and "
+        "2.5 % too large there, so these are the reference, to 1 %."
     )
     result.notes.append(
         "The held strip is shallow (its slope is 0.01), so that a pressure that follows it and one that does not are "
