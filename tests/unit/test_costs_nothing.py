@@ -95,7 +95,6 @@ def test_no_rotations_without_the_consistent_formulation() -> None:
         "fem",
         "skfem",
         "ipctk",
-        "shapely",
         "bh.analysis",
     )
     look = {"bh.analysis", *(f"bh.analysis.{name}" for name in ("contact", "projection", "triangles"))}
