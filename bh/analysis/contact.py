@@ -188,6 +188,9 @@ class _Detector:
         from bh.analysis.triangles import intersecting
 
         triangles = self.mesh.triangles
+        points = np.array(
+            points
+        )  # those of states are read-only, for which kernels would be compiled once more
         if seen_once(points, triangles, self.edges):
             return np.empty((0, 2), dtype=np.int64)
         tolerance = TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))

@@ -45,6 +45,8 @@ KERNELS = (
     "bh.mechanics.consistent.membrane_kernels:bar_rates d2 d2 q2 d1",
     "bh.mechanics.consistent.kernels:bending_rates d2 d2 d1 q2 q3 d3 d2 q2 d3 d2",
     "bh.mechanics.consistent.kernels:spring_rates d2 d2 d1 q2 d1 d1 d1 q2 d1 d1",
+    "bh.analysis.projection:outline q2r",
+    "bh.analysis.projection:seen_once d2 q2r q2",
     "bh.solvers.dissection:_spread q1 q1 q q1 q1",
     "bh.solvers.dissection:_dissect q1 q1 q1 d2 q2 q b1 b1",
     "bh.solvers.sparse:_lower q1 q1 q1",

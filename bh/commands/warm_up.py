@@ -9,6 +9,7 @@ import math
 
 import meshes
 from bh.analysis.contact import candidates
+from bh.analysis.projection import meets_itself, outline
 from bh.analysis.triangles import intersecting
 from bh.commands.compile_ahead import compiled_ahead
 from bh.formulations.registry import names
@@ -28,7 +29,9 @@ def warm_up() -> None:
         "edge:start", "xyz", clamp=True
     )
     trace(clamped.fold("crease", rest=3.0, Lstar=1.0))
-    intersecting(path[-1].points, mesh.triangles, candidates(path[-1].points, mesh.triangles), 1e-9)
+    x = path[-1].points
+    intersecting(x, mesh.triangles, candidates(x, mesh.triangles), 1e-9)
+    meets_itself(x, mesh.triangles, outline(mesh.triangles), 1e-9)
     wide = meshes.structured(meshes.annulus_sector(10.0, 5.0, 1.0), along=64, rows=20)  # too wide for a band
     system = Path(Model(wide, Sheet(E=1.0, t=0.1)).fold("crease", rest=3.0, Lstar=1.0)).system(0)
     now = system.evaluate(system.start(), 0.0)

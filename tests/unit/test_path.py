@@ -522,7 +522,7 @@ def test_resumed_after_a_kill(name: str, tmp_path: FilePath) -> None:
 def test_resumed_while_following_by_arc_length(
     strategy: Automatic | ArcLength, states: int, tmp_path: FilePath
 ) -> None:
-    """A column under a dead load far beyond buckling: killed at any point, it goes on in the same way."""
+    """A column under a dead load far beyond buckling, through itself: killed anywhere, it goes on in the same way."""
     strip = meshes.structured(meshes.strip(40.0, 8.0), along=20)
     model = (
         Model(strip, Sheet(E=1000.0, t=0.2), formulation="bars-and-hinges", contact=False)
