@@ -69,6 +69,7 @@ STUDIES = (
     Study("appendix_b_sheets", "B", part_of="appendix_b", seconds=6),
     Study("shell_benchmarks", "solver"),
     Study("eigenvalues", "solver"),
+    Study("actuated", "solver", seconds=8),
     Study("published", "solver", seconds=250),
     Study("tables4", "4", seconds=1),
     Study("speed_error", "solver", long=True),
