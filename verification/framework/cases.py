@@ -70,6 +70,7 @@ STUDIES = (
     Study("shell_benchmarks", "solver"),
     Study("eigenvalues", "solver"),
     Study("loads", "solver"),
+    Study("actuated", "solver", seconds=8),
     Study("published", "solver", seconds=250),
     Study("peers", "solver", seconds=15),
     Study("tables4", "4", seconds=1),
