@@ -195,7 +195,7 @@ def test_scenes_of_the_gallery_are_read(file: Path) -> None:
 def test_the_gallery(site: Path) -> None:
     links_lead_somewhere(site)
     gallery = {file.stem for file in (site / "gallery").glob("*.html")}
-    assert gallery == {"index", *(file.stem for file in (*SCENES, *SCRIPTS))}
+    assert gallery == {"index", "cookbook", *(file.stem for file in (*SCENES, *SCRIPTS))}
 
 
 @pytest.mark.slow
@@ -213,14 +213,16 @@ def test_scripts_of_the_gallery_run(file: Path, site: Path) -> None:
     """Every file that a script names is there afterwards, and no other; the site is built by running each."""
     text = file.read_text(encoding="utf-8")
     folder = site.parent / "source" / "gallery"
-    made = {found.name for found in folder.glob(f"{file.stem}*") if found.suffix != ".md"}
+    cookbook = {entry.stem for entry in (ROOT / "examples" / "cookbook").glob("*.py")}  # their pictures
+    there = [found for found in folder.iterdir() if found.stem not in cookbook]
+    made = {found.name for found in there if found.name.startswith(file.stem) and found.suffix != ".md"}
     assert made
     for name in made:
         assert f'"{name}"' in text
     assert {part for part in text.split('"') if part.startswith(f"{file.stem}") and "." in part} == made
     stems = tuple(other.stem for other in (*SCENES, *SCRIPTS))
-    others = {found.name for found in folder.iterdir() if not found.name.startswith(stems)}
-    assert others == {"index.md"}
+    others = {found.name for found in there if not found.name.startswith(stems)}
+    assert others == {"index.md", "cookbook.md"}
 
 
 @pytest.mark.slow
