@@ -84,7 +84,10 @@ def report(scene: Scene) -> list[str]:
         if isinstance(support, Support):
             what = f"fix {support.fix}" if support.fix is not None else "clamped"
             lines.append(f"support at {support.at}: {what}, {count(len(select(mesh, support.at)), 'node')}")
-    if not model.supports:
+    for spring in model.springs:
+        nodes = count(len(select(mesh, spring.at)), "node")
+        lines.append(f"springs to the ground at {spring.at}: {nodes}")
+    if not (model.supports or model.springs):
         lines.append("supports: none; rigid motions are taken out, nothing is held")
     for i, step in enumerate(model.steps):
         items = [_words(item) for item in (*step.actuations, *step.support, step.until) if item]
