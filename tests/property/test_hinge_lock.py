@@ -188,7 +188,9 @@ def test_stiffness_of_the_locks() -> None:
     e = first_system(flap(50.0).force("edge:outer", total=(0.0, 0.0, -0.01))).elements
     assert e.lock == pytest.approx(e.hinge_stiffness, rel=1e-14)
     assert not first_system(replace(model, hinge_lock=False)).elements.lock.any()
-    e = first_system(Model(mesh, SHEET, formulation="bars-and-hinges").fold("crease", to=2.0)).elements
+    e = first_system(
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False).fold("crease", to=2.0)
+    ).elements
     assert e.prescribed > 0
     assert not e.lock[-e.prescribed :].any()
     assert e.lock[: -e.prescribed].all()
@@ -206,11 +208,13 @@ def test_stiffness_of_the_locks_where_stiffness_is_given() -> None:
 def test_what_is_in_contact_is_named() -> None:
     """Bending hinges by their edge, creases by their shortest name; held creases never."""
     mesh = flap().mesh
-    held = trace(Model(mesh, SHEET, formulation="bars-and-hinges").fold("crease", to=0.2 * ZONE))
+    held = trace(
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False).fold("crease", to=0.2 * ZONE)
+    )
     assert held.outcome == "reached"
     assert system_of(held, 0).contact(held.records[-1].q, 1.0) == ""
     plain = (
-        Model(mesh, SHEET, formulation="bars-and-hinges")
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False)
         .support("crease:crease", "xyz")
         .support("edge:inner", "xyz")
     )  # no law: sheet
@@ -329,9 +333,9 @@ def test_nothing_changes_where_no_hinge_is_near() -> None:
     """Energies, positions and iterations to the last digit, with the lock and without."""
     mesh = meshes.structured(meshes.annulus_sector(40.0, 8.0, 0.6), along=8)
     for model in (
-        Model(mesh, SHEET, formulation="bars-and-hinges").fold("crease", to=1.2),
-        Model(mesh, SHEET, formulation="bars-and-hinges").fold("crease", rest=1.2, Lstar=2.0),
-        Model(mesh, SHEET, formulation="bars-and-hinges").fold(
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False).fold("crease", to=1.2),
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False).fold("crease", rest=1.2, Lstar=2.0),
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False).fold(
             "crease", to=math.radians(1.0)
         ),  # a prescribed crease may go where the lock would be
     ):
