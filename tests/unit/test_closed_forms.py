@@ -53,7 +53,7 @@ def cantilever(along: int) -> Model:
     mesh = meshes.structured(meshes.strip(LENGTH, HEIGHT), along=along, kind="alternating")
     clamped = np.flatnonzero(mesh.points[:, 0] <= 1.001 * LENGTH / along)
     return (
-        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges", contact=False)
         .support("edge:start", "xyz")
         .support(clamped.tolist(), "z")
     )
@@ -132,7 +132,7 @@ def test_strip_in_tension(kind: Kind, along: int) -> None:
     mesh = meshes.structured(meshes.strip(LENGTH, HEIGHT), along=along, kind=kind)
     u = 1e-4
     model = (
-        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges", contact=False)
         .support("edge:start", "xyz")
         .support("edge:end", "z")
     )
@@ -153,7 +153,7 @@ def twist_energy(alpha: float, kind: Kind) -> float:
     mesh = meshes.structured(meshes.strip(LENGTH, HEIGHT), along=round(alpha * LENGTH / HEIGHT), kind=kind)
     down, up = (Displace(f"corner:{side}-end", "z", by) for side, by in (("inner", -1e-4), ("outer", 1e-4)))
     return linear_energy(
-        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges", contact=False)
         .support("edge:start", "xyz")
         .step(down, up)
     )
@@ -211,7 +211,7 @@ def test_square_cell_folded_along_its_diagonal() -> None:
     mesh = square_cell()
     w = 1e-5
     model = (
-        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges", contact=False)
         .support([0, 1, 2], "xyz")
         .support([3], "x")
         .displace([3], "z", w)
@@ -224,7 +224,7 @@ def test_square_cell_is_dead_loaded() -> None:
     """The same hinge under a dead force: w = F h^2 / k, potential - F w / 2."""
     mesh = square_cell()
     model = (
-        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges", contact=False)
         .support([0, 1, 2], "xyz")
         .support([3], "xy")
     )
@@ -242,7 +242,7 @@ D = SHEET.bending_stiffness(nu=0.0)
 
 def folded_strip(kind: Kind, rows: int, fold: str = "mountain") -> Model:
     mesh = meshes.structured(meshes.strip(30.0, 10.0, [4.0], fold), along=8, kind=kind, rows=rows)  # type: ignore[arg-type]
-    return Model(mesh, SHEET, formulation="bars-and-hinges")
+    return Model(mesh, SHEET, formulation="bars-and-hinges", contact=False)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -309,7 +309,7 @@ def folded_sector(
 ) -> bh.State:
     mesh = meshes.structured(meshes.annulus_sector(100.0, 10.0, angle), along=along, kind=kind)
     return reached(
-        Model(mesh, SHEET, formulation="bars-and-hinges")
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False)
         .support("crease:crease", "z")
         .support("rigid-body")
         .fold("crease", to=dihedral)
@@ -383,7 +383,9 @@ def test_full_annulus_of_cones_does_not_exist() -> None:
     """A closed annulus cannot fold with its crease kept plane but by stretching: far above the cone."""
     mesh = meshes.structured(meshes.full_annulus(100.0, 10.0), along=48)
     model = (
-        Model(mesh, SHEET, formulation="bars-and-hinges").support("crease:crease", "z").support("rigid-body")
+        Model(mesh, SHEET, formulation="bars-and-hinges", contact=False)
+        .support("crease:crease", "z")
+        .support("rigid-body")
     )
     path = trace(model.fold("crease", to=math.pi - 0.1))
     cone = cone_theory.bending_energy(angle=2.0 * math.pi, dihedral=math.pi - 0.1, **CONE)
@@ -395,7 +397,7 @@ def test_dead_loads_and_folds_superpose_when_small() -> None:
     """Linear response: the response to two loads is the sum of the responses."""
     mesh = meshes.structured(meshes.strip(LENGTH, HEIGHT), along=20, kind="alternating")
     model = (
-        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges")
+        Model(mesh, Sheet(E=E, t=T), formulation="bars-and-hinges", contact=False)
         .support("edge:start", "xyz")
         .support("node:1", "z")
     )
