@@ -99,6 +99,9 @@ def laid_flat(frame: Frame) -> Frame:
     return replace(frame, points=turned(frame.points), bends=bends)
 
 
+MOST_OBJECTS = 200_000  # in JSON, some 70 bytes each in memory
+
+
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
     """The JSON object at the top of a FOLD file.
 
@@ -116,6 +119,8 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
         text = drawing_bytes(path, "FOLD").decode("utf-8-sig")
         if not text.strip():
             raise FileFormatError("the file is empty; give a FOLD file")
+        if text.count("{") > MOST_OBJECTS:
+            raise FileFormatError(f"more than {MOST_OBJECTS:,} objects {{...}}; FOLD has one a frame")
         data = json.loads(text, parse_constant=refuse)
     except UnicodeDecodeError as error:
         raise FileFormatError(f"byte {error.start} is not UTF-8; save the file as UTF-8 text") from error

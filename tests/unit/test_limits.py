@@ -196,6 +196,9 @@ def test_frames_of_a_fold_file_are_counted_first(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="5,001 frames, more than 1,000"):
         read_fold(tmp_path / "bomb.fold")
     (tmp_path / "long.fold").write_text(json.dumps({**sheet, "file_frames": chain[:999]}), encoding="utf-8")
+    (tmp_path / "many.fold").write_text('{"x": [' + "{}," * 300_000 + "{}]}", encoding="utf-8")
+    with pytest.raises(FileFormatError, match="more than 200,000 objects"):
+        read_fold(tmp_path / "many.fold")
     began = time.process_time()
     assert len(read_fold(tmp_path / "long.fold").triangles) == 1
     assert time.process_time() - began < 2.0
