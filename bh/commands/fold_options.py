@@ -65,15 +65,13 @@ def fold(  # noqa: PLR0913 - the options of a command line
             "--seconds", metavar="150s", parser=a_time, help="For solving; counted by work, not by the clock."
         ),
     ] = 150.0,
-    contact: Annotated[
-        bool, typer.Option("--contact", help="Panels of nets stop each other, too: takes its time.")
-    ] = False,
+    contact: Annotated[bool, typer.Option("--contact", help="Panels of nets stop each other: slow.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Write over a scene that is there.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Fold a drawing: picture, result and the scene that did it."""
+    from bh.commands import fold_all
     from bh.commands.fold import fold_file
-    from bh.commands.fold_all import fold_sheets
     from bh.commands.place import marking
     from bh.scene.folding import Wish
 
@@ -82,7 +80,7 @@ def fold(  # noqa: PLR0913 - the options of a command line
     wish = Wish(angle, percent, material, fit, scale, number, one, tuple(write or ()), contact)
     folder = Path(f"{file.stem}-folded") if output is None else output
     if sheet == "all":
-        together = fold_sheets(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
+        together = fold_all.fold_sheets(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
         ended = [_told(done, f"{file}, sheet {at}", quiet) for at, done in together.sheets.items()]
         for at, why in together.left.items():
             say(f"bh: sheet {at} is left out: {why}", err=True)
@@ -90,9 +88,8 @@ def fold(  # noqa: PLR0913 - the options of a command line
             say(f"all sheets: {together.picture}")
     else:
         reading = {"fit": fit, "scale": scale, "frame": number, "sheet": one}
-        with marking(
-            file, folder.parent, {key: value for key, value in reading.items() if value is not None}
-        ):
+        given = {key: value for key, value in reading.items() if value is not None}
+        with marking(file, folder.parent, given):
             done = fold_file(file, folder, wish, seconds=seconds, progress=not quiet, force=force)
         ended = [_told(done, str(file), quiet)]
     if not all(ended):
