@@ -434,3 +434,22 @@ def test_references_to_blocks_count_as_what_ezdxf_makes_of_them(tmp_path: Path) 
     with pytest.raises(FileFormatError, match=r"this drawing has 21,\d* entities, more than 20,000"):
         read_pattern(file)
     assert time.process_time() - began < 1.0
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "entries",
+        "triangles",
+        "entities",
+        "frames",
+        "attributes",
+        "transforms",
+        "lines",
+        "vertices",
+        "crossings",
+    ],
+)
+def test_security_says_the_limits(name: str) -> None:
+    page = (Path(__file__).parents[2] / "SECURITY.md").read_text(encoding="utf-8")
+    assert f"{getattr(Limits(), name):,} {name}" in page
