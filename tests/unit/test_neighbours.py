@@ -28,6 +28,7 @@ from bh.solvers.system import Evaluation
 from bh.solving import follow
 from bh.sweep.scenes import SceneTask
 from tests.unit.test_newton import Small
+from verification.framework.random_scenes import part_of
 from verification.studies.solver import branches
 from verification.studies.solver.branch_scenes import drawn
 
@@ -230,10 +231,10 @@ def test_rows_are_judged() -> None:
 
 def test_a_part_of_the_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(branches.PART, raising=False)
-    assert branches.part_of("BH_BRANCHES", 500, 500) == range(500)
+    assert part_of("BH_BRANCHES", 500, 500) == range(500)
     monkeypatch.setenv(branches.PART, "100:200")
-    assert branches.part_of("BH_BRANCHES", 500, 500) == range(100, 200)
+    assert part_of("BH_BRANCHES", 500, 500) == range(100, 200)
     monkeypatch.setenv(branches.PART, "200:900")
     with pytest.raises(InputError, match="two numbers such as 100:200"):
-        branches.part_of("BH_BRANCHES", 500, 500)
+        part_of("BH_BRANCHES", 500, 500)
     assert drawn(7).words == drawn(7).words != drawn(8).words

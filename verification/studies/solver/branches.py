@@ -8,16 +8,14 @@ that was stopped goes on; with BH_BRANCHES=100:200 in the environment it plays t
 from __future__ import annotations
 
 import math
-import os
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from bh import Automatic, LoadControl, Path, trace
 from bh.errors import InputError
 from verification.framework.checks import CaseResult, Context
-from verification.framework.store import Store
+from verification.framework.random_scenes import Clock, OutOfTimeError, part_of, played
 from verification.studies.solver.branch_scenes import SEED, drawn
 
 CASE, RUNS, PART = "branches", "branches_runs.json", "BH_BRANCHES"
@@ -74,27 +72,6 @@ class Row:
         return self.apart > APART and not self.told
 
 
-class OutOfTimeError(Exception):
-    """A scene has had its share."""
-
-
-class Clock:
-    """A meter that ends a run whose processor time is over."""
-
-    def __init__(self, seconds: float) -> None:
-        """Begins now, with `seconds` of processor time."""
-        self.end = time.process_time() + seconds
-
-    def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
-        """Look at the clock."""
-        del step, steps, lam, iterations, energy
-        if time.process_time() > self.end:
-            raise OutOfTimeError
-
-    def close(self, outcome: str) -> None:
-        """Nothing to close."""
-
-
 def telling(path: Path) -> tuple[str, ...]:
     """Remarks of a path that tell of other branches, states or critical points."""
     return tuple(line for line in path.remarks if any(word in line for word in TELLING))
@@ -136,49 +113,6 @@ def play(number: int) -> Row:
         return Row(number, scene.words, str(path.outcome), str(fine.outcome), told=told, seconds=seconds)
     difference, lower = apart(path, fine)
     return Row(number, scene.words, str(path.outcome), str(fine.outcome), difference, lower, told, seconds)
-
-
-def part_of(variable: str, most: int, scenes: int) -> range:
-    """Which scenes are played: those that a variable of the environment names, such as 100:200, or the first `most`.
-
-    Args:
-        variable: of the environment.
-        most: without it.
-        scenes: all.
-
-    Raises:
-        InputError: the variable names no such part.
-    """
-    word = os.environ.get(variable, "").strip()
-    if not word:
-        return range(most)
-    first, _, last = word.partition(":")
-    if not (first.isdecimal() and last.isdecimal() and int(first) < int(last) <= scenes):
-        raise InputError(
-            f"{variable} = {word[:40]!r} cannot be; give two numbers such as 100:200, up to {scenes}"
-        )
-    return range(int(first), int(last))
-
-
-def played(
-    context: Context, case: str, runs: str, numbers: range, scenes: int, play: Callable[[int], Any]
-) -> list[dict[str, Any]]:
-    """Play the scenes that are not stored, keep each as it ends, and give all that are stored, by number.
-
-    Args:
-        context: of the run.
-        case: its name, for the progress.
-        runs: file of the store.
-        numbers: scenes to play.
-        scenes: all.
-        play: gives a dataclass for the number of a scene.
-    """
-    store = Store.open(context.folder, runs, context.quick)
-    for number in numbers:
-        if str(number) not in store.runs:
-            context.tell(f"{case}: scene {number}")
-            store.keep(str(number), asdict(play(number)))
-    return [store.runs[str(n)] for n in range(scenes) if str(n) in store.runs]
 
 
 def run(context: Context) -> CaseResult:

@@ -19,7 +19,7 @@ from bh.mechanics.consistent.system import ConsistentSystem
 from bh.paths.path import Path
 from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context
-from verification.studies.solver.branches import part_of, played
+from verification.framework.random_scenes import part_of, played
 from verification.studies.solver.contact_layers import layers
 from verification.studies.solver.contact_scenes import SEED, Row, play
 from verification.theory.wrapped import wrapped_by

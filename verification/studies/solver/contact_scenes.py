@@ -17,7 +17,8 @@ import meshes
 from bh.analysis.contact import first_contact
 from bh.errors import InputError
 from meshes.library import alternating
-from verification.studies.solver.branches import FINE, Clock, OutOfTimeError, telling
+from verification.framework.random_scenes import Clock, OutOfTimeError
+from verification.studies.solver.branches import FINE, telling
 
 SEED = 7919
 KINDS = ("letter", "pleats", "sector", "pulled")
