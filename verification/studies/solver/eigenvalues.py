@@ -159,13 +159,14 @@ def run(context: Context) -> CaseResult:
             levels,
             tolerance,
         )
-    exact = _trough("shell", 2 * levels["shell"][-1])
-    shown = {"consistent": levels["consistent"]} | ({} if context.quick else {"shell": levels["shell"][-1:]})
+    finest = levels["shell"][-1]
+    exact = _trough("shell", 4 * finest)
+    shown = {"consistent": levels["consistent"]} | ({} if context.quick else {"shell": (finest, 2 * finest)})
     _against(result, "folded strip", SHELL, "presses and Hz", exact, _trough, shown, tolerance)
     result.notes.append(
         "Masses are lumped at the nodes, and Green's strain lets a pressed sheet shorten before it buckles (2e-5 of "
         "its length for the column). Of the folded strip the buckling loads are multiples of a press by 0.01 mm, its "
-        "frequencies are those with the supports that it was folded with."
+        "frequencies are those with the supports that it was folded with; lumped masses leave 0.3 % on 32 cells."
     )
     return result
 
