@@ -275,6 +275,8 @@ def _layer(drawing: Any, name: str) -> Any:
 
 
 def _off(drawing: Any, entity: Any) -> bool:
+    if not entity.dxf.is_supported("layer"):  # what has a name that nobody knows
+        return True
     layer = _layer(drawing, entity.dxf.layer)
     return bool(entity.dxf.get("invisible", 0)) or (
         layer is not None and (layer.is_off() or layer.is_frozen())
