@@ -76,17 +76,24 @@ def _touch(x, y, a, b, c, d, tolerance):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
+def _doubled(points, triangle, out):  # type: ignore[no-untyped-def]
+    """Normal of a triangle into out (3,), as long as twice its area."""
+    i, j, k = triangle
+    for c in range(3):
+        a, b = (c + 1) % 3, (c + 2) % 3
+        out[c] = (points[j, a] - points[i, a]) * (points[k, b] - points[i, b]) - (
+            points[j, b] - points[i, b]
+        ) * (points[k, a] - points[i, a])
+
+
+@njit(**INNER)
 def _axes(points, triangles, u, v):  # type: ignore[no-untyped-def]
     """Axes across the mean normal into u, v (3,); False where a triangle does not face along it."""
     doubled = np.empty((len(triangles), 3))
     n = np.zeros(3)
     for t in range(len(triangles)):
-        i, j, k = triangles[t]
+        _doubled(points, triangles[t], doubled[t])
         for c in range(3):
-            a, b = (c + 1) % 3, (c + 2) % 3
-            doubled[t, c] = (points[j, a] - points[i, a]) * (points[k, b] - points[i, b]) - (
-                points[j, b] - points[i, b]
-            ) * (points[k, a] - points[i, a])
             n[c] += doubled[t, c]
     size = math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
     area = 0.0
@@ -220,12 +227,7 @@ def _plain_nodes(points, triangles, edges):  # type: ignore[no-untyped-def]
     count = len(points)
     normals, total = np.zeros((len(triangles), 3)), np.zeros((count, 3))
     for t in range(len(triangles)):
-        i, j, k = triangles[t]
-        for c in range(3):
-            a, b = (c + 1) % 3, (c + 2) % 3
-            normals[t, c] = (points[j, a] - points[i, a]) * (points[k, b] - points[i, b]) - (
-                points[j, b] - points[i, b]
-            ) * (points[k, a] - points[i, a])
+        _doubled(points, triangles[t], normals[t])
         own = math.sqrt(normals[t, 0] ** 2 + normals[t, 1] ** 2 + normals[t, 2] ** 2)
         for c in range(3):
             normals[t, c] /= max(own, 1e-300)

@@ -139,7 +139,6 @@ def clear_guess(
         along = clear_part(system, here.q, tangent[0] - here.q, lam)
         if along > part:
             part, guess = along, tangent
-
     part = 1.0 if part >= 1.0 else 0.9 * part
     return here.q + part * (guess[0] - here.q), here.forces + part * (guess[1] - here.forces)
 

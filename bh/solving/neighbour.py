@@ -30,30 +30,47 @@ def neighbour(before: Path, model: Model) -> Path | None:
         return None
     if any(law.law is not None and law.law.remembers for law in model.creases.values()):
         return None
-    path, newton = Path(model), LoadControl().newton
+    path = Path(model)
     ends = {record.step: index for index, record in enumerate(before.records)}
-    with one_blas_thread():
-        for step in range(len(model.steps)):
-            old, record = before.solved(ends[step])
-            system = path.system(step)
-            if len(record.q) != system.size or record.lam != 1.0:
-                return None
-            found = newton.solve(system, record.q, 1.0, old.evaluate(record.q, 1.0).forces)
-            lost = found.stable is False and record.stable is not False
-            if not found.converged or lost or system.objection(record.q, 1.0, found.q, 1.0):
-                return None
-            path.records.append(
-                Record(
-                    step,
-                    1.0,
-                    found.q,
-                    found.iterations,
-                    found.evaluation.imbalance,
-                    0.0,
-                    record.next_increment,
-                    negative=found.negative,
-                    note="from a neighbouring model",
-                )
-            )
-            path.steps.append(StepOutcome(Outcome.REACHED))
+    for step in range(len(model.steps)):
+        known = before.records[ends[step]]
+        if known.lam != 1.0:
+            return None
+        found = end_beside(path, step, before, ends[step], "from a neighbouring model")
+        if found is None or (found.stable is False and known.stable is not False):
+            return None
+        path.records.append(found)
+        path.steps.append(StepOutcome(Outcome.REACHED))
     return path
+
+
+def end_beside(path: Path, step: int, before: Path, index: int, note: str) -> Record | None:
+    """The end of a step by Newton's method from a state of another path; None where there is none without a jump.
+
+    Args:
+        path: of which it is to be the next state.
+        step: number of the step.
+        before: a path of a model on the same mesh.
+        index: of its state at the end of that step.
+        note: for the record.
+    """
+    old, known = before.solved(index)
+    system = path.system(step)
+    if len(known.q) != system.size:
+        return None
+    with one_blas_thread():
+        forces = old.evaluate(known.q, 1.0).forces
+        found = LoadControl().newton.solve(system, known.q, 1.0, forces)
+    if not found.converged or system.objection(known.q, 1.0, found.q, 1.0):
+        return None
+    return Record(
+        step,
+        1.0,
+        found.q,
+        found.iterations,
+        found.evaluation.imbalance,
+        0.0,
+        known.next_increment,
+        negative=found.negative,
+        note=note,
+    )

@@ -16,10 +16,9 @@ import numpy as np
 from bh.model.model import Model
 from bh.model.serialise import fingerprint
 from bh.paths.path import Path
-from bh.paths.record import Record, StepOutcome
-from bh.runtime.threads import one_blas_thread
-from bh.solvers.load_control import LoadControl
+from bh.paths.record import StepOutcome
 from bh.solvers.outcome import Outcome
+from bh.solving.neighbour import end_beside
 from bh.solving.trace import trace
 
 SAME = 1e-6  # of the sheet's size: states this near each other are one
@@ -89,27 +88,9 @@ def step_over(before: Path, model: Model) -> Path | None:
     path = Path(model)
     path.records = [record for record in before.records if record.step < last]
     path.steps = list(before.steps[:last])
-    system = path.system(last)
-    old, record = before.solved()
-    if len(record.q) != system.size:
+    record = end_beside(path, last, before, len(before.records) - 1, "from a neighbouring point")
+    if record is None or not record.stable:
         return None
-    newton = LoadControl().newton
-    with one_blas_thread():
-        forces = old.evaluate(record.q, 1.0).forces
-        found = newton.solve(system, record.q, 1.0, forces)
-    if not found.converged or not found.stable or system.objection(record.q, 1.0, found.q, 1.0):
-        return None
-    record = Record(
-        last,
-        1.0,
-        found.q,
-        found.iterations,
-        found.evaluation.imbalance,
-        0.0,
-        record.next_increment,
-        negative=found.negative,
-        note="from a neighbouring point",
-    )
     path.records.append(record)
     path.steps.append(StepOutcome(Outcome.REACHED))
     return path

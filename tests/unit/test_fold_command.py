@@ -97,6 +97,12 @@ class TestOneCommand:
         file = fold(tmp_path, edges_foldAngle=[0, 0, 0, 0, 0, 0, 180.0])
         assert "part = 0.8" in proposals(file)[0].text
 
+    def test_nets_pass_through_themselves_unless_asked(self, tmp_path: Path) -> None:
+        """Both say so in the scene."""
+        loose, firm = (proposals(fold(tmp_path), Wish(contact=asked))[0].text for asked in (False, True))
+        assert parse_scene(loose, tmp_path).model.contact is False
+        assert parse_scene(firm, tmp_path).model.contact == "auto"
+
     def test_a_cp_file(self, tmp_path: Path) -> None:
         file = tmp_path / "x.cp"
         rim = [(0, 0, 80, 0), (80, 0, 80, 60), (80, 60, 0, 60), (0, 60, 0, 0)]

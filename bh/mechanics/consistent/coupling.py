@@ -18,15 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from numpy.typing import NDArray
 
 from bh.mechanics.consistent.growth import Growth
 from bh.mechanics.consistent.kernels import TURN
 from bh.mechanics.consistent.patches import Patches, turned_strains
 from bh.mechanics.consistent.stretching import Stretching
-from bh.mechanics.shared.assembly import add_lower, rotate
-from bh.mechanics.shared.kinematics import OPTIONS, dihedral_gradients
+from bh.mechanics.shared.assembly import add_blocks
+from bh.mechanics.shared.kinematics import dihedral_gradients
 from bh.mechanics.shared.sparsity import Slots
 from bh.model.ramp import Ramp
 from meshes import SheetMesh
@@ -130,15 +129,7 @@ class Coupling:
         H = np.swapaxes(G, 1, 2) @ self.local @ W
         H += np.swapaxes(H, 1, 2)
         seven = np.hstack((self.nodes, np.full((t, 1), -1)))
-        _add(np.ascontiguousarray(H), seven, frame_of, frames, slots, data)
-
-
-@njit(**OPTIONS)
-def _add(H, nodes, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]
-    for e in range(len(H)):
-        if len(frames) > 0:
-            rotate(H[e], nodes[e], frame_of, frames)
-        add_lower(H[e], np.int64(21), slots[e], data)
+        add_blocks(seven, np.ascontiguousarray(H), frame_of, frames, slots, data)
 
 
 def sheet_coupling(

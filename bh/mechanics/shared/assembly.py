@@ -119,6 +119,15 @@ def add_lower(H, n, slots, data):  # type: ignore[no-untyped-def]
             at += 1
 
 
+@njit(**OPTIONS)
+def add_blocks(nodes, blocks, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]
+    """Add element matrices (e, n, n) of nodes (e, n / 3) to the values `data`, turned into the axes of supports."""
+    for e in range(len(blocks)):
+        if len(frames) > 0:
+            rotate(blocks[e], nodes[e], frame_of, frames)
+        add_lower(blocks[e], blocks.shape[1], slots[e], data)
+
+
 @njit(**INNER_OPTIONS)
 def _bar_matrix(x, a, b, rest_length, k, s, green, H):  # type: ignore[no-untyped-def]
     """Write k g g^T + s Hessian of one bar into the lower half of H (6, 6); returns the gradient g of its elongation.

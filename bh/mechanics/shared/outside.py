@@ -14,16 +14,14 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from numpy.typing import NDArray
 
 from bh.loading.load_step import LoadStep
-from bh.mechanics.shared.assembly import add_lower, rotate
+from bh.mechanics.shared.assembly import add_blocks
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.rigid_contact import RigidContact
 from bh.mechanics.shared.sparsity import Slots
 from bh.model.ramp import Ramp
-from bh.runtime.kernel_options import KERNEL
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -129,7 +127,7 @@ class Outside:
         blocks = self._held.copy()
         if self.pressure is not None:
             blocks += pressure_blocks(x[self.triangles], self.pressure.at(lam))
-        _add(self.triangles, blocks, frame_of, frames, slots, data)
+        add_blocks(self.triangles, blocks, frame_of, frames, slots, data)
 
     def skew(self, x: Array, lam: float, size: int) -> sp.csr_matrix | None:
         """The skew part of the tangent of all unknowns, (size, size); None where it is nothing.
@@ -323,11 +321,3 @@ def sprung_corners(triangles: Ints, stiffness: Array) -> Array:
     for axis in range(3):
         out[owner, 3 * place + axis, 3 * place + axis] = stiffness[:, axis]
     return out
-
-
-@njit(**KERNEL)
-def _add(triangles, blocks, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]
-    for t in range(len(triangles)):
-        if len(frames) > 0:
-            rotate(blocks[t], triangles[t], frame_of, frames)
-        add_lower(blocks[t], np.int64(9), slots[t], data)

@@ -56,30 +56,10 @@ def layers(result: CaseResult) -> None:
         result: to which checks are added.
     """
     for t in THICK:
-        path = block(t)
-        result.check(
-            "height of five loose sheets that are pressed",
-            height(path),
-            unit="mm",
-            reference=SHEETS * t,
-            source=STACK,
-            tolerance=TOLERANCE,
-            params={"t": t},
-            path=path,
-        )
+        _stack(result, "height of five loose sheets that are pressed", block(t), SHEETS)
     paths = {name: bh.trace(load_scene(EXAMPLES / f"{name}.toml").model, warn=False) for name in OPENED}
     pleats, carton = (paths[name] for name in OPENED)
-    t = pleats.model.sheet.t
-    result.check(
-        "height of four pleats between plates",
-        height(pleats),
-        unit="mm",
-        reference=PANELS * t,
-        source=STACK,
-        tolerance=TOLERANCE,
-        params={"t": t},
-        path=pleats,
-    )
+    _stack(result, "height of four pleats between plates", pleats, PANELS)
     result.check(
         "fold angle of an opened carton",
         float(carton[-1].fold_angle("mountain").mean()) if carton.reached else math.nan,
@@ -97,4 +77,19 @@ def layers(result: CaseResult) -> None:
         source="the predicate of bh.contact, which shares nothing with the barrier",
         tolerance=0.0,
         params={"states": sum(len(path) for path in paths.values())},
+    )
+
+
+def _stack(result: CaseResult, quantity: str, path: Path, sheets: int) -> None:
+    """The height of so many layers that lie on each other."""
+    t = path.model.sheet.t
+    result.check(
+        quantity,
+        height(path),
+        unit="mm",
+        reference=sheets * t,
+        source=STACK,
+        tolerance=TOLERANCE,
+        params={"t": t},
+        path=path,
     )
