@@ -1,9 +1,10 @@
-"""DXF entities of a kind that nobody knows."""
+"""DXF entities: of a kind that nobody knows, and named by their handles."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from ezdxf.filemanagement import new
 
@@ -24,3 +25,15 @@ def test_entities_of_no_known_kind_draw_nothing(tmp_path: Path, kind: str) -> No
     file.write_text(f"{before}{kind}\n{rest}")
     pattern = read_pattern(file)
     assert len(pattern.creases) == 1
+
+
+def test_rim_and_creases_of_one_layer_are_told_apart_by_handles(tmp_path: Path) -> None:
+    drawing = new(units=4)
+    space = drawing.modelspace()
+    space.add_lwpolyline([(0, 0), (60, 0), (60, 40), (0, 40)], close=True)
+    one, two = (space.add_line((x, 0), (x, 40)).dxf.handle for x in (20, 40))
+    file = tmp_path / "a.dxf"
+    drawing.saveas(file)
+    pattern = read_pattern(file, lines={f"handle:{one}": "valley", f"handle:{two}": "mountain"})
+    folds = {round(crease.curve.point(np.zeros(1))[0, 0]): crease.fold for crease in pattern.creases}
+    assert folds == {20: "valley", 40: "mountain"}
