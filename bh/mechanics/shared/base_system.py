@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
+from bh.loading.tethers import NONE, Tethers, tethers
 from bh.mechanics.shared import penetration as hinge_penetration
 from bh.mechanics.shared.crease_curves import CreaseCurves
 from bh.mechanics.shared.displacements import Displacements
@@ -21,7 +22,6 @@ from bh.mechanics.shared.outside import Outside
 from bh.model.constraints import MOTIONS, TURNED, rigid_motions
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.model import Model
-from bh.model.ramp import Ramp
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix
 from bh.solvers.hinged import Stops
@@ -46,6 +46,7 @@ class SupportedSheet:
 
     size: int
     curves: CreaseCurves | None = None  # None where all creases are straight lines
+    tethers: Tethers  # in the place of supports that the step lets go of
 
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
@@ -71,14 +72,12 @@ class SupportedSheet:
             from bh.mechanics.shared.mirrored import MirroredDisplacements
 
             self.displacements = MirroredDisplacements(self.mesh, load_step.constraints, start_points, plane)
-        if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
-            let_go = start.reactions - self.displacements.reactions(start.reactions)
-            self.force = Ramp(self.force.start + let_go, self.force.end)
+        self.tethers = NONE
         if not load_step.bodies:
             self.displacements.bring_home()
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
-        if self.constraints.rigid_body and (start is None or not load_step.releases):
+        if self.constraints.rigid_body:
             self.displacements.check_balance(self.force)
         self.barrier: SheetBarrier | None = None
         if model.stops_itself:
@@ -94,6 +93,14 @@ class SupportedSheet:
             raise ModelError(
                 "a pressure pushes a sheet that nothing holds as a whole; add supports or springs"
             )
+
+    def _let_go(self, start: State | None, begin: Array, couples: Array | None = None) -> None:
+        """Tethers for what the step lets go of, from unknowns `begin` on, and for `couples` (rotations,) of clamps."""
+        if self.load_step.releases and start is not None:
+            exerted = start.reactions - self.displacements.reactions(start.reactions)
+            pull = self.displacements.components(exerted)
+            pull = pull if couples is None else np.concatenate((pull, couples))
+            self.tethers = tethers(begin, pull, self.moving, self.mesh.areas)
 
     def _check_start(self, x: Array) -> None:
         """Raises `ModelError` where the step begins with a sheet that passes through itself."""
