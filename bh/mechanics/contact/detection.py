@@ -39,7 +39,9 @@ class Detection:
         self._slack = slack
         self._found: tuple[Array, ipctk.Candidates] | None = None
         self._linked: deque[Array] = deque(maxlen=KEPT)
-        self._marks: deque[int] = deque(maxlen=KEPT)  # of the linked ones, which tell most others apart at once
+        self._marks: deque[int] = deque(
+            maxlen=KEPT
+        )  # of the linked ones, which tell most others apart at once
         self._ways: deque[tuple[Array, Array, float]] = deque(maxlen=WAYS)
         # additive detection (Li, Kaufman and Jiang 2021): root finders take seconds where edges move in one plane
         self._method = ipctk.AdditiveCCD(STEPS)
