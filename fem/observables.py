@@ -44,7 +44,10 @@ def observe(
     stretching = 0.5 * np.einsum("tk,tk->t", membrane_forces, strain)
     bending = 0.5 * np.einsum("tk,tk->t", moments, curvature)
     beta = system.components.beta(here.components)
-    folding = creases.energy(beta, lam)
+    folding, dissipated = creases.energy(beta, lam), 0.0
+    if creases.laws is not None:
+        lost = creases.laws.held(beta - creases.rest.at(lam)).dissipated
+        folding, dissipated = folding - lost, float(lost.sum())
     sides = mesh.topology.edge_triangles[creases.edges]
     by_triangle = np.zeros(len(mesh.triangles))
     share = folding / e.areas[sides].sum(axis=1)
@@ -68,6 +71,7 @@ def observe(
             float(stretching.sum()),
             float(bending.sum()),
             float(folding.sum()),
+            dissipated=dissipated,
             ground=0.0 if system.outside is None else system.outside.spring_energy(here.x),
         ),
         dihedral_angles=angles,
@@ -83,6 +87,8 @@ def observe(
         frames=system.carried_frames(here.components),
         fold_angles=fold_angles,
         crease_couples=couples,
+        crease_history=creases.laws.by_edge() if creases.laws is not None and system.remembers else None,
+        point_history=system.history if system.remembers else None,
         membrane_forces=in_plane,
         moments=bent,
         recover=partial(
@@ -133,8 +139,7 @@ def _couples(system: ShellSystem, here: Here) -> Array:
     """(c, r) couples on the fold angles: a spring's own, and what an imposed angle takes, N mm / rad."""
     creases = system.creases
     sheet = system.components.beta(system.components.spread(here.pull))
-    turn = creases.rest.at(here.lam) - system.components.beta(here.components)
-    spring = creases.stiffness[:, None] * np.einsum("cij,cj->ci", creases.mass, turn)
+    spring = -creases.springs(system.components.beta(here.components), here.lam)
     out: Array = np.where(creases.prescribed[:, None], sheet, spring)
     return out
 
