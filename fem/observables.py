@@ -97,11 +97,18 @@ def observe(
             in_plane,
             bent,
             None if system.rest is None else system.rest.mean.at(lam),
+            None if system.load_step.changed is None else system.load_step.changed.at(lam),
         ),
     )
 
 
-def resultants(made_of: Sections, forces: Array, moments: Array, rest: Array | None = None) -> Resultants:
+def resultants(
+    made_of: Sections,
+    forces: Array,
+    moments: Array,
+    rest: Array | None = None,
+    changed: Array | None = None,
+) -> Resultants:
     """What stresses are made of; strains and curvatures are those that forces and moments belong to.
 
     Args:
@@ -109,6 +116,7 @@ def resultants(made_of: Sections, forces: Array, moments: Array, rest: Array | N
         forces: (t, 3) membrane forces at the middle of each triangle, N / mm.
         moments: (t, 3) moments there, N.
         rest: (2, t, 3) strain and curvature at rest, which the others are beside.
+        changed: (t,) change of temperature or moisture.
     """
     sheet = made_of.sheets[0]
     if by_triangle.needed(made_of):
@@ -116,7 +124,7 @@ def resultants(made_of: Sections, forces: Array, moments: Array, rest: Array | N
         strain, curvature = by_triangle.strains(found, made_of, forces, moments)
         if rest is not None:
             strain, curvature = strain + rest[0], curvature + rest[1]
-        return Resultants(sheet, strain, curvature, forces, moments, made_of)
+        return Resultants(sheet, strain, curvature, forces, moments, made_of, changed)
     C = grain.compliance_in_drawing(sheet)
     strain, curvature = forces @ C / sheet.t, moments @ C * 12.0 / sheet.t**3
     if rest is not None:

@@ -256,7 +256,7 @@ def test_what_takes_no_laminates_says_so() -> None:
     with pytest.raises(ModelError, match="a laminate is not solved by halves"):
         bh.trace(replace(model, mesh=even), symmetry="x")
     state = bh.trace(model)[-1]
-    with pytest.raises(ModelError, match="stresses of laminates are not told"):
+    with pytest.raises(ModelError, match="every ply of a laminate has its own stress"):
         state.stress().at("top")
     assert np.isfinite(state.stress().strain_at("top")).all()
     with pytest.raises(ModelError, match="not coupled"):
