@@ -54,7 +54,7 @@ class Studio:
         """A new token."""
         self.token = secrets.token_urlsafe(16)
         self.sheet = sheet
-        self.windows: set[Window] = set()
+        self.windows: dict[Window, None] = {}  # in the order in which they were opened
         self.pool = ThreadPoolExecutor(2 * WINDOWS, thread_name_prefix="bh-studio")
 
     def application(self) -> tornado.web.Application:
@@ -154,7 +154,7 @@ class Window(tornado.websocket.WebSocketHandler):
             args: of the address; there are none.
             kwargs: none.
         """
-        self.studio.windows.add(self)
+        self.studio.windows[self] = None
         self.drawn.set()
         self.work = asyncio.create_task(self._work())
 
@@ -169,7 +169,7 @@ class Window(tornado.websocket.WebSocketHandler):
 
     def on_close(self) -> None:
         """Give everything back."""
-        self.studio.windows.discard(self)
+        self.studio.windows.pop(self, None)
         self.going.clear()
         for task in (self.work, self.finer):
             if task is not None:

@@ -14,7 +14,9 @@ import pytest
 
 import bh
 from bh.scene.load import load_scene
+from bh.studio.opening import Opened
 from bh.studio.server import Studio
+from bh.studio.sheets import of_library
 from tests.unit.browsers import needs_browser
 
 pytestmark = needs_browser
@@ -233,6 +235,18 @@ def test_at_rest_it_is_refined_and_a_hand_brings_the_coarse_mesh_back(window: Vi
     assert not page.evaluate("studio.refined")
     page.wait_for_function("studio.refined && Object.values(studio.head.asked)[0] > 1.0", timeout=60_000)
     assert window.told == []
+
+
+def test_the_frame_of_a_notebook_is_the_same_window(chromium: Any) -> None:
+    """In a page of another origin, as Jupyter's is: it folds there."""
+    opened = Opened(of_library("strip"))
+    page = chromium.new_context(bypass_csp=True).new_page()
+    page.set_content(f"<h1>a notebook</h1>{opened._repr_html_()}")
+    frame = page.frame_locator("iframe")
+    frame.locator("#percent").fill("30", timeout=PATIENCE)
+    frame.locator("#percent-out", has_text="30.0 %").wait_for(timeout=PATIENCE)
+    page.close()
+    opened.close()
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(360, "dark"), (1400, "light"), (2560, "dark")])
