@@ -79,6 +79,7 @@ STUDIES = (
     Study("defaults", "solver", long=True),
     Study("honesty", "solver", long=True),
     Study("campaign", "solver", long=True),
+    Study("agreement", "solver", long=True),
     Study("attack", "solver", long=True),
     Study("branches", "solver", long=True),
     Study("contact", "solver", long=True),
