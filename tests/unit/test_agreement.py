@@ -77,7 +77,7 @@ def test_what_takes_too_long_is_given_up_wherever_it_is() -> None:
             try:
                 while True:
                     pass
-            except Exception:  # noqa: S112, BLE001 - as some library on the way might
+            except Exception:  # as some library on the way might
                 continue
 
     with pytest.raises(OutOfTimeError), processor_limit(0.05):

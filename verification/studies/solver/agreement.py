@@ -4,7 +4,8 @@ Networks, wide panels and closed rings, from a seed that nothing was chosen with
 energy, mesh and formulation chosen), by the shell on two meshes of its own, and along the default's path the work of
 the actuation is compared with the energy gained. What each may be off by is what it tells itself: the default's
 estimate, the distance of the shell's two meshes, the difference of the work by all states and by every second one.
-Sheets are kept in `agreement_runs.json` as they are done; BH_AGREEMENT=100:200 plays these and counts all that are kept.
+Sheets are kept in `agreement_runs.json` as they are done; BH_AGREEMENT=100:200 plays these and counts all that are
+kept.
 """
 
 from __future__ import annotations
