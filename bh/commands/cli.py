@@ -202,7 +202,7 @@ def run(
     """Solve a scene into a folder: path.bh and result.json."""
     from bh.commands.occupied import UNFINISHED
     from bh.commands.place import load_marking
-    from bh.commands.resuming import goes_on_from
+    from bh.commands.resuming import say_from
     from bh.commands.run import holds_states, solve, write_extras
     from bh.commands.summary import summary
 
@@ -216,8 +216,8 @@ def run(
             "give it a mesh (--set mesh.rows=4 --set mesh.along=32), or use bh compare"
         )
     folder = Path(f"{loaded.name}-out") if output is None else output
-    if resume and not quiet and (clause := goes_on_from(folder, loaded)):
-        say(f"{loaded.name}: {clause}")
+    if resume and not quiet:
+        say_from(folder, loaded)
     try:
         path, names, before, contact, yields = solve(
             loaded,
@@ -236,8 +236,7 @@ def run(
         ) from None
     if before and not quiet:
         say(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
-    written = [folder / name for name in names]
-    written += write_extras(path, loaded, folder, pictures, vtu)
+    written = [*(folder / name for name in names), *write_extras(path, loaded, folder, pictures, vtu)]
     if not quiet:
         summary(path, loaded, written, contact, yields)
     if path.reached and path.accuracy is not None and not path.accuracy.met:

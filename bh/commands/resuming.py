@@ -8,11 +8,23 @@ from pathlib import Path
 from bh.commands.occupied import FINISHED, UNFINISHED, changed
 from bh.errors import InputError
 from bh.paths.storage import PathFile, reading
+from bh.runtime.terminal import say
 from bh.scene.load import Scene
 from bh.solvers.outcome import Outcome
 from bh.solving.contact import stored_model
 from bh.solving.follow import check_resumable
 from bh.solving.levels import folder_of
+
+
+def say_from(folder: Path, scene: Scene) -> None:
+    """Print the state that a resumed run goes on from; nothing where nothing can be gone on from, as the run will say.
+
+    Args:
+        folder: of the run.
+        scene: to be solved.
+    """
+    if clause := goes_on_from(folder, scene):
+        say(f"{scene.name}: {clause}")
 
 
 def goes_on_from(folder: Path, scene: Scene) -> str:
@@ -24,7 +36,7 @@ def goes_on_from(folder: Path, scene: Scene) -> str:
 
     Returns:
         "goes on from step 2, lambda 0.4 (12 states are kept)"; empty where nothing is left to solve, or nothing can be
-        gone on from, as the run will say.
+        gone on from.
     """
     for name, _ in (UNFINISHED, FINISHED):
         meshes = len(list(folder_of(folder / name).glob("*.bh")))
