@@ -92,6 +92,7 @@ STUDIES = (
     Study("problem_b", "6"),
     Study("problem_c", "6", long=True),
     Study("landing", "6", long=True),
+    Study("tolerances", "6", long=True),
 )
 BY_NAME = {study.name: study for study in STUDIES}
 ALL_CASES = tuple(BY_NAME)
