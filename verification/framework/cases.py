@@ -61,6 +61,7 @@ STUDIES = (
     Study("fig5_3", "5", seconds=60),
     Study("appendix_a", "A", seconds=4),
     Study("pinch_shell", "5", seconds=60),
+    Study("bend_twist", "5", long=True),
     Study("scan", "3", seconds=120),
     Study("hard_cases", "solver", seconds=140),
     Study("appendix_b_shell", "B", part_of="appendix_b", seconds=250),
