@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import bh.sweep
-from bh.applications.inverse.judge import MESHES, judge
+from bh.applications.inverse.judge import MESHES, Verdict, judge
 from bh.applications.inverse.models import SHIPPED, model
 from bh.applications.inverse.reach import Reach
 from bh.applications.inverse.simulate import simulate
@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 Target = tuple[float, float, float]
 Designs = tuple[tuple[Target, tuple[tuple[float, float, bool], ...]], ...]
 REFINED = (0.625, 6)  # of the shell that judges segments: mm along the crease, rows a panel
+DOUBTFUL = (
+    1.0  # mm that the shell's last refinement may move the end of a strip; else it is refined once more
+)
 SHELL = "shell"
 BLOCKS = 10
 
@@ -114,13 +117,16 @@ class JudgeTask:
     @property
     def identity(self) -> str:
         """Of the task, its meshes and the designs."""
-        return f"judge {MESHES} {_data()} {self.designs!r}"
+        return f"judge {MESHES} {REFINED} {DOUBTFUL} {_data()} {self.designs!r}"
 
     def __call__(self, point: Mapping[str, Any]) -> dict[str, float]:
         """What the design for the target {"x", "y", "z"} (mm) misses."""
         target = (float(point["x"]), float(point["y"]), float(point["z"]))
         k0, length, on = zip(*dict(self.designs)[target], strict=True)
         verdict = judge(k0, length, on, model().setting, MESHES)
+        if verdict.change > DOUBTFUL:
+            finer = judge(k0, length, on, model().setting, (REFINED,))
+            verdict = Verdict((*verdict.strips, *finer.strips))
         return {"missed": verdict.missed(np.array(target)), "change": verdict.change}
 
 
