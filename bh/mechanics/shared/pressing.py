@@ -110,9 +110,8 @@ class PressedSheet:
         if self.barrier is not None and not self.barrier.begin(
             x + (self.displacements.home - self.displacements.reference)
         ):
-            met = self.barrier.meetings(x)
             raise ModelError(
-                f"contact: the first state meets itself ({met}); begin with panels apart (layers of a folded form: "
+                f"contact: {self.barrier.first_meetings(x)}; begin with panels apart (layers of a folded form: "
                 "untangle = true)"
             )
 
