@@ -20,6 +20,7 @@ import numpy as np
 import bh
 import meshes
 from bh.model.step import StepBuilder
+from bh.solvers.points import Critical
 from meshes.curves import Arc
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.theory import actuated as laminates
@@ -193,7 +194,7 @@ def lost_at(model: bh.Model) -> tuple[float, bh.Path]:
         the part of the load, and the path.
     """
     path = bh.trace(model, estimate=False, neighbours=False, warn=False)
-    found = [point.lam for _, point in path.critical_points if point.kind == "bifurcation"]
+    found = [point.lam for _, point in path.critical_points if point.kind is Critical.BIFURCATION]
     if found:
         return min(found), path
     lost = [i for i, record in enumerate(path.records) if record.negative]
