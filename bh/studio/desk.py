@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,14 +13,16 @@ import bh.studio.messages as asked
 from bh.errors import InputError
 from bh.live import Controls, Session, held
 from bh.model.sheet import Sheet
+from bh.runtime.memory import give_back
 from bh.solving.trace import trace
 from bh.studio.colours import offered, top_of
 from bh.studio.exports import export
 from bh.studio.finer import Finer, finer
 from bh.studio.frames import Json, creases_of, described, head_of, line, packed, surface
-from bh.studio.sheets import LiveSheet, material_of, of_file, of_library
+from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
 
 BUDGET = 0.03  # s of an update
+TIDY = 5.0  # s between two times that free memory goes back to the system
 
 
 class Desk:
@@ -37,6 +40,8 @@ class Desk:
         self._shown: tuple[object, ...] = ()
         self._snapped = False  # since the last picture
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
+        self._tidied = time.monotonic()
+        self._news: list[Json] = []
         self.put(sheet or of_library("arc"))
 
     # ------------------------------------------------------------------------------- what is asked
@@ -50,10 +55,12 @@ class Desk:
         """
         model = sheet.model if sheet.model.supports else held(sheet.model)
         self.sheet = replace(sheet, model=model)
-        self.session = Session(model)
+        self.session = Session(model, settles=sheet.settles)
         if controls is not None:
             self.session.ask(controls)
         self.frame = self.session.update(0.0)
+        self._finer = None  # it is of another sheet
+        give_back()
         self._colours = offered(self.frame.state)
         if self._colour != "none" and self._colour not in self._colours:
             self._colour = "bending"
@@ -139,7 +146,7 @@ class Desk:
         if message.name is not None:
             young, nu, t, _ = material_of(message.name)
             self.material, now = message.name, Sheet(E=young, nu=nu, t=t)
-        nu = now.nu if self.sheet.model.formulation != "bars-and-hinges" else 0.0
+        nu = now.nu if self.sheet.model.formulation != BARS else 0.0
         sheet = replace(
             now, E=message.E or now.E, nu=nu if message.nu is None else message.nu, t=message.t or now.t
         )
@@ -179,6 +186,23 @@ class Desk:
         self._shown = self._now()
         self.frame = self.session.update(budget)
         self._snapped = self._snapped or self.frame.snapped
+        if self.frame.note and self.sheet.settles and self.sheet.model.formulation == BARS:
+            self._bend()
+        if self.frame.at_rest and time.monotonic() - self._tidied > TIDY:
+            give_back()
+            self._tidied = time.monotonic()
+
+    def _bend(self) -> None:
+        """Slender faces of bars collapse under stiff springs: the same faces, which may bend, fold further."""
+        note, nu = self.frame.note, material_of(self.material)[1]
+        self.put(self.sheet.bent(nu), self.session.wanted)
+        text = f"bars and hinges cannot go on ({note}); now its faces may bend, and it folds anew"
+        self._news += [self.describe(), line(text)]
+
+    def news(self) -> list[Json]:
+        """What came of the work beside frames, since this was asked last: another sheet, a line."""
+        news, self._news = self._news, []
+        return news
 
     def picture(self) -> bytes:
         """The newest frame as it travels.

@@ -20,6 +20,7 @@ from bh.model.model import Model
 from bh.model.sheet import Sheet
 from bh.scene.folding import MATERIALS, PERCENT, Wish, proposals
 from bh.scene.load import Outputs, Scene, parse_scene
+from bh.solvers.settling import Settling
 from meshes import SheetMesh
 
 LONGEST = 5_000_000  # bytes of a drawing
@@ -30,6 +31,7 @@ LIBRARY: Mapping[str, str] = {
     'fold = ["mountain", "valley", "mountain"]',
     "strip": 'kind = "strip"\nlength = 120.0\nwidth = 60.0\ncreases = [20.0, 40.0]\nfold = ["mountain", "valley"]',
 }
+BARS, BENT = "bars-and-hinges", "consistent"
 ODD = re.compile(r"[^\w .()+,=@~-]")
 ALONG, ROWS = 24, 3  # cells of the library's patterns
 
@@ -46,6 +48,7 @@ class LiveSheet:
         remarks: one line each: what was assumed, and what to know of the sheet.
         drawing: name and bytes of the file that `tables` speak of; None for a pattern of the library.
         percent: of the way that is shown first.
+        settles: its springs move it downhill to rest where a branch ends, as in its scene.
     """
 
     name: str
@@ -55,10 +58,21 @@ class LiveSheet:
     remarks: tuple[str, ...] = ()
     drawing: tuple[str, bytes] | None = None
     percent: float = PERCENT
+    settles: bool = False
 
     def of(self, sheet: Sheet) -> LiveSheet:
         """The same pattern of another material."""
         return replace(self, model=replace(self.model, sheet=sheet))
+
+    def bent(self, nu: float) -> LiveSheet:
+        """The same faces as panels that bend, in place of bars and hinges.
+
+        Args:
+            nu: Poisson's ratio, which bars and hinges do not know.
+        """
+        model = replace(self.model, formulation=BENT, sheet=replace(self.model.sheet, nu=nu))
+        tables = self.tables.replace(f'formulation = "{BARS}"', f'formulation = "{BENT}"')
+        return replace(self, model=model, tables=tables)
 
 
 def of_library(name: str, material: str = "card") -> LiveSheet:
@@ -166,7 +180,8 @@ def _live(name: str, scene: Scene, tables: str, assumed: tuple[str, ...]) -> Liv
                         laws.setdefault(crease, CreaseLaw(item.Lstar, item.stiffness))
     model = replace(model, creases=laws, steps=())
     said = tuple(str(remark) for remark in remarks(model))
-    return LiveSheet(name, model, _full(model.mesh), tables, (*assumed, *said))
+    settles = isinstance(scene.strategy, Settling)
+    return LiveSheet(name, model, _full(model.mesh), tables, (*assumed, *said), settles=settles)
 
 
 def _full(mesh: SheetMesh) -> dict[str, float]:
