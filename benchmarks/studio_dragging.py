@@ -1,10 +1,10 @@
 """Random handling for as long as wanted: `python -m benchmarks.studio_dragging --seconds 3600 --seed 1`.
 
 A seeded hand drags sliders, pulls, pinches and lets go of points, holds nodes, undoes, changes the material and opens
-other patterns. Of every state that is shown the forces are computed anew, at rest by a system that knows the controls of
-the frame and nothing else; now and then the controls are solved from flat as well. Seconds are of the processor. It
-ends with exit code 1 where a state is out of balance, the memory has grown by more than `LEAK`, or a state that never
-snapped is not that of the run from flat.
+other patterns. Of every state that is shown the forces are computed anew, at rest by a system that knows the
+controls of the frame and nothing else; now and then the controls are solved from flat as well. Seconds are of the
+processor. It ends with exit code 1 where a state is out of balance, the memory has grown by more than `LEAK`, or a
+state that never snapped is not that of the run from flat.
 """
 
 from __future__ import annotations

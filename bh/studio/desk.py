@@ -6,6 +6,7 @@ import base64
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
 from bh.solving.trace import trace
 from bh.studio.colours import offered, top_of
-from bh.studio.exports import export
+from bh.studio.exports import export, film
 from bh.studio.finer import Finer, finer
 from bh.studio.frames import Json, creases_of, described, head_of, line, packed, surface
 from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
@@ -99,6 +100,9 @@ class Desk:
             case asked.Export(what=what):
                 name, data = export(what, self.sheet, self.session, self.session.rest(20.0))
                 return [{"kind": "file", "name": name, "data": base64.b64encode(data).decode()}]
+            case asked.Film(pictures=pictures, ms=ms):
+                name, data = f"{Path(self.sheet.name).stem or 'sheet'}.gif", film(pictures, ms)
+                return [{"kind": "file", "name": name, "data": base64.b64encode(data).decode()}]
         return []
 
     def _laid(self, message: asked.Asked) -> bool:
@@ -106,8 +110,10 @@ class Desk:
         match message:
             case asked.Open(name=name, data=data):
                 self.put(of_file(name, data, self.material))
-            case asked.Pattern(name=name):
-                self.put(of_library(name, self.material))
+            case asked.Pattern(name=name, values=values):
+                self.put(of_library(name, self.material, values))
+            case asked.Spring(crease=crease, Lstar=Lstar):
+                self.put(self.sheet.sprung(crease, Lstar), self.session.wanted)
             case asked.Hold(node=node, on=on):
                 self._hold(node, on)
             case asked.Material():

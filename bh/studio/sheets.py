@@ -6,8 +6,9 @@ import json
 import math
 import re
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,7 @@ class LiveSheet:
         remarks: one line each: what was assumed, and what to know of the sheet.
         drawing: name and bytes of the file that `tables` speak of; None for a pattern of the library.
         percent: of the way that is shown first.
+        values: numbers of a pattern of the library that can be chosen, by key.
         settles: its springs move it downhill to rest where a branch ends, as in its scene.
     """
 
@@ -59,10 +61,30 @@ class LiveSheet:
     drawing: tuple[str, bytes] | None = None
     percent: float = PERCENT
     settles: bool = False
+    values: Mapping[str, float | Sequence[float]] = field(default_factory=dict)
 
     def of(self, sheet: Sheet) -> LiveSheet:
         """The same pattern of another material."""
         return replace(self, model=replace(self.model, sheet=sheet))
+
+    def sprung(self, crease: str, Lstar: float | None) -> LiveSheet:
+        """With a crease that is a spring, or one whose angle is imposed.
+
+        Args:
+            crease: its name, or "all".
+            Lstar: length scale of its stiffness E t^3 / (12 Lstar), mm; None for an imposed angle.
+
+        Raises:
+            InputError: there is no such crease.
+        """
+        folded = [name for name, kind in self.model.mesh.folds.items() if kind != "flat"]
+        if crease not in (*folded, "all"):
+            raise InputError(f"there is no crease '{crease}'; choose one of {', '.join(folded)}, or all")
+        names = folded if crease == "all" else [crease]
+        laws = {name: law for name, law in self.model.creases.items() if name not in names}
+        if Lstar is not None:
+            laws.update({name: CreaseLaw(Lstar) for name in names})
+        return replace(self, model=replace(self.model, creases=laws))
 
     def bent(self, nu: float) -> LiveSheet:
         """The same faces as panels that bend, in place of bars and hinges.
@@ -75,23 +97,45 @@ class LiveSheet:
         return replace(self, model=model, tables=tables)
 
 
-def of_library(name: str, material: str = "card") -> LiveSheet:
+def of_library(
+    name: str, material: str = "card", values: Mapping[str, float | Sequence[float]] | None = None
+) -> LiveSheet:
     """A pattern of the library.
 
     Args:
         name: one of `LIBRARY`.
         material: one of `MATERIALS`.
+        values: numbers in place of those of the library, mm and rad, by key; lists keep their length.
 
     Raises:
-        InputError: there is no such pattern or material.
+        InputError: there is no such pattern, key or material, or the pattern cannot be.
     """
     if name not in LIBRARY:
         raise InputError(f"there is no pattern '{name}'; choose one of {', '.join(LIBRARY)}")
-    tables = f'[pattern]\n{LIBRARY[name]}\n\n[mesh]\nkind = "staggered"\nalong = {ALONG}\nrows = {ROWS}\n'
+    table = tomllib.loads(LIBRARY[name])
+    known = parameters(name)
+    for key, value in (values or {}).items():
+        if key not in known:
+            raise InputError(f"pattern '{name}' has no '{key}' to choose; it has {', '.join(known)}")
+        old = known[key]
+        if isinstance(old, list) != isinstance(value, Sequence) or (
+            isinstance(old, list) and isinstance(value, Sequence) and len(old) != len(value)
+        ):
+            wanted = f"{len(old)} numbers" if isinstance(old, list) else "one number"
+            raise InputError(f"'{key}' of pattern '{name}' takes {wanted}")
+        table[key] = list(value) if isinstance(value, Sequence) else value
+    text = "\n".join(f"{key} = {json.dumps(value)}" for key, value in table.items())
+    tables = f'[pattern]\n{text}\n\n[mesh]\nkind = "staggered"\nalong = {ALONG}\nrows = {ROWS}\n'
     young, nu, t, _ = material_of(material)
     step = '[[steps]]\nfold = { crease = "all", by = 0.5 }\n'
     scene = parse_scene(f"{tables}\n[sheet]\nE = {young}\nnu = {nu}\nt = {t}\n\n{step}", name=name)
-    return _live(name, scene, tables, ())
+    return replace(_live(name, scene, tables, ()), values={**known, **(values or {})})
+
+
+def parameters(name: str) -> dict[str, float | list[float]]:
+    """Numbers of a pattern of the library that can be chosen, mm and rad, by key."""
+    table = tomllib.loads(LIBRARY[name])
+    return {key: value for key, value in table.items() if key not in ("kind", "fold")}
 
 
 def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
