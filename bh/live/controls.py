@@ -68,7 +68,12 @@ class Controls:
         return Controls(folds, grips, self.jaws)
 
     def gripped(self, grips: Mapping[int, Grip], jaws: Jaws | None = None) -> Controls:
-        """With other nodes pulled, too, by a hand or by jaws; what held these nodes before is opened."""
+        """With other nodes pulled, too; what held these nodes before is opened.
+
+        Args:
+            grips: by node.
+            jaws: that pull them; None where a hand does.
+        """
         kept = tuple(old for old in self.jaws if not grips.keys() & {old.a, old.b})
         opened = {node for old in self.jaws if old not in kept for node in (old.a, old.b)} - grips.keys()
         left = {node: grip for node, grip in self.grips.items() if node not in opened}

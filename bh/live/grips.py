@@ -69,7 +69,11 @@ class Jaws:
         return cls(a, b, (x, y, z), (u, v, w), stiffness)
 
     def grips(self, gap: float) -> dict[int, Grip]:
-        """Where the jaws are when they are `gap` apart, mm."""
+        """Where the jaws are when they are `gap` apart, mm.
+
+        Returns:
+            {node: grip} of both nodes.
+        """
         found = {}
         for node, half in ((self.a, -0.5 * gap), (self.b, 0.5 * gap)):
             x, y, z = (np.array(self.middle) + half * np.array(self.along)).tolist()
@@ -106,7 +110,12 @@ class Jaws:
         return self.between(points[self.a], points[self.b])
 
     def between(self, one: Array, two: Array) -> Jaws:
-        """Halfway between two points (3,), mm, on the line that joins them; as they are where these are one."""
+        """Halfway between two points, on the line that joins them; as they are where these are one.
+
+        Args:
+            one: (3,) where the first node is, mm.
+            two: (3,) where the second one is, mm.
+        """
         apart = two - one
         if not apart.any():
             return self
