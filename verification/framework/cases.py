@@ -72,6 +72,7 @@ STUDIES = (
     Study("loads", "solver"),
     Study("actuated", "solver", seconds=8),
     Study("published", "solver", seconds=250),
+    Study("cones", "solver", long=True),
     Study("peers", "solver", seconds=15),
     Study("tables4", "4", seconds=1),
     Study("speed_error", "solver", long=True),
