@@ -38,6 +38,7 @@ def test_discs_of_two_holes_are_the_same_but_for_an_octave() -> None:
     assert small_.points[: len(large.points)] == pytest.approx(0.5 * large.points)
 
 
+@pytest.mark.slow
 def test_creases_lead_to_the_other_state_and_back() -> None:
     """On a coarse disc: its energies are in the order of the closed forms, and the axis has the sign of the state."""
     path = trace(cone_model(6, "consistent", 4, 2), warn=False, neighbours=False)
