@@ -160,7 +160,8 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     if rig.tape > 0.0 and rig.pulled:
         # flat sheets lie in z = 0, as the supports do
         down = start.model.step(*items, Displace(taped, "z", 0.0))
-        start = trace(down, after=start, strategy=LoadControl(work_mismatch=math.inf), warn=False)
+        pulled = LoadControl(work_mismatch=math.inf)
+        start = trace(down, after=start, strategy=pulled, warn=False, neighbours=False)
         if not start.reached:
             raise ModelError(f"the corrugation cannot be taped down ({start.outcome}: {start.reason})")
         points = start[-1].points
@@ -176,7 +177,8 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     # as on a test stand: where the sheet snaps it goes to the next stable state, and the bar goes on
     first, largest = min(0.1, 0.2 * rig.largest) / rig.travel, rig.largest / rig.travel
     snapping = LoadControl(first=first, largest=largest, work_mismatch=math.inf, smallest=1e-4)
-    path = trace(start.model.step(*items), after=start, strategy=snapping, warn=False)
+    # other stable states beside the last one are of no use: the curve is of those that a test stand passes
+    path = trace(start.model.step(*items), after=start, strategy=snapping, warn=False, neighbours=False)
     return _evaluate(path, azimuth, rig)
 
 
