@@ -74,6 +74,7 @@ STUDIES = (
     Study("actuated", "solver", seconds=8),
     Study("bifurcations", "solver", seconds=60),
     Study("published", "solver", seconds=250),
+    Study("cones", "solver", long=True),
     Study("peers", "solver", seconds=15),
     Study("tables4", "4", seconds=1),
     Study("speed_error", "solver", long=True),
