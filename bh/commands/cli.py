@@ -205,12 +205,11 @@ def run(
     from bh.commands.resuming import say_from
     from bh.commands.run import holds_states, solve, write_extras
     from bh.commands.summary import summary
+    from bh.errors import InputError
 
     asked = [*(changes or ()), *([f"model.formulation={formulation}"] if formulation else [])]
     loaded = load_marking(scene, asked, (output or Path()).parent)
     if formulation is not None and loaded.accuracy is not None:
-        from bh.errors import InputError
-
         raise InputError(
             f"--formulation {formulation}: this scene is solved to an accuracy, which chooses the formulation; "
             "give it a mesh (--set mesh.rows=4 --set mesh.along=32), or use bh compare"
