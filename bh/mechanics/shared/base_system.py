@@ -144,7 +144,12 @@ class SupportedSheet(PressedSheet):
         return np.vstack((turned, self.friction.history_at(self.near(q, lam), lam)))
 
     def crease_history_at(self, q: Array, lam: float) -> Array:
-        """(m, 2) the part of it that is of creases."""
+        """(m, 2) the part of it that is of creases.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         raise NotImplementedError
 
     def remember(self, history: Array) -> None:

@@ -47,7 +47,12 @@ class PressedSheet:
     _kept: Array = np.zeros((0, 2))  # what friction remembers
 
     def near(self, q: Array, lam: float) -> Array:
-        """(n, 3) positions, mm, of unknowns q (size,)."""
+        """(n, 3) positions of the nodes, mm.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         raise NotImplementedError
 
     def begin_contact(self, model: Model, load_step: LoadStep, start: State | None, x: Array) -> None:
