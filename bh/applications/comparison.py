@@ -15,6 +15,7 @@ from bh.analysis.shapes import Distance, shape_distance
 from bh.analysis.stiffness_probe import Probe
 from bh.errors import InputError, ModelError
 from bh.formulations.registry import names
+from bh.loading.builder import load_steps
 from bh.model.model import Model
 from bh.model.refinement import Goal
 from bh.paths.path import Path
@@ -126,7 +127,8 @@ def compare(
         progress: as for `bh.trace`.
 
     Raises:
-        ModelError: a formulation is not known, or one stands twice.
+        ModelError: a formulation is not known, or one stands twice; or a stiffness is asked of a sheet that nothing
+            holds.
     """
     known = names()
     asked = list(formulations) or known
@@ -135,6 +137,11 @@ def compare(
             raise ModelError(f"formulation '{name}' is not known; use one of {', '.join(known)}")
     if len(set(asked)) < len(asked):
         raise ModelError(f"formulations {', '.join(asked)}: each can be compared once")
+    if stiffness is not None and load_steps(model)[-1].constraints.rigid_body:
+        raise ModelError(
+            f"nothing holds the sheet, so that it yields to any force at {stiffness.at}; hold it somewhere, as it lies "
+            'in a step of its own: hold = "edge:start"'
+        )
     report = meter(progress)
     if accuracy is not None:
         stage(report, "choosing a mesh")

@@ -21,7 +21,7 @@ def compare(
         typer.Option("--formulation", metavar="NAME", help="One of them, as often as wanted; default all."),
     ] = None,
     stiffness: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option("--stiffness", metavar="PLACE:AXIS", help="Also compare it: corner:outer-end:z."),
     ] = None,
     changes: Annotated[
@@ -43,7 +43,7 @@ def compare(
 
     check_picture(picture)
     loaded = load_scene(scene, changes or ())
-    wanted = None if stiffness is None else _stiffness(stiffness)
+    wanted = _stiffness(stiffness) if stiffness else None
     found = comparison.compare(
         loaded.model,
         formulations=formulations or (),
@@ -74,11 +74,16 @@ def compare(
         raise typer.Exit(1)
 
 
-def _stiffness(text: str) -> Stiff:
+def _stiffness(asked: list[str]) -> Stiff:
     from bh.applications.comparison import Stiff
     from bh.errors import InputError
     from bh.model.supports import AXES
 
+    text, *more = asked
+    if more:
+        raise InputError(
+            f"--stiffness {text} and {', '.join(more)}: one place and axis can be compared at a time"
+        )
     place, _, axis = text.rpartition(":")
     if not place or axis not in AXES:
         raise InputError(f"--stiffness {text} is no place and axis; write it as corner:outer-end:z")

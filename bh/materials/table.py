@@ -129,7 +129,7 @@ def material(name: str) -> Stock:
         ModelError: there is none of that name; the line has the nearest one, and all.
     """
     if name not in MATERIALS:
-        close = difflib.get_close_matches(name, MATERIALS, n=1)
+        close = difflib.get_close_matches(name.lower(), MATERIALS, n=1)
         hint = f" (did you mean '{close[0]}'?)" if close else ""
         raise ModelError(f"material '{name}' is not known{hint}; use one of {', '.join(MATERIALS)}")
     return MATERIALS[name]

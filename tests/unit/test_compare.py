@@ -65,6 +65,19 @@ def test_members_are_what_each_formulation_says_alone(scene: Path) -> None:
     assert len(picture(found).axes) == 3  # energies, the distance, its colours
 
 
+def test_stiffness_of_a_sheet_that_nothing_holds_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It yields to any force: 0 was told, and looked like a result."""
+    file = tmp_path / "free.toml"
+    file.write_text(SCENE[: SCENE.index("[[supports]]")] + SCENE[SCENE.index("[[steps]]") :])
+    assert main(["compare", str(file), "--stiffness", "corner:outer-end:z"]) == 2
+    assert (
+        "nothing holds the sheet, so that it yields to any force at corner:outer-end"
+        in capsys.readouterr().err
+    )
+
+
 def test_command_writes_table_json_and_picture(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -87,6 +100,10 @@ def test_command_writes_table_json_and_picture(
         (["--formulation", "shel"], "formulation 'shel' is not known"),
         (["--formulation", "shell", "--formulation", "shell"], "each can be compared once"),
         (["--stiffness", "tip"], "no place and axis"),
+        (
+            ["--stiffness", "edge:end:z", "--stiffness", "edge:end:y"],
+            "one place and axis can be compared at a time",
+        ),
         (["--set", "mesh.rows"], "sets nothing; write it as --set mesh.rows=4"),
         (["--set", "mesh.rows=none"], "mesh.rows"),
         (["--set", "steps[3].fold.to=2.0"], r"the scene has no 'steps[3].fold.to'"),
