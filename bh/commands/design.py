@@ -6,6 +6,7 @@ import csv
 import json
 import math
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -132,7 +133,7 @@ class Answer:
     wants: Wants | None = None
     verdict: Verdict | None = None
 
-    @property
+    @cached_property
     def tolerance(self) -> Tolerance | None:
         """How the end moves with what is not made exactly; None where the model does not know."""
         k0, length, on = self.design.k0, self.design.length, self.design.pinched
@@ -140,7 +141,7 @@ class Answer:
             return None
         return predicted(self.surrogate, k0, length, on, SPREADS).one()
 
-    @property
+    @cached_property
     def region(self) -> Region | None:
         """The ellipsoid that the ends of most strips are in; None where the model does not know."""
         if not self.surrogate.has_variants:
