@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-Stopping = Annotated[list[Number], Field(min_length=4, max_length=4)]
+Stopping = Annotated[list[Number], Field(min_length=4, max_length=5)]
 Box = Annotated[list[Number], Field(min_length=6, max_length=6)]
 SPREADS, PROBABILITY = Spreads(), 0.95
 
@@ -68,7 +68,8 @@ class TargetTable(Table):
     )
     stops: list[Stopping] = Field(
         default_factory=list,
-        description="of a point: where the end is on its way, rows [part, x, y, z]: part of the pinch, mm",
+        description="of a point: where the crease is on its way, rows [part, x, y, z] or [part, x, y, z, along]: part "
+        "of the pinch, mm, and which point: a share of the length of the crease, 1 (the end) if not given",
     )
     keep_out: list[Box] = Field(
         default_factory=list,
@@ -201,7 +202,7 @@ def solve(file: str | Path) -> Answer:
 
 def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answer:
     assert target.point is not None
-    stops = [(row[0], row[1:]) for row in target.stops]
+    stops = [(row[0], row[1:4], row[4] if len(row) > 4 else 1.0) for row in target.stops]
     wants = Wants.of(target.point, target.tangent, target.up, stops, target.keep_out)
     books = tuple(Library(surrogate, n, size_of(n), search.seed) for n in range(1, search.segments + 1))
     reach = Reach(
