@@ -322,6 +322,9 @@ def made(
         setting: sheet, fold and pinch.
         spreads: standard deviations.
         rng: draws the errors.
+
+    Returns:
+        the design and the setting that one would get.
     """
     off = {name: getattr(setting, name) + getattr(spreads, name) * rng.normal() for name in VARIED}
     cut = replace(
