@@ -6,6 +6,7 @@ import csv
 import json
 import math
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-Stopping = Annotated[list[Number], Field(min_length=4, max_length=4)]
+Stopping = Annotated[list[Number], Field(min_length=4, max_length=5)]
 Box = Annotated[list[Number], Field(min_length=6, max_length=6)]
 SPREADS, PROBABILITY = Spreads(), 0.95
 
@@ -67,7 +68,8 @@ class TargetTable(Table):
     )
     stops: list[Stopping] = Field(
         default_factory=list,
-        description="of a point: where the end is on its way, rows [part, x, y, z]: part of the pinch, mm",
+        description="of a point: where the crease is on its way, rows [part, x, y, z] or [part, x, y, z, along]: part "
+        "of the pinch, mm, and which point: a share of the length of the crease, 1 (the end) if not given",
     )
     keep_out: list[Box] = Field(
         default_factory=list,
@@ -132,7 +134,7 @@ class Answer:
     wants: Wants | None = None
     verdict: Verdict | None = None
 
-    @property
+    @cached_property
     def tolerance(self) -> Tolerance | None:
         """How the end moves with what is not made exactly; None where the model does not know."""
         k0, length, on = self.design.k0, self.design.length, self.design.pinched
@@ -140,7 +142,7 @@ class Answer:
             return None
         return predicted(self.surrogate, k0, length, on, SPREADS).one()
 
-    @property
+    @cached_property
     def region(self) -> Region | None:
         """The ellipsoid that the ends of most strips are in; None where the model does not know."""
         if not self.surrogate.has_variants:
@@ -200,7 +202,7 @@ def solve(file: str | Path) -> Answer:
 
 def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answer:
     assert target.point is not None
-    stops = [(row[0], row[1:]) for row in target.stops]
+    stops = [(row[0], row[1:4], row[4] if len(row) > 4 else 1.0) for row in target.stops]
     wants = Wants.of(target.point, target.tangent, target.up, stops, target.keep_out)
     books = tuple(Library(surrogate, n, size_of(n), search.seed) for n in range(1, search.segments + 1))
     reach = Reach(

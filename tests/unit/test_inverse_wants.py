@@ -12,6 +12,7 @@ pytest.importorskip("xarray")
 from xarray import Dataset
 
 from bh.applications.inverse import models, surrogate
+from bh.applications.inverse.along import along, along_strip
 from bh.applications.inverse.boxes import ROOM, depths
 from bh.applications.inverse.converged import Converged
 from bh.applications.inverse.descent import descend
@@ -176,6 +177,7 @@ def test_directions_as_residuals() -> None:
         ({"tangent": (0.0, 0.0, 0.0)}, "no direction"),
         ({"tangent": (1.0, 0.0, 0.0), "up": (2.0, 0.0, 0.0)}, "no direction"),
         ({"stops": [(1.0, (1.0, 2.0, 3.0))]}, "0 < part < 1"),
+        ({"stops": [(0.5, (1.0, 2.0, 3.0), 1.2)]}, "0 < along <= 1"),
         ({"keep_out": [[0.0, 0.0, 0.0, 1.0, 1.0, 0.0]]}, "no room"),
         ({"keep_out": [[0.0, 1.0]]}, "six numbers"),
         ({"keep_out": [[-5.0, -5.0, -5.0, 5.0, 5.0, 5.0]]}, "the start of the crease .* lies in a box"),
@@ -257,6 +259,32 @@ def test_a_design_is_found_again() -> None:
     assert turned < math.radians(0.5)
     assert 0.0 < landing.bar <= bar < 1.0
     assert 0.0 < turn_bar < math.radians(0.5)
+
+
+def test_points_of_the_crease() -> None:
+    """Ends and joints are those of the chain, a point between is that of the simulated strip, half a pinch too."""
+    arrays = np.array([K0]), np.array([LENGTH]), np.array([ON])
+    model = converged().closed_by(0.5)
+    points = model.forward(*arrays)[0][0]
+    for share, point in zip((0.0, LENGTH[0] / sum(LENGTH), 1.0), points, strict=True):
+        np.testing.assert_allclose(along(model, *arrays, share)[0], point, atol=1e-9)
+    share = 0.35  # 22 mm behind the middle of the first pinch
+    landing = model.land(K0, LENGTH, ON)
+    beside = along_strip(landing.strip, share) - along(model.same_mesh, *arrays, share)[0]
+    assert np.linalg.norm(beside) < 0.5
+    assert np.linalg.norm(along_strip(landing.strip, 1.0) - landing.strip.t) < 1e-9
+
+
+def test_a_design_with_a_point_on_the_way_is_found_again() -> None:
+    """Where its end is, and where two thirds of its crease are when pinches are half closed."""
+    arrays = np.array([K0]), np.array([LENGTH]), np.array([ON])
+    end = converged().forward(*arrays)[0][0, -1]
+    between = along(converged().closed_by(0.5), *arrays, 0.66)[0]
+    wants = Wants.of(end, stops=[(0.5, between, 0.66)])
+    problem = ReachAll(converged(), 2, target=end, wants=wants, shift=np.zeros(1))
+    x = descend(problem, problem.variables(DESIGN)[None] + [0.02, -0.02, 1.0, -1.0], np.array([ON]))
+    missed, _ = problem.off(problem.bare(x, np.array([ON])))
+    assert missed[0] < 0.05
 
 
 def test_a_point_with_a_direction() -> None:

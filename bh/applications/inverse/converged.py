@@ -94,6 +94,11 @@ class Converged:
         except (KeyError, TypeError, ValueError) as error:
             raise DesignError(f"the data set is incomplete ({error}); {ANEW}") from error
 
+    @property
+    def same_mesh(self) -> Converged:
+        """The same strips on the mesh on which whole strips are simulated."""
+        return self._same
+
     def sector_bound(self, length: ArrayLike) -> Array:
         """Curvature before folding at which the sector is as large as it may be, 1/mm.
 

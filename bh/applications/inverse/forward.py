@@ -27,6 +27,11 @@ class Forward(Protocol):
     setting: Setting
     has_variants: bool
 
+    @property
+    def same_mesh(self) -> Forward:
+        """The same strips on the mesh on which whole strips are simulated (`land`)."""
+        ...
+
     def forward(
         self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike, check: bool = True
     ) -> tuple[Array, Array]:

@@ -235,6 +235,11 @@ class Surrogate:
         """None: this model does not know what strips do that are made a little differently."""
         return {}
 
+    @property
+    def same_mesh(self) -> Surrogate:
+        """Itself: it is of one mesh."""
+        return self
+
     def made(self, off: Mapping[str, Array]) -> Forward:
         """Not known to this model: strips that are made a little differently.
 

@@ -13,7 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bh.applications.inverse.along import along, along_strip
 from bh.applications.inverse.boxes import depths
+from bh.applications.inverse.converged import SHARE
 from bh.applications.inverse.descent import descend
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.problems import Design, ReachPoint
@@ -30,15 +32,17 @@ STEADY = 0.3  # weight of movements beside residuals, where a design is to move 
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """Where the end of the crease is when pinches are closed by a part of the way.
+    """Where a point of the crease is when pinches are closed by a part of the way.
 
     Attributes:
-        part: of the way from the fold to the full pinch, above 0 and below 1.
-        point: (3,) where the end is to be then, mm.
+        part: of the way from the fold to the full pinch, above 0; at the end of the crease below 1.
+        point: (3,) where it is to be then, mm.
+        along: which point of the crease: a share of its length, 1 for its end.
     """
 
     part: float
     point: Array
+    along: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +70,7 @@ class Wants:
         point: ArrayLike,
         tangent: ArrayLike | None = None,
         up: ArrayLike | None = None,
-        stops: Sequence[tuple[float, ArrayLike]] = (),
+        stops: Sequence[tuple[float, ArrayLike] | tuple[float, ArrayLike, float]] = (),
         keep_out: ArrayLike = (),
     ) -> Wants:
         """From plain numbers, checked.
@@ -75,7 +79,7 @@ class Wants:
             point: (3,), mm.
             tangent: (3,) of any length.
             up: (3,) of any length; only its part at right angles to the tangent counts.
-            stops: parts of the way of the pinch, and points (3,), mm.
+            stops: parts of the way of the pinch, points (3,), mm, and of the length of the crease, 1 if not given.
             keep_out: (k, 2, 3) or (k, 6) corners of boxes, mm.
 
         Raises:
@@ -89,11 +93,7 @@ class Wants:
         if up is not None and along is not None:
             ridge = _vector(up, "up")
             ridge = _unit(ridge - (ridge @ along) * along, "up, at right angles to the tangent,")
-        for part, _ in stops:
-            if not 0.0 < part < 1.0:
-                raise DesignError(
-                    f"a pinch that is closed by {part:g} of its way is no stop; give 0 < part < 1"
-                )
+        met = tuple(_stop(*stop) for stop in stops)
         try:
             boxes = np.asarray(keep_out, dtype=float).reshape(-1, 2, 3)
         except ValueError as error:
@@ -103,7 +103,6 @@ class Wants:
         boxes = np.sort(boxes, axis=1)
         if not np.isfinite(boxes).all() or (boxes[:, 0] >= boxes[:, 1]).any():
             raise DesignError("a box of keep_out has no room; give two opposite corners")
-        met = tuple(Stop(float(part), _vector(p, "a stop")) for part, p in stops)
         places = [
             ("the start of the crease", np.zeros(3)),
             ("the target", at),
@@ -165,6 +164,14 @@ def _vector(value: ArrayLike, name: str) -> Array:
     return found
 
 
+def _stop(part: float, point: ArrayLike, share: float = 1.0) -> Stop:
+    if not 0.0 < share <= 1.0:
+        raise DesignError(f"a stop at {share:g} of the length of the crease cannot be; give 0 < along <= 1")
+    if not 0.0 < part <= 1.0 or part == share == 1.0:
+        raise DesignError(f"a pinch that is closed by {part:g} of its way is no stop; give 0 < part < 1")
+    return Stop(float(part), _vector(point, "a stop"), float(share))
+
+
 def _unit(value: Array, name: str) -> Array:
     size = float(np.linalg.norm(value))
     if size < 1e-9:
@@ -208,7 +215,7 @@ class ReachAll(ReachPoint):
         points, frames = self.surrogate.forward(*design, on, check=False)
         groups = [points[..., -1, :] - self.wants.point, self.wants.turn(frames[..., -1, :, :])]
         for model, stop in zip(self._closed, self.wants.stops, strict=True):
-            groups.append(model.forward(*design, on, check=False)[0][..., -1, :] - stop.point)
+            groups.append(along(model, *design, on, stop.along) - stop.point)
         return np.concatenate(groups, axis=-1)
 
     def residuals(self, x: Array, on: Bools) -> Array:
@@ -271,10 +278,13 @@ class ReachAll(ReachPoint):
         landing = self.surrogate.land(*design.lists())
         groups = [landing.end - self.wants.point, self.wants.turn(landing.frame)]
         bar = landing.bar
+        landings: dict[float, Landing] = {1.0: landing}
         for model, stop in zip(self._closed, self.wants.stops, strict=True):
-            there = model.land(*design.lists())
-            groups.append(there.end - stop.point)
-            bar = max(bar, there.bar)
+            if stop.part not in landings:
+                landings[stop.part] = model.land(*design.lists())
+            place, doubt = _reached(model, landings[stop.part], design, stop.along)
+            groups.append(place - stop.point)
+            bar = max(bar, doubt)
         return landing, np.concatenate(groups), bar, landing.turn
 
     def shifted(self, residuals: Array, x: Array, on: Bools) -> ReachAll:
@@ -286,6 +296,16 @@ class ReachAll(ReachPoint):
             on: (n,) its pinches.
         """
         return replace(self, shift=residuals - self.bare(x[None], on[None])[0])
+
+
+def _reached(model: Forward, landing: Landing, design: Design, share: float) -> tuple[Array, float]:
+    """(3,) a point of the crease of a strip that was simulated, and its error bar, mm; see `Converged.land`."""
+    if share == 1.0:
+        return landing.end, landing.bar
+    arrays = design.k0[None], design.length[None], design.pinched[None]
+    limit, same = (along(each, *arrays, share)[0] for each in (model, model.same_mesh))
+    beside = along_strip(landing.strip, share) - same
+    return limit + beside, float(model.bars(*arrays)[0][0] + SHARE * np.linalg.norm(beside))
 
 
 @dataclass(frozen=True, eq=False)
