@@ -242,6 +242,11 @@ class Hindered(Limited, Protocol):
         """Does anything stand in the way, ever?"""
         ...
 
+    @property
+    def looking(self) -> float:
+        """What looks at what stands in the way have taken so far, s of one core of 2.5 GHz, counted by their work."""
+        ...
+
     def unhindered(self) -> AbstractContextManager[None]:
         """While it lasts nothing stands in the way."""
         ...

@@ -13,6 +13,7 @@ from meshes import SheetMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
+MOST_KEPT = 2  # times as many pairs as there are now, for those of before to be kept in the pattern
 
 
 class ContactBlocks:
@@ -24,12 +25,13 @@ class ContactBlocks:
         self._keys: Ints = np.zeros(0, dtype=np.int64)
 
     def known(self, pairs: Ints) -> bool:
-        """Are all of these (p, 2) among the pairs? If not, the pairs are now these."""
+        """Are all of these (p, 2) among the pairs? If not, they are now, with those of before unless they are many."""
         keys = _keys(pairs)
         if np.isin(keys, self._keys).all():
             return True
-        self._keys, first = np.unique(keys, return_index=True)
-        self.pairs = pairs[first]
+        few = len(self.pairs) <= MOST_KEPT * len(pairs)  # pairs come and go: what was near will be near again
+        self._keys = np.union1d(self._keys, keys) if few else np.unique(keys)
+        self.pairs = np.column_stack((self._keys >> 31, self._keys & (2**31 - 1)))
         return False
 
     def add(
