@@ -29,10 +29,8 @@ class ContactBlocks:
         keys = _keys(pairs)
         if np.isin(keys, self._keys).all():
             return True
-        many = len(self.pairs) > MOST_KEPT * len(
-            pairs
-        )  # else what was near will be near again: pairs come and go
-        self._keys = np.unique(keys) if many else np.union1d(self._keys, keys)
+        few = len(self.pairs) <= MOST_KEPT * len(pairs)  # pairs come and go: what was near will be near again
+        self._keys = np.union1d(self._keys, keys) if few else np.unique(keys)
         self.pairs = np.column_stack((self._keys >> 31, self._keys & (2**31 - 1)))
         return False
 

@@ -25,6 +25,7 @@ from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 ROW = 16  # numbers of a contact in what is remembered: kind and nodes, s, normal, force, weights
+HEAD = 4  # numbers before the positions: energies by forces of ends and by means, lambda
 TINY = 1e-300
 
 
@@ -98,7 +99,7 @@ class Friction:
         """
         self._sources, self._places = sources, places
         self._slip, self._partner = slip, partner
-        self._used = dissipated
+        self._used = self._told = dissipated  # by the forces of ends of increments, and by their means
         self._before = np.zeros((0, 3))  # places of the state that was accepted last
         self._kept = self._now = Rubbing.none()
 
@@ -183,12 +184,34 @@ class Friction:
             lam: load parameter of the step, 0 to 1.
         """
         places = self._places(x, lam)
-        return self.energy(places), self._pushes(self._now, places)
-
-    def energy(self, places: Array) -> float:
-        """What friction has used up, and holds where the sheet sticks, N mm."""
         _, y = self._slips(self._now, places)
-        return self._used + float(self._now.force @ self._potential(y))
+        energy = self._used + float(self._now.force @ self._potential(y))
+        return energy, self._pushes(self._now, places)
+
+    def dissipated(self, x: Array, lam: float) -> float:
+        """What friction has used up, N mm: slips times the means of the forces at both ends of increments.
+
+        What is held where the sheet sticks is in it.
+
+        Args:
+            x: (nodes, 3) positions of the sheet, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        _, y = self._slips(self._now, self._places(x, lam))
+        held = self._now.force @ self._potential(np.minimum(y, self._slip))
+        return self._told + float(held) + self._lost(y)
+
+    def _lost(self, y: Array) -> float:
+        """What slips (c,), mm, since the last state use up, by the means of the forces there and here, N mm."""
+        before = {tuple(key): f for key, f in zip(self._kept.keys.tolist(), self._kept.force, strict=True)}
+        rubbed = set(self._kept.keys[:, 1:].ravel().tolist()) - {-1}
+        old = np.array(
+            [  # what slides on to the next triangle has rubbed before, what touches anew has not
+                before.get(tuple(key), force if rubbed & set(key[1:3]) else 0.0)
+                for key, force in zip(self._now.keys.tolist(), self._now.force.tolist(), strict=True)
+            ]
+        )
+        return float(0.5 * (old + self._now.force) @ np.maximum(y - self._slip, 0.0))
 
     def _stiffness(self, x: Array, lam: float) -> Array:
         """(c, 3, 3) second derivatives by the slips, N / mm."""
@@ -245,8 +268,8 @@ class Friction:
         stuck = u * np.minimum(1.0, self._slip / np.maximum(y, TINY))[:, None]
         lost = self._potential(y) - self._potential(np.minimum(y, self._slip))
         rows = np.hstack((rubbing.keys, stuck, rubbing.normals, rubbing.force[:, None], rubbing.weights))
-        used = self._used + float(rubbing.force @ lost)
-        flat = np.concatenate(([used, lam], x.ravel(), np.zeros(x.size % 2), rows.ravel()))
+        used, told = self._used + float(rubbing.force @ lost), self._told + self._lost(y)
+        flat = np.concatenate(([used, lam, told, 0.0], x.ravel(), np.zeros(x.size % 2), rows.ravel()))
         return flat.reshape(-1, 2)
 
     def fits(self, history: Array, nodes: int) -> bool:
@@ -267,7 +290,7 @@ class Friction:
 
     @staticmethod
     def _head(nodes: int) -> int:
-        return 2 + 3 * nodes + (3 * nodes) % 2
+        return HEAD + 3 * nodes + (3 * nodes) % 2
 
     def remember(self, history: Array, nodes: int) -> None:
         """Go on from there.
@@ -278,7 +301,7 @@ class Friction:
         """
         flat = history.ravel()
         rows = flat[self._head(nodes) :].reshape(-1, ROW)
-        self._used, lam = float(flat[0]), float(flat[1])
-        self._before = self._places(flat[2 : 2 + 3 * nodes].reshape(-1, 3), lam)
+        self._used, lam, self._told = (float(each) for each in flat[:3])
+        self._before = self._places(flat[HEAD : HEAD + 3 * nodes].reshape(-1, 3), lam)
         keys, stuck, normals, force, weights = np.split(rows, [5, 8, 11, 12], axis=1)
         self._kept = self._now = Rubbing(keys.astype(np.int64), weights, normals, force[:, 0], stuck)

@@ -184,9 +184,8 @@ class PressedSheet:
         energy = self._contact(x, lam, f)
         if self.friction is None:
             return energy, 0.0
-        used, rubbed = self.friction.forces(x, lam)
-        f += rubbed[: len(x)]
-        return energy, used
+        f += self.friction.forces(x, lam)[1][: len(x)]
+        return energy, self.friction.dissipated(x, lam)
 
     def contact_forces(self, x: Array, lam: float) -> dict[str, Array]:
         """(3,) force of every body of the step on the sheet, friction included, N, by its name.
