@@ -18,9 +18,10 @@ from bh.solvers.system import Evaluation, Tangent, grows_ahead
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
+from fem.contact import StoppedShell
 from fem.creases import connectors, spring_entries
 from fem.growth import at_rest
-from fem.here import Here, root_mean_square
+from fem.here import Here, out_of_balance
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
 from fem.outside import shell_outside
@@ -35,7 +36,7 @@ LARGEST_ANGLE = 2.6  # rad between an edge's sides or tangent and its frame, whi
 ROUNDING = 8.0 * np.finfo(float).eps
 
 
-class ShellSystem:
+class ShellSystem(StoppedShell):
     """`bh.solvers.System` of one step.
 
     Unknowns: free displacements of all nodes in local axes (mm), rotations alpha of edges and fold angles beta of
@@ -92,6 +93,7 @@ class ShellSystem:
         self.outside = shell_outside(elements, load_step, loads.ground(elements, model), self.constraints)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
+        self.hinder(model, x)
         if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
             pull, free = self.gradient(self.at(self.start(), 0.0)), self.components.free
             carried = np.zeros(len(pull))
@@ -137,10 +139,6 @@ class ShellSystem:
         """Unknowns of the state that the step begins with."""
         return self.components.begin[self.components.free]
 
-    def node_positions(self, components: Array) -> Array:
-        """(n, 3) positions of all nodes, middle nodes included, mm."""
-        return self.mesh.nodes + self.components.moves(components)
-
     def positions(self, q: Array, lam: float) -> Array:
         """(n, 3) positions of the corners, mm."""
         return self.node_positions(self.components.whole(q, lam))[: len(self.mesh.sheet.points)]
@@ -183,7 +181,7 @@ class ShellSystem:
         energy = 0.5 * float(np.vdot(forces, np.hstack((strain, curvature))))
         B = e.gradients(x, self.frames)
         pull = np.einsum("tkj,tk->tj", B, forces)
-        self._here = Here(q.copy(), lam, components, x, forces, energy, B, pull)
+        self._here = Here(q.copy(), lam, components, x, forces, energy, B, pull, *self.press(x))
         return self._here
 
     def elastic(self, x: Array, gamma: Array, lam: float) -> tuple[Array, Array]:
@@ -219,6 +217,8 @@ class ShellSystem:
         ).ravel()
         if self.outside is not None:
             self._add_nodal(out, self.outside.gradient(here.x, here.lam))
+        if here.pressed is not None:
+            self._add_nodal(out, here.pressed)
         return out
 
     def _add_nodal(self, out: Array, nodal: Array) -> None:
@@ -236,11 +236,10 @@ class ShellSystem:
         """Energy, residual and element forces at (q, lam)."""
         here = self.at(q, lam)
         beta = self.components.beta(here.components)
-        energy = (
-            here.energy + float(self.creases.energy(beta, lam).sum()) + self.creases.load_energy(beta, lam)
-        )
+        energy = here.energy + float(self.creases.energy(beta, lam).sum())
+        energy += self.creases.load_energy(beta, lam)
         energy -= float(self.load.at(lam) @ here.components)
-        energy += 0.0 if self.outside is None else self.outside.energy(here.x, lam)
+        energy += here.contact + (0.0 if self.outside is None else self.outside.energy(here.x, lam))
         residual = self.gradient(here)[self.components.free]
         return Evaluation(energy, residual, self._imbalance(residual, here), here.forces.ravel())
 
@@ -266,12 +265,7 @@ class ShellSystem:
                 floors[1],
             ),
         )
-        worst = 0.0
-        for part, inner, outer, floor in groups:
-            largest = float(np.abs(part).max(initial=0.0)) - floor
-            if largest > 0.0:
-                worst = max(worst, largest / max(root_mean_square(inner), outer, 1e-300))
-        return worst
+        return max(0.0, *(out_of_balance(*group) for group in groups))
 
     @cached_property
     def _flat_stiffness(self) -> tuple[float, float, float]:
@@ -298,9 +292,12 @@ class ShellSystem:
             self.outside.add(K, here.x, here.lam)
         if (self.constraints.frame_of >= 0).any():
             turn_blocks(K, self.mesh.triangles, self.constraints.frame_of, self.constraints.frames)
+        met = self.blocks(here.x)
         pattern = self._pattern
         data = np.zeros(pattern.size)
         scatter(K, self.components.sides, pattern.slots, data)
+        if met is not None:
+            self.add_blocks(*met, pattern, data)
         slots, values = self._springs
         np.add.at(data, slots, values)
         if not self.constraints.rigid_body:
@@ -371,6 +368,8 @@ class ShellSystem:
             out[self.components.first_beta :] += turn.ravel()
             if self.outside is not None:
                 self._add_nodal(out, self.outside.times(here.x, self.components.moves(v), here.lam))
+            if self.barrier is not None:
+                self._add_nodal(out, self.barrier.times(here.x, self.components.moves(v)))
         return out
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
@@ -382,6 +381,8 @@ class ShellSystem:
             q_new: (size,) after it.
             lam_new: after it.
         """
+        if stopped := self.passed(q, lam, q_new, lam_new):
+            return stopped
         before, after = self.components.whole(q, lam), self.components.whole(q_new, lam_new)
         turn = float(np.abs(self.components.alpha(after) - self.components.alpha(before)).max())
         if turn > LARGEST_TURN:
@@ -394,9 +395,8 @@ class ShellSystem:
         return ""
 
     def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Nothing: the shell knows no contact, and its sides may pass through each other."""
-        del q, lam, q_new, lam_new  # the arguments of every system
-        return ""
+        """What passed through itself between two states; without contact sides may do so, and nothing is said."""
+        return self.passed(q, lam, q_new, lam_new)
 
     def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
         """What stands in the way of loads on a free sheet, with its outcome; None if nothing does."""
@@ -415,7 +415,8 @@ class ShellSystem:
 
     @cached_property
     def _pattern(self) -> Pattern:
-        return build_pattern(self.mesh, self.components.of_element, self.components.number)
+        c = self.components
+        return build_pattern(self.mesh, c.of_element, c.number, touching=self.touching)
 
     @cached_property
     def _springs(self) -> tuple[Ints, Array]:
