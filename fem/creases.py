@@ -10,6 +10,8 @@ edges have none.
 - elastic: 1/2 k_f int (beta - beta_R)^2 ds; free hinge: k_f = 0;
 - moment-driven: - int m beta ds, on top of either.
 
+- a law of its own (table, elastic-plastic, ...): an energy at the points of the edge (`fem.crease_laws`).
+
 As the moment of a side is conjugate to gamma, an elastic crease is the same as a compliance -sigma_nn^2 / (2 k_f) in
 the mixed energy.
 """
@@ -18,6 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +30,10 @@ from bh.loading.load_step import LoadStep
 from bh.model.laws import PRESCRIBED, SHEET, SPRING
 from bh.model.model import Model
 from bh.model.ramp import Ramp
+from fem.crease_laws import CreaseLaws, crease_laws
 from fem.shell import ShellElements, edge_tangents
 from fem.spaces import tables
+from fem.state import ShellState
 from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
@@ -48,7 +53,8 @@ class Connectors:
         mass: (c, r, r) int of the products of beta's shape functions, mm.
         stiffness: (c,) k_f a length, N mm / (mm rad).
         rest: (c, r) beta_R, rad.
-        moment: (c,) couple a length, N.
+        moment: (c, r) couple a length, N.
+        laws: of creases that are no straight lines, whose `stiffness` here is zero; None without such creases.
     """
 
     hinges: Ints
@@ -60,13 +66,14 @@ class Connectors:
     stiffness: Array
     rest: Ramp
     moment: Ramp
+    laws: CreaseLaws | None = None
 
     def __len__(self) -> int:
         """Number of creased edges, c."""
         return len(self.edges)
 
     def energy(self, beta: Array, lam: float) -> Array:
-        """(c,) elastic energies of springs, N mm.
+        """(c,) energies of springs, with what yielding has dissipated, N mm.
 
         Args:
             beta: (c, r) turns of the connectors, rad.
@@ -74,7 +81,7 @@ class Connectors:
         """
         turn = beta - self.rest.at(lam)
         out: Array = 0.5 * self.stiffness * np.einsum("ci,cij,cj->c", turn, self.mass, turn)
-        return out
+        return out if self.laws is None else out + self.laws.held(turn).energy
 
     def load_energy(self, beta: Array, lam: float) -> float:
         """Potential of the couples, N mm.
@@ -83,18 +90,37 @@ class Connectors:
             beta: (c, r) turns of the connectors, rad.
             lam: load parameter of the step, 0 to 1.
         """
-        return -float(np.einsum("c,cij,cj->", self.moment.at(lam), self.mass, beta))
+        return -float(np.einsum("ci,cij,cj->", self.moment.at(lam), self.mass, beta))
 
-    def gradient(self, beta: Array, lam: float) -> Array:
-        """(c, r) derivative of both by beta, N mm.
+    def springs(self, beta: Array, lam: float) -> Array:
+        """(c, r) derivative of the energies of springs by beta, N mm / rad.
 
         Args:
             beta: (c, r) turns of the connectors, rad.
             lam: load parameter of the step, 0 to 1.
         """
-        turn = self.stiffness[:, None] * (beta - self.rest.at(lam)) - self.moment.at(lam)[:, None]
-        out: Array = np.einsum("cij,cj->ci", self.mass, turn)
-        return out
+        turn = beta - self.rest.at(lam)
+        out: Array = self.stiffness[:, None] * np.einsum("cij,cj->ci", self.mass, turn)
+        return out if self.laws is None else out + self.laws.held(turn).gradient
+
+    def tangents(self, beta: Array, lam: float) -> Array:
+        """(c, r, r) second derivative of the energies of springs by beta, N mm / rad^2.
+
+        Args:
+            beta: (c, r) turns of the connectors, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
+        out: Array = self.stiffness[:, None, None] * self.mass
+        return out if self.laws is None else out + self.laws.held(beta - self.rest.at(lam)).tangent
+
+    def gradient(self, beta: Array, lam: float) -> Array:
+        """(c, r) derivative of both energies by beta, N mm / rad.
+
+        Args:
+            beta: (c, r) turns of the connectors, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
+        return np.asarray(self.springs(beta, lam) - np.einsum("cij,cj->ci", self.mass, self.moment.at(lam)))
 
     def largest(self, beta: Array, lam: float) -> float:
         """Largest couple of a spring or of a load on one value of beta, N mm / rad.
@@ -103,16 +129,19 @@ class Connectors:
             beta: (c, r) turns of the connectors, rad.
             lam: load parameter of the step, 0 to 1.
         """
-        turn = self.stiffness[:, None] * (beta - self.rest.at(lam))
-        spring = np.abs(np.einsum("cij,cj->ci", self.mass, turn)).max(initial=0.0)
-        load = np.abs(self.moment.at(lam)[:, None] * self.mass.sum(axis=2)).max(initial=0.0)
+        spring = np.abs(self.springs(beta, lam)).max(initial=0.0)
+        load = np.abs(self.moment.at(lam) * self.mass.sum(axis=2)).max(initial=0.0)
         return float(max(spring, load))
 
-    def gradient_rate(self) -> Array:
-        """(c, r) derivative of `gradient` by lambda."""
-        turn = -self.stiffness[:, None] * self.rest.rate - self.moment.rate[:, None]
-        out: Array = np.einsum("cij,cj->ci", self.mass, turn)
-        return out
+    def gradient_rate(self, beta: Array, lam: float) -> Array:
+        """(c, r) derivative of `gradient` by lambda at fixed beta.
+
+        Args:
+            beta: (c, r) turns of the connectors, rad.
+            lam: load parameter of the step, 0 to 1.
+        """
+        turning = np.einsum("cij,cj->ci", self.tangents(beta, lam), self.rest.rate)
+        return np.asarray(-turning - np.einsum("cij,cj->ci", self.mass, self.moment.rate))
 
     def power(self, beta: Array, lam: float) -> float:
         """Derivative of both energies by lambda at fixed beta, N mm.
@@ -121,22 +150,18 @@ class Connectors:
             beta: (c, r) turns of the connectors, rad.
             lam: load parameter of the step, 0 to 1.
         """
-        return float(np.vdot(self.gradient_rate(), beta)) + float(
-            np.einsum("c,ci,cij,cj->", self.stiffness, self.rest.rate, self.mass, self.rest.at(lam))
-        )
+        loads = float(np.einsum("ci,cij,cj->", self.moment.rate, self.mass, beta))
+        return -float(np.vdot(self.springs(beta, lam), self.rest.rate)) - loads
 
 
-def connectors(
-    mesh: ElementMesh, model: Model, load_step: LoadStep, beta: Array, couple: Array
-) -> Connectors:
+def connectors(mesh: ElementMesh, model: Model, load_step: LoadStep, start: ShellState | None) -> Connectors:
     """Creased edges of a step.
 
     Args:
         mesh: elements.
         model: has the laws of its creases.
         load_step: what the step imposes.
-        beta: (m, r) fold angles of all hinges where the step begins, rad.
-        couple: (m, r) couples on them there, N mm / rad.
+        start: state that the step begins at; None for the flat sheet.
 
     Raises:
         ModelError: a couple acts where there is no crease to turn.
@@ -154,10 +179,14 @@ def connectors(
     of_edge[edges] = np.arange(len(edges))
     table = tables(mesh.degree)
     turns = table.rotations
-    speed = np.linalg.norm(edge_tangents(mesh, mesh.nodes), axis=-1)
-    mass = np.einsum("p,cp,ip,jp->cij", table.edge_weights, speed[edges], table.turn, table.turn)
+    flat = np.zeros((len(topology.hinges), turns))
+    beta, couple = (flat, flat) if start is None else (start.fold_angles, start.crease_couples)
+    weights = table.edge_weights * np.linalg.norm(edge_tangents(mesh, mesh.nodes), axis=-1)[edges]
+    mass = np.einsum("cp,ip,jp->cij", weights, table.turn, table.turn)
     prescribed = load_step.law[hinges] == PRESCRIBED
-    stiffness = np.where(load_step.law == SPRING, load_step.stiffness, 0.0)[hinges]
+    laws = crease_laws(load_step, hinges, weights, table, start)
+    straight = (load_step.law == SPRING) & (True if load_step.curve is None else load_step.curve < 0)
+    stiffness = np.where(straight, load_step.stiffness, 0.0)[hinges]
 
     def fold(angles: Array) -> Array:
         """(c, r) fold angles of dihedral angles (m, 2) at the ends of edges, or (m,) of whole edges."""
@@ -171,30 +200,40 @@ def connectors(
     # a prescribed crease that is released keeps its moment: k (rest - beta) is what the crease carried
     turn = np.linalg.solve(mass, couple[hinges][..., None])[..., 0]
     released = begin + turn / np.where(stiffness > 0.0, stiffness, np.inf)[:, None]
-    start = fold(springs.start)
-    rest = Ramp(np.where(np.isnan(start), released, start), fold(springs.end))
-    load = Ramp(
-        np.where(prescribed, 0.0, load_step.moment.start[hinges]),
-        np.where(prescribed, 0.0, load_step.moment.end[hinges]),
+    before = fold(springs.start)
+    rest = Ramp(np.where(np.isnan(before), released, before), fold(springs.end))
+    load = [
+        np.repeat(np.where(prescribed, 0.0, at[hinges])[:, None], turns, axis=1)
+        for at in (load_step.moment.start, load_step.moment.end)
+    ]
+    if laws is not None and load_step.freed is not None:  # what imposed their angles fades out
+        own = np.linalg.solve(mass, laws.held(begin - rest.start).gradient[..., None])[..., 0]
+        freed = load_step.freed[hinges] & ~prescribed
+        load[0] = np.where(freed[:, None], turn + own, load[0])
+    return Connectors(
+        hinges, edges, of_edge, prescribed, angle, mass, stiffness, rest, Ramp(load[0], load[1]), laws
     )
-    return Connectors(hinges, edges, of_edge, prescribed, angle, mass, stiffness, rest, load)
+
+
+class SpringEntries(NamedTuple):
+    """Where the stiffness of elastic creases goes: (k,) places, and (3, k) which of their entries (c, r, r)."""
+
+    places: Ints
+    which: Ints
 
 
 def spring_entries(
     creases: Connectors, elements: ShellElements, turns: int, slots: NDArray[np.int32]
-) -> tuple[Ints, Array]:
-    """Where the stiffness of elastic creases goes, and its values.
+) -> SpringEntries:
+    """Where the stiffness of elastic creases goes.
 
     Args:
         creases: of the step.
         elements: of the sheet.
         turns: rotations of an edge.
         slots: (t, entries) of the lower entries of every element in the matrix, -1 where there is none.
-
-    Returns:
-        (k,) places, and (k,) values, N mm / rad.
     """
-    places, values = [], []
+    places, which = [], []
     triangle = elements.mesh.sheet.topology.edge_triangles[creases.edges, 0]
     local = np.argmax(elements.loops.edges[triangle] == creases.edges[:, None], axis=1)
     swapped = elements.loops.sides[triangle, local] < 0
@@ -203,6 +242,6 @@ def spring_entries(
         row, column = first + turns * local + i, first + turns * local + j
         end = np.where(swapped, turns - 1 - i, i), np.where(swapped, turns - 1 - j, j)
         places.append(slots[triangle, row * (row + 1) // 2 + column])
-        values.append(creases.stiffness * creases.mass[np.arange(len(creases)), end[0], end[1]])
-    place, value = np.concatenate(places), np.concatenate(values)
-    return place[place >= 0], value[place >= 0]
+        which.append(np.stack((np.arange(len(creases)), *end)))
+    place, entry = np.concatenate(places), np.concatenate(which, axis=1)
+    return SpringEntries(place[place >= 0], entry[:, place >= 0])

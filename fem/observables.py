@@ -44,7 +44,10 @@ def observe(
     stretching = 0.5 * np.einsum("tk,tk->t", membrane_forces, strain)
     bending = 0.5 * np.einsum("tk,tk->t", moments, curvature)
     beta = system.components.beta(here.components)
-    folding = creases.energy(beta, lam)
+    folding, dissipated = creases.energy(beta, lam), 0.0
+    if creases.laws is not None:
+        lost = creases.laws.held(beta - creases.rest.at(lam)).dissipated
+        folding, dissipated = folding - lost, float(lost.sum())
     sides = mesh.topology.edge_triangles[creases.edges]
     by_triangle = np.zeros(len(mesh.triangles))
     share = folding / e.areas[sides].sum(axis=1)
@@ -69,6 +72,7 @@ def observe(
             float(bending.sum()),
             float(folding.sum()),
             contact=here.contact,
+            dissipated=dissipated,
             ground=0.0 if system.outside is None else system.outside.spring_energy(here.x),
         ),
         dihedral_angles=angles,
@@ -84,6 +88,8 @@ def observe(
         frames=system.carried_frames(here.components),
         fold_angles=fold_angles,
         crease_couples=couples,
+        crease_history=creases.laws.by_edge() if creases.laws is not None and system.remembers else None,
+        point_history=system.history if system.remembers else None,
         membrane_forces=in_plane,
         moments=bent,
         recover=partial(
@@ -92,11 +98,18 @@ def observe(
             in_plane,
             bent,
             None if system.rest is None else system.rest.mean.at(lam),
+            None if system.load_step.changed is None else system.load_step.changed.at(lam),
         ),
     )
 
 
-def resultants(made_of: Sections, forces: Array, moments: Array, rest: Array | None = None) -> Resultants:
+def resultants(
+    made_of: Sections,
+    forces: Array,
+    moments: Array,
+    rest: Array | None = None,
+    changed: Array | None = None,
+) -> Resultants:
     """What stresses are made of; strains and curvatures are those that forces and moments belong to.
 
     Args:
@@ -104,6 +117,7 @@ def resultants(made_of: Sections, forces: Array, moments: Array, rest: Array | N
         forces: (t, 3) membrane forces at the middle of each triangle, N / mm.
         moments: (t, 3) moments there, N.
         rest: (2, t, 3) strain and curvature at rest, which the others are beside.
+        changed: (t,) change of temperature or moisture.
     """
     sheet = made_of.sheets[0]
     if by_triangle.needed(made_of):
@@ -111,7 +125,7 @@ def resultants(made_of: Sections, forces: Array, moments: Array, rest: Array | N
         strain, curvature = by_triangle.strains(found, made_of, forces, moments)
         if rest is not None:
             strain, curvature = strain + rest[0], curvature + rest[1]
-        return Resultants(sheet, strain, curvature, forces, moments, made_of)
+        return Resultants(sheet, strain, curvature, forces, moments, made_of, changed)
     C = grain.compliance_in_drawing(sheet)
     strain, curvature = forces @ C / sheet.t, moments @ C * 12.0 / sheet.t**3
     if rest is not None:
@@ -134,8 +148,7 @@ def _couples(system: ShellSystem, here: Here) -> Array:
     """(c, r) couples on the fold angles: a spring's own, and what an imposed angle takes, N mm / rad."""
     creases = system.creases
     sheet = system.components.beta(system.components.spread(here.pull))
-    turn = creases.rest.at(here.lam) - system.components.beta(here.components)
-    spring = creases.stiffness[:, None] * np.einsum("cij,cj->ci", creases.mass, turn)
+    spring = -creases.springs(system.components.beta(here.components), here.lam)
     out: Array = np.where(creases.prescribed[:, None], sheet, spring)
     return out
 

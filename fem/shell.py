@@ -340,4 +340,7 @@ def flat_stiffness(e: ShellElements, mesh: ElementMesh) -> tuple[float, float, f
     # no entry of a semi-definite matrix is larger than the largest on its diagonal
     push = (stretch * (e.membrane @ stretch)).sum(axis=1) + (move * (e.bending @ move)).sum(axis=1)
     couple = np.abs(moments.transpose(0, 2, 1) @ move)
+    if e.coupling is not None:  # rounded strains turn edges, too
+        push = push + 2.0 * np.abs((stretch * (e.coupling @ move)).sum(axis=1))
+        couple = couple + np.abs((e.coupling @ turn).transpose(0, 2, 1) @ stretch)
     return 0.5 * float((turn * moments).sum()), float(push.max()), float(couple.max())

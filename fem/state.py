@@ -29,6 +29,7 @@ class ShellState(State):
         crease_couples: (m, r) couples that the crease takes there, conjugate to fold_angles, N mm / rad.
         membrane_forces, moments: (t, 3) components xx, yy, xy in the flat sheet's axes at the middle of each triangle
             (second Piola-Kirchhoff), N/mm and N; a moment is positive where it bends the sheet's edges up.
+        point_history: (m p, 2) what creases that yield remember at the points of their edges, rad; None without such.
     """
 
     nodes: Array
@@ -37,6 +38,7 @@ class ShellState(State):
     crease_couples: Array
     membrane_forces: Array
     moments: Array
+    point_history: Array | None = None
 
     def fold_angles_along(self, crease: str) -> Array:
         """(k, 2) fold angles at both ends of every edge along a crease, in its order, rad; mountain positive."""

@@ -19,7 +19,8 @@ from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
 from fem.contact import StoppedShell
-from fem.creases import connectors, spring_entries
+from fem.crease_memory import CreaseMemory
+from fem.creases import SpringEntries, connectors, spring_entries
 from fem.growth import at_rest
 from fem.here import Here, out_of_balance
 from fem.kernels import Frames
@@ -36,7 +37,7 @@ LARGEST_ANGLE = 2.6  # rad between an edge's sides or tangent and its frame, whi
 ROUNDING = 8.0 * np.finfo(float).eps
 
 
-class ShellSystem(StoppedShell):
+class ShellSystem(StoppedShell, CreaseMemory):
     """`bh.solvers.System` of one step.
 
     Unknowns: free displacements of all nodes in local axes (mm), rotations alpha of edges and fold angles beta of
@@ -68,11 +69,6 @@ class ShellSystem(StoppedShell):
             raise ModelError(
                 "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
             )
-        if load_step.curve is not None:
-            raise ModelError(
-                "the shell's creases are springs of one stiffness; take consistent or bars-and-hinges for a "
-                "crease with a law of its own"
-            )
         if load_step.bodies:
             raise ModelError(
                 "the shell knows no bars and tethers; take formulation consistent or bars-and-hinges"
@@ -85,8 +81,7 @@ class ShellSystem(StoppedShell):
         self.rest = at_rest(elements, load_step.growth)
         flat = np.zeros((len(model.mesh.topology.hinges), elements.tables.rotations))
         beta = flat if start is None else start.fold_angles
-        couple = flat if start is None else start.crease_couples
-        self.creases = connectors(mesh, model, load_step, beta, couple)
+        self.creases = connectors(mesh, model, load_step, start)
         self.constraints = loads.constraints(mesh, model, step, None if start is None else x)
         clamped = mesh.sheet.topology.find_edges(load_step.constraints.clamped)
         self.components = lay_out(elements, self.constraints, self.creases, x, beta, clamped)
@@ -298,8 +293,9 @@ class ShellSystem(StoppedShell):
         scatter(K, self.components.sides, pattern.slots, data)
         if met is not None:
             self.add_blocks(*met, pattern, data)
-        slots, values = self._springs
-        np.add.at(data, slots, values)
+        if len(self.creases):
+            tangents = self.creases.tangents(self.components.beta(here.components), here.lam)
+            np.add.at(data, self._springs.places, tangents[tuple(self._springs.which)])
         if not self.constraints.rigid_body:
             matrix = pattern.matrix(data)
             if self.outside is None or self.conservative:
@@ -322,7 +318,8 @@ class ShellSystem(StoppedShell):
         """(size,) derivative of the residual by lambda."""
         here = self.at(q, lam)
         out = self._times(here, self.components.rate) - self.load.rate
-        out[self.components.first_beta :] += self.creases.gradient_rate().ravel()
+        beta = self.components.beta(here.components)
+        out[self.components.first_beta :] += self.creases.gradient_rate(beta, lam).ravel()
         if self.outside is not None:
             self._add_nodal(out, -self.outside.push_rate(here.x))
         if self.rest is not None:
@@ -353,8 +350,9 @@ class ShellSystem(StoppedShell):
             forces, here = self.elements.forces(*self.rest.rate), self.at(q, lam)
             moving = np.einsum("tkj,tj->tk", here.B, self.components.gather(self.components.rate))
             total += float(np.vdot(forces, np.hstack(self.rest.rate) - 2.0 * moving))
-        total += 2.0 * float(np.vdot(c.gradient_rate(), self.components.beta(self.components.rate)))
-        return total + float(np.einsum("c,ci,cij,cj->", c.stiffness, c.rest.rate, c.mass, c.rest.rate))
+        beta, moving = (self.components.beta(each) for each in (here.components, self.components.rate))
+        total += 2.0 * float(np.vdot(c.gradient_rate(beta, lam), moving))
+        return total + float(np.einsum("ci,cij,cj->", c.rest.rate, c.tangents(beta, lam), c.rest.rate))
 
     def _times(self, here: Here, v: Array) -> Array:
         """Tangent of sheet and springs times v, all components."""
@@ -362,9 +360,8 @@ class ShellSystem(StoppedShell):
         if v.any():
             K = self.element_tangents(here, here.forces)
             out = self.components.spread(np.einsum("tij,tj->ti", K, self.components.gather(v)))
-            turn = self.creases.stiffness[:, None] * np.einsum(
-                "cij,cj->ci", self.creases.mass, self.components.beta(v)
-            )
+            tangents = self.creases.tangents(self.components.beta(here.components), here.lam)
+            turn = np.einsum("cij,cj->ci", tangents, self.components.beta(v))
             out[self.components.first_beta :] += turn.ravel()
             if self.outside is not None:
                 self._add_nodal(out, self.outside.times(here.x, self.components.moves(v), here.lam))
@@ -419,8 +416,8 @@ class ShellSystem(StoppedShell):
         return build_pattern(self.mesh, c.of_element, c.number, touching=self.touching)
 
     @cached_property
-    def _springs(self) -> tuple[Ints, Array]:
-        """Slots and values of the stiffness of elastic creases."""
+    def _springs(self) -> SpringEntries:
+        """Slots of the stiffness of elastic creases."""
         return spring_entries(self.creases, self.elements, self.components.rotations, self._pattern.slots)
 
     @cached_property

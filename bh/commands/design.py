@@ -119,8 +119,8 @@ class Answer:
         measure: name, value and unit of what was asked for, by the surrogate and by the simulation of the
             strip.
         goal: (k, 3) point or curve to be drawn beside it, mm.
-        point: the goal is a point to be reached.
         surrogate: the model that it was made with.
+        wants: all that was asked for of a point to be reached; None for other goals.
         verdict: the shell's, where that was asked for.
     """
 
@@ -129,7 +129,7 @@ class Answer:
     measure: dict[str, tuple[float, str]]
     goal: Array
     surrogate: Forward
-    point: bool = False
+    wants: Wants | None = None
     verdict: Verdict | None = None
 
     @property
@@ -153,7 +153,7 @@ class Answer:
         """
         verdict = judge(*self.design.lists(), self.surrogate.setting)
         more = {"end by the shell, change with its mesh": (verdict.change, "mm")}
-        if self.point:
+        if self.wants is not None:
             more = {"distance of the strip by the shell": (verdict.missed(self.goal[0]), "mm"), **more}
         return replace(self, verdict=verdict, measure={**self.measure, **more})
 
@@ -212,11 +212,15 @@ def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answ
         "its error bar": (found.bar, "mm"),
         "clears itself in space": (float(found.clear), "1 yes, 0 no"),
     }
+    if wants.stops:  # the distances above are the largest ones of all points
+        measure["points on the way of the pinch"] = float(len(wants.stops)), "met, too"
+    if len(wants.keep_out):
+        measure["boxes that it stays out of"] = float(len(wants.keep_out)), "folded and pinched"
     if wants.directed:
         measure["angle of the simulated strip to its direction"] = math.degrees(found.turned_simulated), "deg"
         measure["error bar of the angle"] = math.degrees(found.turn_bar), "deg"
     goal = np.array([target.point], dtype=float)
-    return Answer(found.design, found.landing, measure, goal, surrogate, point=True)
+    return Answer(found.design, found.landing, measure, goal, surrogate, wants)
 
 
 def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> Answer:
@@ -379,6 +383,13 @@ def picture(answer: Answer) -> Figure:
             ax.plot(*x[mesh.nodes(name)][:, [i, j]].T, color=colour, lw=1.0)
         style = "*" if len(answer.goal) == 1 else "-"
         ax.plot(answer.goal[:, i], answer.goal[:, j], style, color="C3", ms=11, label="target")
+        if answer.wants is not None:
+            for stop in answer.wants.stops:
+                ax.plot(stop.point[i], stop.point[j], "x", color="C3", ms=8)
+                ax.annotate(f"{stop.part:.0%}", stop.point[[i, j]], fontsize=8)
+            for low, high in answer.wants.keep_out:
+                corners = [(low[i], low[j]), (high[i], low[j]), (high[i], high[j]), (low[i], high[j])]
+                ax.fill(*np.transpose(corners), color="0.7", zorder=0)
         ax.set(title=title, xlabel="xyz"[i] + ", mm", ylabel="xyz"[j] + ", mm", aspect="equal")
         ax.margins(0.08)
     flat.legend(fontsize=8)

@@ -170,7 +170,8 @@ def _solved(
 
 
 def _yields(path: Trace) -> Yielding | str | None:
-    if path.model.sheet.strength is None:
+    sheet = path.model.sheet
+    if all(part.strength is None for part in (sheet, *(sheet.plies or ()))):
         return None
     try:
         return yielding(path)

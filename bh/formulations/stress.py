@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.formulations import yield_criteria
+from bh.formulations.plies import PlyStress, ply_stress
 from bh.formulations.recovery import corner_values
 from bh.model.sheet import Sheet
 from bh.model.zones import Sections
@@ -33,6 +34,7 @@ class Resultants(NamedTuple):
         forces: (t, 3) membrane forces (second Piola-Kirchhoff), N / mm, components xx, yy, xy.
         moments: (t, 3) N mm / mm, components xx, yy, xy.
         sections: what every triangle is made of, where there are zones.
+        changed: (t,) change of temperature or moisture, which plies feel one by one; None for none.
     """
 
     sheet: Sheet
@@ -41,6 +43,7 @@ class Resultants(NamedTuple):
     forces: Array
     moments: Array
     sections: Sections | None = None
+    changed: Array | None = None
 
 
 class Extreme(NamedTuple):
@@ -48,7 +51,7 @@ class Extreme(NamedTuple):
 
     Attributes:
         utilisation: equivalent stress over strength; 1 is yield.
-        side: "top" or "bottom".
+        side: "top" or "bottom"; of a laminate "top of ply 2", plies counted from the bottom.
         triangle: row of `mesh.triangles`.
         place: (2,) in the flat drawing, mm.
     """
@@ -72,6 +75,7 @@ class Stress(OneLine):
         strain, curvature, forces, moments: see `Resultants`.
         cut: (k,) rows of `mesh.topology.hinges`: creases and borders of zones, across which nothing is averaged.
         sections: what every triangle is made of, where there are zones.
+        changed: (t,) change of temperature or moisture; None for none.
     """
 
     mesh: SheetMesh
@@ -82,6 +86,7 @@ class Stress(OneLine):
     moments: Array
     cut: Ints
     sections: Sections | None = None
+    changed: Array | None = None
 
     @cached_property
     def corners(self) -> Stress:
@@ -89,7 +94,7 @@ class Stress(OneLine):
         both = np.hstack((self.strain, self.curvature, self.forces, self.moments))
         at = corner_values(self.mesh, both, self.cut)
         parts = (at[..., :3], at[..., 3:6], at[..., 6:9], at[..., 9:])
-        return Stress(self.mesh, self.sheet, *parts, self.cut, self.sections)
+        return Stress(self.mesh, self.sheet, *parts, self.cut, self.sections, self.changed)
 
     def _each(self, read: Callable[[Sheet], float]) -> Array:
         """A value of the sheet, or of that of every triangle, (t, 1) or (t, 1, 1)."""
@@ -97,6 +102,36 @@ class Stress(OneLine):
             return np.asarray(read(self.sheet))
         values = self.sections.each([read(sheet) for sheet in self.sections.sheets])
         return values.reshape((-1,) + (1,) * (self.forces.ndim - 1))
+
+    @property
+    def _sheets(self) -> tuple[Sheet, ...]:
+        return (self.sheet,) if self.sections is None else self.sections.sheets
+
+    @property
+    def plies(self) -> int:
+        """Plies of the sheet, or of the zone that has most of them; 1 where no part is a laminate."""
+        return max(1 if sheet.plies is None else len(sheet.plies) for sheet in self._sheets)
+
+    def ply(self, number: int) -> PlyStress:
+        """Strains and stresses of one ply of a laminate, on its own faces and along its fibres.
+
+        Args:
+            number: from 0 at the bottom; a sheet that is none has one.
+
+        Raises:
+            ModelError: there are fewer plies.
+        """
+        if not 0 <= number < self.plies:
+            raise ModelError(f"ply {number} is none of the {self.plies} (0 is at the bottom)")
+        of = None if self.sections is None else self.sections.of
+        return ply_stress(
+            number,
+            self._sheets,
+            np.zeros(len(self.forces), dtype=np.int64) if of is None else of,
+            np.stack((self.strain, self.curvature)),
+            np.stack((self.forces, self.moments)),
+            self.changed,
+        )
 
     def at(self, side: str = "top") -> Array:
         """(..., 3) stresses xx, yy, xy, MPa.
@@ -107,9 +142,8 @@ class Stress(OneLine):
         Raises:
             ModelError: of a laminate, whose plies have stresses of their own.
         """
-        sheets = (self.sheet,) if self.sections is None else self.sections.sheets
-        if any(sheet.plies is not None for sheet in sheets):
-            raise ModelError("stresses of laminates are not told; read forces, moments and strain_at")
+        if any(sheet.plies is not None for sheet in self._sheets):
+            raise ModelError("every ply of a laminate has its own stress; read stress.ply(0).at(side), ...")
         t = self._each(lambda sheet: sheet.t)
         return np.asarray(self.forces / t - 12.0 / t**2 * _height(side) * self.moments)
 
@@ -175,17 +209,40 @@ class Stress(OneLine):
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / self.utilisation(side))
 
-    def worst(self) -> Extreme:
-        """Where the sheet is nearest to yield, on either side, by the values at corners.
+    def faces(self) -> dict[str, Array]:
+        """(...,) utilisation on every face that stress is largest on, by its name as in `Extreme`; nan: no such ply.
 
         Raises:
             ModelError: no strength is given.
         """
-        both = {side: self.corners.utilisation(side) for side in ("top", "bottom")}
-        side = max(both, key=lambda name: float(both[name].max()))
-        triangle, corner = np.unravel_index(int(both[side].argmax()), both[side].shape)
+        if self.plies == 1:
+            return {side: self.utilisation(side) for side in ("top", "bottom")}
+        plies = [self.ply(number) for number in range(self.plies)]
+        return {
+            f"{side} of ply {ply.number + 1}": ply.utilisation(side)
+            for ply in reversed(plies)
+            for side in ("top", "bottom")
+        }
+
+    def largest(self) -> Array:
+        """(...,) utilisation where it is largest through the thickness, on any face of any ply.
+
+        Raises:
+            ModelError: no strength is given.
+        """
+        return np.asarray(np.nanmax(list(self.faces().values()), axis=0))
+
+    def worst(self) -> Extreme:
+        """Where the sheet is nearest to yield, on any face, by the values at corners.
+
+        Raises:
+            ModelError: no strength is given.
+        """
+        faces = self.corners.faces()
+        side = max(faces, key=lambda name: float(np.nanmax(faces[name])))
+        triangle, corner = np.unravel_index(int(np.nanargmax(faces[side])), faces[side].shape)
         place = self.mesh.points[self.mesh.triangles[triangle, corner], :2]
-        return Extreme(float(both[side].max()), side, int(triangle), place)
+        return Extreme(float(np.nanmax(faces[side])), side, int(triangle), place)
 
 
 def stress_of(mesh: SheetMesh, found: Resultants, moments: Array) -> Stress:
@@ -208,7 +265,7 @@ def stress_of(mesh: SheetMesh, found: Resultants, moments: Array) -> Stress:
         cut[hinge[hinge >= 0]] = True
     if found.sections is not None:
         cut |= found.sections.borders(mesh)
-    return Stress(mesh, *found[:5], np.flatnonzero(cut), found.sections)
+    return Stress(mesh, *found[:5], np.flatnonzero(cut), found.sections, found.changed)
 
 
 def _height(side: str) -> float:

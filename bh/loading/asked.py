@@ -43,6 +43,7 @@ class Asked:
     growth: Array | None = (
         None  # (2, t, 3, 3) strain and curvature at rest at the corners, where there are some
     )
+    changed: Array | None = None  # (t,) of temperature or moisture, which is in `growth`
 
     @classmethod
     def nothing(cls, mesh: SheetMesh) -> Asked:

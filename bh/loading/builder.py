@@ -187,7 +187,7 @@ class LoadStepBuilder:
         """A dead couple a length on edges of the boundary (k,), N mm / mm; see `StepBuilder.turn`."""
         self._asked.turned[edges] = couple
 
-    def grow(self, triangles: Ints, strain: Array, curvature: Array) -> None:
+    def grow(self, triangles: Ints, strain: Array, curvature: Array, change: float = 0.0) -> None:
         """Strain and curvature at which triangles (k,) are at rest; see `StepBuilder.grow`.
 
         Raises:
@@ -200,8 +200,11 @@ class LoadStepBuilder:
         asked = self._asked
         if asked.growth is None:
             asked.growth = np.zeros((2, len(self.mesh.triangles), 3, 3))
+            asked.changed = np.zeros(len(self.mesh.triangles))
         fresh = [row for row in triangles.tolist() if row not in self._step.grown]
-        asked.growth[:, fresh] = 0.0
+        assert asked.changed is not None
+        asked.growth[:, fresh], asked.changed[fresh] = 0.0, 0.0
+        asked.changed[triangles] += change
         self._step.grown.update(fresh)
         for kind, values in enumerate((strain, curvature)):
             asked.growth[kind, triangles] += values[:, None] if values.ndim == 2 else values
@@ -276,7 +279,8 @@ class LoadStepBuilder:
             pressure=_some(start.pressed, end.pressed),
             edge_couple=_some(start.turned, end.turned),
             ground=self._ground,
-            growth=_growth(start, end),
+            growth=_from_none(start.growth, end.growth),
+            changed=_from_none(start.changed, end.changed),
         )
 
     def ended(self, points: Array) -> None:
@@ -307,6 +311,7 @@ class LoadStepBuilder:
         asked.pressed = Ramp(self._begun.pressed, asked.pressed).at(end.lam)
         asked.turned = Ramp(self._begun.turned, asked.turned).at(end.lam)
         asked.growth = None if step.growth is None else step.growth.at(end.lam)
+        asked.changed = None if step.changed is None else step.changed.at(end.lam)
         if np.isnan(asked.rest).any() or step.freed is not None:
             raise ModelError(
                 "a prescribed crease is released in a step that ends early (until); release it in a step before"
@@ -399,10 +404,9 @@ def _some(start: Array, end: Array) -> Ramp | None:
     return Ramp(start, end) if start.any() or end.any() else None
 
 
-def _growth(start: Asked, end: Asked) -> Ramp | None:
-    if end.growth is None:
-        return None
-    return Ramp(np.zeros_like(end.growth) if start.growth is None else start.growth, end.growth)
+def _from_none(start: Array | None, end: Array | None) -> Ramp | None:
+    """A ramp from nothing where nothing was asked for before; None where nothing is."""
+    return None if end is None else Ramp(np.zeros_like(end) if start is None else start, end)
 
 
 def load_steps(model: Model, ends: Mapping[int, StepEnd] | None = None) -> tuple[LoadStep, ...]:

@@ -70,6 +70,7 @@ class LoadStep:
         freed: (m,) such creases whose angle was imposed up to here; what imposed it fades out during the step.
         growth: (2, t, 3, 3) strain and curvature (1 / mm) at which triangles are at rest, at their corners, components
             xx, yy, 2 xy in the axes of the drawing; None for a sheet that is at rest as it is drawn.
+        changed: (t,) change of temperature or moisture that is in `growth`; None with it.
     """
 
     law: NDArray[np.int64]
@@ -90,6 +91,7 @@ class LoadStep:
     edge_couple: Ramp | None = None
     ground: Array | None = None
     growth: Ramp | None = None
+    changed: Ramp | None = None
 
     def prescribed_angles(self, now: Array) -> Ramp:
         """Imposed angles for a step that begins with dihedral angles `now`, (m,) or (m, 2) at the ends of each edge."""

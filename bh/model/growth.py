@@ -102,7 +102,7 @@ class Expand(Actuation):
         if self.change:
             for row in np.unique(of[inside]).tolist():
                 both[:, of == row] += np.stack(free_strain(sections.sheets[row], self.change))[:, None]
-        builder.grow(np.flatnonzero(inside), both[0, inside], both[1, inside])
+        builder.grow(np.flatnonzero(inside), both[0, inside], both[1, inside], self.change)
 
     def _axes(self, sheet: Sheet) -> float:
         if self.axes is not None:

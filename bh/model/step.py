@@ -160,7 +160,7 @@ class StepBuilder(Protocol):
         """
         ...
 
-    def grow(self, triangles: Ints, strain: Array, curvature: Array) -> None:
+    def grow(self, triangles: Ints, strain: Array, curvature: Array, change: float = 0.0) -> None:
         """Strain and curvature at which triangles (k,) are at rest, in place of what was asked for there before.
 
         Several in one step add up. Values may differ between the corners of a triangle, linear between them.
@@ -169,6 +169,7 @@ class StepBuilder(Protocol):
             triangles: (k,) rows of `mesh.triangles`.
             strain: (k, 3) or (k, 3 corners, 3) components xx, yy, 2 xy in the axes of the drawing.
             curvature: likewise, 1 / mm, positive where the edges go up.
+            change: of temperature or moisture that is in both, which plies of a laminate feel one by one.
         """
         ...
 

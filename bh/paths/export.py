@@ -72,7 +72,8 @@ def cell_data(state: State) -> dict[str, NDArray[np.float64]]:
 
     Energy densities (N mm / mm^2); where the formulation has them membrane_force (N / mm) and moment (N), components
     xx, yy, xy in the axes of the drawing, equivalent_stress_top, _middle and _bottom (MPa: von Mises, with a grain
-    Hill), and with a strength reserve, the smaller one of both sides.
+    Hill), of laminates ply1_stress_bottom, ply1_stress_top and so on (MPa: along the fibres, across them, in shear; nan
+    in zones without such a ply), and with a strength reserve, the least one through the thickness.
 
     Args:
         state: of a path.
@@ -87,7 +88,11 @@ def cell_data(state: State) -> dict[str, NDArray[np.float64]]:
     cells |= {"membrane_force": stress.forces, "moment": stress.moments}
     with contextlib.suppress(ModelError):  # a grain without strengths has no equivalent stress
         cells |= {f"equivalent_stress_{side}": stress.equivalent(side) for side in HEIGHT}
-        cells["reserve"] = np.minimum(*(np.minimum(stress.reserve(side), 1e9) for side in ("top", "bottom")))
+    for number in range(stress.plies if stress.plies > 1 else 0):
+        ply = stress.ply(number)
+        cells |= {f"ply{number + 1}_stress_{side}": ply.along_fibres(side) for side in ("bottom", "top")}
+    with contextlib.suppress(ModelError):
+        cells["reserve"] = 1.0 / np.maximum(stress.largest(), 1e-9)
     return cells
 
 

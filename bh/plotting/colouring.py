@@ -68,8 +68,10 @@ def colouring_of(state: State, colour: str | None, top: float | None) -> Colouri
     if colour in STRESSES:
         label, unit = STRESSES[colour]
         stress = state.stress().corners
-        of = stress.equivalent if colour == "stress" else stress.utilisation
-        corners = np.maximum(of("top"), of("bottom"))
+        if colour == "stress":
+            corners = np.maximum(stress.equivalent("top"), stress.equivalent("bottom"))
+        else:
+            corners = stress.largest()
         values = _means(state.mesh.triangles, corners, len(state.points))
     elif colour == "total":
         values = np.sum([state.nodal_energy_density(kind) for kind in KINDS], axis=0)

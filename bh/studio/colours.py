@@ -68,7 +68,11 @@ COLOURS: Mapping[str, Colour] = {
     "bending": Colour("bending energy", "N mm / mm²", _energy("bending")),
     "stretching": Colour("stretching energy", "N mm / mm²", _energy("stretching")),
     "stress": Colour("equivalent stress", "MPa", _stress(Stress.equivalent)),
-    "utilisation": Colour("stress over strength", "1 is yield", _stress(Stress.utilisation)),
+    "utilisation": Colour(
+        "stress over strength",
+        "1 is yield",
+        lambda state: at_nodes(state.mesh, state.stress().largest()),
+    ),
     "curvature": Colour(
         "largest curvature", "1/mm", lambda state: at_nodes(state.mesh, _largest(state.stress().curvature))
     ),

@@ -81,6 +81,8 @@ class Desk:
                     self.session.fold(crease, 0.01 * value * self.sheet.full[crease])
             case asked.Pull(node=node, to=to):
                 self.session.pull(node, to)
+            case asked.Pinch(a=a, b=b, gap=gap):
+                self.session.pinch(a, b, gap)
             case asked.LetGo(node=node):
                 self.session.let_go(node)
             case asked.Plain(do=what):

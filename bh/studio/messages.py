@@ -68,6 +68,15 @@ class Pull(Message):
     to: Point
 
 
+class Pinch(Message):
+    """Two nodes to jaws that are a gap apart, mm; without one the jaws touch them where they are."""
+
+    do: Literal["pinch"]
+    a: Annotated[int, Field(ge=0)]
+    b: Annotated[int, Field(ge=0)]
+    gap: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
+
+
 class LetGo(Message):
     """Let go of a node, or of all."""
 
@@ -113,7 +122,7 @@ class Export(Message):
     what: str
 
 
-Asked = Open | Pattern | Fold | Percent | Pull | LetGo | Material | Hold | Plain | Colour | Export
+Asked = Open | Pattern | Fold | Percent | Pull | Pinch | LetGo | Material | Hold | Plain | Colour | Export
 _ADAPTER: TypeAdapter[Asked] = TypeAdapter(Annotated[Asked, Field(discriminator="do")])
 
 

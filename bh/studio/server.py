@@ -27,7 +27,7 @@ HOST = "127.0.0.1"
 STATIC = Path(__file__).with_name("static")
 LONGEST_MESSAGE = LONGEST * 4 // 3 + 4096  # bytes of a file in base64, and its name
 LONGEST_REQUEST = 65_536  # bytes of a request's body; no page takes one
-MOVES = ["fold", "percent", "pull"]  # of which only the last counts
+MOVES = ["fold", "percent", "pull", "pinch"]  # of which only the last counts
 WINDOWS = 8  # at once
 QUIET = 0.4  # s without a wish before a finer mesh is begun
 POLICY = (
@@ -54,7 +54,7 @@ class Studio:
         """A new token."""
         self.token = secrets.token_urlsafe(16)
         self.sheet = sheet
-        self.windows: set[Window] = set()
+        self.windows: dict[Window, None] = {}  # in the order in which they were opened
         self.pool = ThreadPoolExecutor(2 * WINDOWS, thread_name_prefix="bh-studio")
 
     def application(self) -> tornado.web.Application:
@@ -154,7 +154,7 @@ class Window(tornado.websocket.WebSocketHandler):
             args: of the address; there are none.
             kwargs: none.
         """
-        self.studio.windows.add(self)
+        self.studio.windows[self] = None
         self.drawn.set()
         self.work = asyncio.create_task(self._work())
 
@@ -169,7 +169,7 @@ class Window(tornado.websocket.WebSocketHandler):
 
     def on_close(self) -> None:
         """Give everything back."""
-        self.studio.windows.discard(self)
+        self.studio.windows.pop(self, None)
         self.going.clear()
         for task in (self.work, self.finer):
             if task is not None:
@@ -275,7 +275,7 @@ def _subject(message: str | bytes) -> tuple[object, ...] | None:
         return None
     if not isinstance(data, dict) or data.get("do") not in MOVES:
         return None
-    return str(data["do"]), repr(data.get("crease")), repr(data.get("node"))
+    return str(data["do"]), *(repr(data.get(key)) for key in ("crease", "node", "a", "b"))
 
 
 def _fault(error: Exception) -> dict[str, object]:

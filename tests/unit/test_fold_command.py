@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import bh
 from bh.commands.cli import main
@@ -261,9 +262,10 @@ class TestOneCommand:
             model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), contact=contact)
             model = model.step(bh.Fold(mesh.creases[0], by=0.3))
             clock = _Clock(Silent(), 10.0, 10.0)
-            timed = _timed(formulation(model.formulation).system(model, load_steps(model)[0], None), clock)
-            q = timed.start()
-            spread = 0.1 * np.arange(len(q))
+            system = formulation(model.formulation).system(model, load_steps(model)[0], None)
+            timed = _timed(system, clock)
+            q = system.start()
+            spread: NDArray[np.float64] = 0.1 * np.arange(len(q), dtype=float)
             clear_part(timed, q, spread, 0.0)  # between two evaluations
             timed.tangent(q, 0.0, timed.evaluate(q, 0.0).forces)
             spent.append(clock.spent)

@@ -102,7 +102,7 @@ def test_a_laminate_of_one_material_is_a_sheet() -> None:
     [
         ("consistent", (0, 90)),
         ("consistent", (30, -30)),
-        pytest.param("shell", (0, 90), marks=pytest.mark.slow),  # its last forces are rounding: ten seconds
+        ("shell", (0, 90)),
         ("shell", (30, -30)),
     ],
 )
@@ -117,7 +117,9 @@ def test_a_pulled_laminate_bends_and_twists(name: str, angles: tuple[float, floa
     # given as what its plies would want; the balance of the whole is that of the pull
     mesh = strip(name, 8, 2)
     wanted = Expand(by=tuple(both[:3].tolist()), through=tuple(both[3:].tolist()), axes=0.0)
-    state = bh.trace(Model(mesh, sheet, formulation=name).step(wanted))[-1]
+    path = bh.trace(Model(mesh, sheet, formulation=name).step(wanted))
+    assert path.iterations <= 10  # rounded strains turn edges, too: 1732 where that is not known
+    state = path[-1]
     stress = state.stress()
     np.testing.assert_allclose(
         stress.curvature, [both[3:]] * len(mesh.triangles), atol=2e-3 * np.abs(both[3:]).max()
@@ -254,7 +256,7 @@ def test_what_takes_no_laminates_says_so() -> None:
     with pytest.raises(ModelError, match="a laminate is not solved by halves"):
         bh.trace(replace(model, mesh=even), symmetry="x")
     state = bh.trace(model)[-1]
-    with pytest.raises(ModelError, match="stresses of laminates are not told"):
+    with pytest.raises(ModelError, match="every ply of a laminate has its own stress"):
         state.stress().at("top")
     assert np.isfinite(state.stress().strain_at("top")).all()
     with pytest.raises(ModelError, match="not coupled"):

@@ -44,9 +44,13 @@ class Rig:
         tape: 0 is a sheet that lies free, without friction. Else valley creases over the supports are first
             pulled down onto them and stay there, held along x and y by this stiffness, N/mm in all
             (double-sided tape, 4.5.1).
+        pulled: tape holds valleys down; else it holds them sideways only, and the sheet may lift off.
         gap: of the contact, mm (`bh.model.actuations.Indenter`).
         stiffness: of the contact (`bh.model.actuations.Indenter`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
+        lean: slope of the bar beside that, rad (`free_bar`).
+        grip: mountain creases under the bar are held along x and y where the bar meets them, by this stiffness, N/mm in
+            all: a bar that they stick to. 0 is a bar without friction; what friction does lies in between.
         largest: displacement between two states, mm.
         offset: of the sheet's middle from the bar, along the span, mm.
     """
@@ -60,6 +64,9 @@ class Rig:
     level: bool = False
     largest: float = 0.5
     offset: float = 0.0
+    lean: float = 0.0
+    grip: float = 0.0
+    pulled: bool = True
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -71,6 +78,10 @@ class Rig:
             raise ModelError(f"a bar of {self.bar:g} mm does not fit between supports {self.span:g} mm apart")
         if not (math.isfinite(self.tape) and self.tape >= 0.0):
             raise ModelError(f"tape = {self.tape} cannot be; give a stiffness in N/mm, or 0")
+        if not (math.isfinite(self.grip) and self.grip >= 0.0):
+            raise ModelError(f"grip = {self.grip} cannot be; give a stiffness in N/mm, or 0")
+        if not abs(self.lean) < 1.0:
+            raise ModelError(f"lean = {self.lean} of the bar cannot be; give less than 1 rad")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -150,6 +161,7 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
         if not taped:
             raise ModelError("no valley crease lies over the supports, where tape could hold it")
         items.append(Tether(taped, (rig.tape, rig.tape, 0.0)))
+    if rig.tape > 0.0 and rig.pulled:
         # flat sheets lie in z = 0, as the supports do
         down = start.model.step(*items, Displace(taped, "z", 0.0))
         pulled = LoadControl(work_mismatch=math.inf)
@@ -160,6 +172,15 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     slope, height = lid(folded, points, along, across, 0.5 * rig.bar)
     if rig.level:
         slope, height = 0.0, float(_under(folded, points, across, 0.5 * rig.bar)[:, 2].max())
+    if rig.lean != 0.0:
+        slope += rig.lean
+        under = _under(folded, points, across, 0.5 * rig.bar)
+        height = float((under[:, 2] - slope * (under @ along)).max())
+    if rig.grip > 0.0:
+        mountains = crease_nodes(folded.mesh, "mountain")
+        held = mountains[np.abs(points[mountains] @ across) <= 0.5 * rig.bar].tolist()
+        if held:
+            items.append(Tether(held, (rig.grip, rig.grip, 0.0)))
     items.append(bar("bar", 0.0, height + depth, rig.bar, rig.travel, math.atan(slope)))
     # as on a test stand: where the sheet snaps it goes to the next stable state, and the bar goes on
     first, largest = min(0.1, 0.2 * rig.largest) / rig.travel, rig.largest / rig.travel

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline, NdBSpline, RectBivariateSpline
 
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.segments import DesignError, Domain, folded, folded_transforms
@@ -51,6 +50,8 @@ class Surrogate:
         Raises:
             DesignError: the segments are no grid, or leave out parts of the domain.
         """
+        from scipy.interpolate import CubicSpline, NdBSpline, RectBivariateSpline
+
         self.setting, self.domain, self.has_variants = setting, Domain(fold=setting.fold), False
         k0, length, values = (np.asarray(x, dtype=float) for x in (k0, length, values))
         lengths = np.unique(length)

@@ -74,10 +74,11 @@ class Tolerance:
         Returns:
             (3,) lengths, mm, the longest first, and (3, 3) directions in columns.
         """
-        from scipy.stats import chi2
+        from scipy.special import gammaincinv  # scipy.stats has the same, and takes half a second to import
 
         square, directions = np.linalg.eigh(self.covariance)
-        size = np.sqrt(np.maximum(square, 0.0) * chi2.ppf(probability, 3))
+        quantile = 2.0 * gammaincinv(1.5, probability)  # of chi-squared with three degrees of freedom
+        size = np.sqrt(np.maximum(square, 0.0) * quantile)
         return size[::-1], directions[:, ::-1]
 
 

@@ -154,7 +154,10 @@ class Consistent:
             },
             reactions=system.displacements.reactions(now.f - system.force.at(lam)),
             crease_moments=moments, stable=stable, edge_slopes=slopes, clamp_couples=couples,
-            recover=partial(resultants, model.sections, mesh, e, self.material, x, now.theta, lam),
+            recover=partial(
+                resultants, model.sections, mesh, e, self.material, x, now.theta, lam,
+                None if system.load_step.changed is None else system.load_step.changed.at(lam),
+            ),
             contact_forces={} if system.outside is None else system.outside.contact_forces(x, lam),
             crease_history=system.history_at(q, lam) if system.remembers else None,
         )  # fmt: skip

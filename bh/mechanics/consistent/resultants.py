@@ -30,6 +30,7 @@ def resultants(
     x: Array,
     theta: Array,
     lam: float,
+    changed: Array | None = None,
 ) -> Resultants:
     """What the elements measure, and what their material makes of it.
 
@@ -43,6 +44,7 @@ def resultants(
         x: (n, 3) positions, mm.
         theta: (c, a) angles of the patches there, less those at rest, rad.
         lam: load parameter of the step, 0 to 1.
+        changed: (t,) change of temperature or moisture.
     """
     growth = elements.growth
     at_rest = None if growth is None else growth.strains(lam)
@@ -71,6 +73,7 @@ def resultants(
         forces,
         moments,
         sections,
+        changed,
     )
 
 

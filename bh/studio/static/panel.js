@@ -1,6 +1,7 @@
 // Controls, numbers and curves at the side.
 import { $, ask, degrees, make, now, number } from "./common.js";
 import { light } from "./view.js";
+import { key, panel as pinchPanel, wide } from "./pinch.js";
 import { taken } from "./pull.js";
 
 const MOST = 200; // sliders of single creases
@@ -63,13 +64,16 @@ export function numbers() {
   } else $("percent-out").textContent = "each its own";
   scale(head.top);
   $("let-go").disabled = Object.keys(head.grips).length === 0;
+  pinchPanel(head);
   if (head.rest) curves();
 }
 
 function curves() {
   const { head, points } = now;
   history.energy.push([history.energy.length, head.energy.total]);
-  for (const [node, force] of Object.entries(head.forces).slice(0, 1)) if (taken[node]) {
+  const pinch = head.pinches.at(-1);
+  if (pinch) history.force.push([Math.max(0, (wide[key(pinch.a, pinch.b)] ?? pinch.apart) - pinch.apart), pinch.force]);
+  else for (const [node, force] of Object.entries(head.forces).slice(-1)) if (taken[node]) {
     const d = Math.hypot(...[0, 1, 2].map((c) => points[3 * node + c] - taken[node][c]));
     history.force.push([d, Math.hypot(...force)]);
   }

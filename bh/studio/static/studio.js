@@ -73,4 +73,4 @@ async function open(file) {
 
 connect(answer, frame); draw();
 window.studio = { get points() { return now.points; }, get rest() { return now.head?.rest ?? false; }, get head() { return now.head; }, get sheet() { return now.sheet; }, get refined() { return refined(); },
-  place: (node) => seen(vector(now.points, node)) };
+  place: (node) => seen(vector(now.points, node)), spot: (at) => seen(vector(at, 0)) };

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -67,7 +68,9 @@ class LandTask:
 
     def __call__(self, point: Mapping[str, Any]) -> dict[str, Any]:
         """What was found for the target {"x", "y", "z"} (mm), as values of the data set."""
+        began = time.process_time()
         found = self.reach(np.array([point["x"], point["y"], point["z"]], dtype=float))
+        seconds = time.process_time() - began
         design, pad = found.design, MOST - found.design.n
         assert found.landing is not None
         return {
@@ -76,6 +79,7 @@ class LandTask:
             "n": design.n,
             "clear": float(found.clear),
             "simulations": found.simulations,
+            "processor_time_s": seconds,
             "k0": np.pad(design.k0, (0, pad), constant_values=np.nan),
             "length": np.pad(design.length, (0, pad), constant_values=np.nan),
             "pinched": np.pad(design.pinched.astype(float), (0, pad), constant_values=np.nan),

@@ -8,7 +8,6 @@ done, a sheet at a time; a run that was stopped goes on. Where a model has no fi
 from __future__ import annotations
 
 import math
-import signal
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from meshes import MeshError, SheetMesh
 from meshes.cells import Kind, RuledCells
 from meshes.choices import choices, cut
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
+from verification.framework.random_scenes import OutOfTimeError, processor_limit
 from verification.framework.store import Store
 from verification.studies.solver.map_sheets import KINDS, UNMEASURED, Sample, on, sample
 
@@ -147,25 +147,13 @@ def examine(kind: str, number: int) -> dict[str, Any]:
     return found
 
 
-class OutOfTime(BaseException):
-    """A sheet took more than its processor time."""
-
-
 def within_time(kind: str, number: int) -> dict[str, Any]:
     """`examine`, given up after `LIMIT_S` of processor time: then the sheet has no figures, and that is said."""
-
-    def stop(_signal: int, _frame: object) -> None:
-        raise OutOfTime
-
-    before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, LIMIT_S)
     try:
-        return examine(kind, number)
-    except OutOfTime:
+        with processor_limit(LIMIT_S):
+            return examine(kind, number)
+    except OutOfTimeError:
         return {"words": sample(kind, number).words, "why": f"more than {LIMIT_S:g} s of processor time"}
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
 
 
 def run(context: Context) -> CaseResult:
