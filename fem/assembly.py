@@ -15,6 +15,7 @@ from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 Array = NDArray[np.float64]
+NO_PAIRS: Ints = np.zeros((0, 2), dtype=np.int64)
 
 
 @njit(**KERNEL)
@@ -74,12 +75,22 @@ def scatter(K, sides, slots, data):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Pattern(Storage):
-    """Where the lower entries of all element matrices go; -1 in `slots` where a component is prescribed."""
+    """Where the lower entries of all element matrices go; -1 in `slots` where a component is prescribed.
+
+    `touching` has the same for the matrices (6, 6) of pairs of nodes in contact.
+    """
 
     slots: NDArray[np.int32]
+    touching: NDArray[np.int32]
 
 
-def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: bool | None = None) -> Pattern:
+def build_pattern(
+    mesh: ElementMesh,
+    components: Ints,
+    number: Ints,
+    banded: bool | None = None,
+    touching: Ints = NO_PAIRS,
+) -> Pattern:
     """Where the element matrices go in the matrix of the unknowns.
 
     Unknowns of a node and of its edge stay together.
@@ -89,6 +100,7 @@ def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: boo
         components: (t, w) components of every element, -1 where it has none.
         number: (k,) unknown of each component, -1 if prescribed.
         banded: a band or a sparse matrix; None for whichever is factorised faster.
+        touching: (p, 2) nodes, the lower number second, that are in contact and so in the matrix, which is sparse then.
     """
     owner = _owners(mesh, components, number)
     free = np.flatnonzero(number >= 0)
@@ -106,6 +118,14 @@ def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: boo
         return np.asarray(number[by_node[np.repeat(starts[nodes], length) + inside]])
 
     high, low = _pairs(vertex[mesh.carriers], len(used))
+    met = (3 * touching[:, :, None] + np.arange(3)).reshape(-1, 6)
+    if len(met):
+        banded = False
+        ends = np.sort(vertex[touching], axis=1)
+        keys = np.unique(
+            np.concatenate((high * len(used) + low, (ends[:, 1] * len(used) + ends[:, 0])[ends[:, 0] >= 0]))
+        )
+        high, low = keys // len(used), keys % len(used)
     order = unknowns(reverse_cuthill_mckee(high, low, len(used))[0])
     rows = _rows(components, number, order)
     last = rows.max(axis=1)
@@ -119,10 +139,13 @@ def build_pattern(mesh: ElementMesh, components: Ints, number: Ints, banded: boo
         reach = np.arange(len(order))
         np.maximum.at(reach, rows[rows >= 0], np.repeat(last, (rows >= 0).sum(axis=1)))
         reach = np.maximum.accumulate(reach)
-        return Pattern(order, bandwidth, (bandwidth + 1) * len(order), None, reach, slots)
+        return Pattern(order, bandwidth, (bandwidth + 1) * len(order), None, reach, slots, slots[:0])
     sparse, _ = SparsePattern.dissected(high, low, sizes[used], mesh.places[used, :2], unknowns)
-    slots = _sparse_slots(_rows(components, number, sparse.order), sparse.indptr, sparse.indices)
-    return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, None, slots)
+    slots, more = (
+        _sparse_slots(_rows(each, number, sparse.order), sparse.indptr, sparse.indices)
+        for each in (components, met)
+    )
+    return Pattern(sparse.order, bandwidth, len(sparse.indices), sparse, None, slots, more)
 
 
 def _owners(mesh: ElementMesh, components: Ints, number: Ints) -> Ints:

@@ -71,6 +71,7 @@ def observe(
             float(stretching.sum()),
             float(bending.sum()),
             float(folding.sum()),
+            contact=here.contact,
             dissipated=dissipated,
             ground=0.0 if system.outside is None else system.outside.spring_energy(here.x),
         ),

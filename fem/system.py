@@ -19,10 +19,11 @@ from bh.solvers.system import Evaluation, Tangent, grows_ahead
 from fem import loads
 from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
+from fem.contact import StoppedShell
 from fem.crease_memory import CreaseMemory
 from fem.creases import SpringEntries, connectors, spring_entries
 from fem.growth import at_rest
-from fem.here import Here, root_mean_square
+from fem.here import Here, out_of_balance
 from fem.kernels import Frames
 from fem.loads import EdgeMoments
 from fem.outside import shell_outside
@@ -37,7 +38,7 @@ LARGEST_ANGLE = 2.6  # rad between an edge's sides or tangent and its frame, whi
 ROUNDING = 8.0 * np.finfo(float).eps
 
 
-class ShellSystem(CreaseMemory):
+class ShellSystem(StoppedShell, CreaseMemory):
     """`bh.solvers.System` of one step.
 
     Unknowns: free displacements of all nodes in local axes (mm), rotations alpha of edges and fold angles beta of
@@ -88,6 +89,7 @@ class ShellSystem(CreaseMemory):
         self.outside = shell_outside(elements, load_step, loads.ground(elements, model), self.constraints)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
+        self.hinder(model, x)
         self.tethers = NONE
         if load_step.releases and start is not None:
             pull = self.gradient(self.at(self.start(), 0.0))[self.components.free]
@@ -135,10 +137,6 @@ class ShellSystem(CreaseMemory):
         """Unknowns of the state that the step begins with."""
         return self.components.begin[self.components.free]
 
-    def node_positions(self, components: Array) -> Array:
-        """(n, 3) positions of all nodes, middle nodes included, mm."""
-        return self.mesh.nodes + self.components.moves(components)
-
     def positions(self, q: Array, lam: float) -> Array:
         """(n, 3) positions of the corners, mm."""
         return self.node_positions(self.components.whole(q, lam))[: len(self.mesh.sheet.points)]
@@ -181,7 +179,7 @@ class ShellSystem(CreaseMemory):
         energy = 0.5 * float(np.vdot(forces, np.hstack((strain, curvature))))
         B = e.gradients(x, self.frames)
         pull = np.einsum("tkj,tk->tj", B, forces)
-        self._here = Here(q.copy(), lam, components, x, forces, energy, B, pull)
+        self._here = Here(q.copy(), lam, components, x, forces, energy, B, pull, *self.press(x))
         return self._here
 
     def elastic(self, x: Array, gamma: Array, lam: float) -> tuple[Array, Array]:
@@ -217,6 +215,8 @@ class ShellSystem(CreaseMemory):
         ).ravel()
         if self.outside is not None:
             self._add_nodal(out, self.outside.gradient(here.x, here.lam))
+        if here.pressed is not None:
+            self._add_nodal(out, here.pressed)
         return out
 
     def _add_nodal(self, out: Array, nodal: Array) -> None:
@@ -234,12 +234,11 @@ class ShellSystem(CreaseMemory):
         """Energy, residual and element forces at (q, lam)."""
         here = self.at(q, lam)
         beta = self.components.beta(here.components)
-        energy = (
-            here.energy + float(self.creases.energy(beta, lam).sum()) + self.creases.load_energy(beta, lam)
-        )
+        energy = here.energy + float(self.creases.energy(beta, lam).sum())
+        energy += self.creases.load_energy(beta, lam)
         energy -= float(self.load.at(lam) @ here.components)
         residual = self.gradient(here)[self.components.free]
-        energy += 0.0 if self.outside is None else self.outside.energy(here.x, lam)
+        energy += here.contact + (0.0 if self.outside is None else self.outside.energy(here.x, lam))
         energy += self.tethers.push(q, lam, residual)
         return Evaluation(energy, residual, self._imbalance(residual, here), here.forces.ravel())
 
@@ -264,12 +263,7 @@ class ShellSystem(CreaseMemory):
                 floors[1],
             ),
         )
-        worst = 0.0
-        for part, inner, outer, floor in groups:
-            largest = float(np.abs(part).max(initial=0.0)) - floor
-            if largest > 0.0:
-                worst = max(worst, largest / max(root_mean_square(inner), outer, 1e-300))
-        return worst
+        return max(0.0, *(out_of_balance(*group) for group in groups))
 
     @cached_property
     def _flat_stiffness(self) -> tuple[float, float, float]:
@@ -296,9 +290,12 @@ class ShellSystem(CreaseMemory):
             self.outside.add(K, here.x, here.lam)
         if (self.constraints.frame_of >= 0).any():
             turn_blocks(K, self.mesh.triangles, self.constraints.frame_of, self.constraints.frames)
+        met = self.blocks(here.x)
         pattern = self._pattern
         data = np.zeros(pattern.size)
         scatter(K, self.components.sides, pattern.slots, data)
+        if met is not None:
+            self.add_blocks(*met, pattern, data)
         if len(self.creases):
             tangents = self.creases.tangents(self.components.beta(here.components), here.lam)
             np.add.at(data, self._springs.places, tangents[tuple(self._springs.which)])
@@ -374,6 +371,8 @@ class ShellSystem(CreaseMemory):
             out[self.components.first_beta :] += turn.ravel()
             if self.outside is not None:
                 self._add_nodal(out, self.outside.times(here.x, self.components.moves(v), here.lam))
+            if self.barrier is not None:
+                self._add_nodal(out, self.barrier.times(here.x, self.components.moves(v)))
         return out
 
     def objection(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
@@ -385,6 +384,8 @@ class ShellSystem(CreaseMemory):
             q_new: (size,) after it.
             lam_new: after it.
         """
+        if stopped := self.passed(q, lam, q_new, lam_new):
+            return stopped
         before, after = self.components.whole(q, lam), self.components.whole(q_new, lam_new)
         turn = float(np.abs(self.components.alpha(after) - self.components.alpha(before)).max())
         if turn > LARGEST_TURN:
@@ -397,9 +398,8 @@ class ShellSystem(CreaseMemory):
         return ""
 
     def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Nothing: the shell knows no contact, and its sides may pass through each other."""
-        del q, lam, q_new, lam_new  # the arguments of every system
-        return ""
+        """What passed through itself between two states; without contact sides may do so, and nothing is said."""
+        return self.passed(q, lam, q_new, lam_new)
 
     def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
         """What stands in the way of loads on a free sheet, with its outcome; None if nothing does."""
@@ -418,7 +418,8 @@ class ShellSystem(CreaseMemory):
 
     @cached_property
     def _pattern(self) -> Pattern:
-        return build_pattern(self.mesh, self.components.of_element, self.components.number)
+        c = self.components
+        return build_pattern(self.mesh, c.of_element, c.number, touching=self.touching)
 
     @cached_property
     def _springs(self) -> SpringEntries:

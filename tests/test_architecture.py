@@ -66,7 +66,8 @@ RULES: dict[str, tuple[str, ...]] = {
     "bh.testing": USERS,
     "bh.commands": (*USERS, "bh.sweep"),
     "bh": ("meshes", "bh"),  # the facade
-    "fem": (*DESCRIPTION, "bh.paths"),  # the judge shares no mechanics with the judged
+    # the judge shares no mechanics with the judged but contact, which is none of the sheet
+    "fem": (*DESCRIPTION, "bh.paths", "bh.mechanics.contact"),
     "verification": ("meshes", "bh", "fem"),
     "reports": ("meshes", "verification", "bh.plotting", "bh.runtime"),
 }

@@ -243,7 +243,8 @@ def test_symmetry_and_sensitivities_say_that_they_know_no_contact() -> None:
         bh.trace(letter(by=0.1), symmetry="x")
 
 
-def test_a_formulation_without_contact_is_refused() -> None:
+def test_a_formulation_without_contact_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bh.paths.path.Limited", int)  # an ability that it has not
     with pytest.raises(ModelError, match="formulation 'linear-shell' has no contact"):
         bh.trace(replace(letter(by=0.1), formulation="linear-shell"))
 
