@@ -20,7 +20,7 @@ import numpy as np
 import bh
 import meshes
 from bh.model.step import StepBuilder
-from bh.solvers.points import Critical
+from bh.solvers.outcome import Critical
 from meshes.curves import Arc
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
 from verification.theory import actuated as laminates
