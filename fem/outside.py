@@ -19,8 +19,10 @@ from skfem.refdom import RefLine, RefTri
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
+from bh.model.actuations import Tether
 from bh.model.constraints import Constraints
 from bh.model.ramp import Ramp
+from bh.model.springs import GroundSpring, ground_stiffness
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix
 from fem.components import Components
@@ -40,11 +42,27 @@ class ShellOutside:
         elements: of the sheet.
         pressure: (t,) on the triangles, N / mm^2; None where there is none.
         ground: (n, 3) stiffness of springs at all nodes, N / mm.
+        tether: (n, 3) stiffness of springs that are at rest where the step begins, N / mm; None without.
+        begin: (n, 3) positions there, mm.
     """
 
     elements: ShellElements
     pressure: Ramp | None
     ground: Array
+    tether: Array | None = None
+    begin: Array | None = None
+
+    @cached_property
+    def _stiff(self) -> Array:
+        """(n, 3) of all springs, N / mm."""
+        return self.ground if self.tether is None else self.ground + self.tether
+
+    def _held(self, x: Array) -> Array:
+        """(n, 3) forces that all springs take at positions x (n, 3), N."""
+        out = self.ground * (x - self.elements.mesh.nodes)
+        if self.tether is None or self.begin is None:
+            return out
+        return np.asarray(out + self.tether * (x - self.begin))
 
     def energy(self, x: Array, lam: float) -> float:
         """Energy of both, N mm.
@@ -54,10 +72,12 @@ class ShellOutside:
             lam: load parameter of the step, 0 to 1.
         """
         out = self.spring_energy(x)
+        if self.tether is not None and self.begin is not None:
+            out += 0.5 * float(np.vdot(self.tether, (x - self.begin) ** 2))
         return out if self.pressure is None else out - float(self.pressure.at(lam) @ self._swept(x))
 
     def spring_energy(self, x: Array) -> float:
-        """Energy of the springs, N mm, at positions x (n, 3)."""
+        """Energy of the springs to the ground, N mm, at positions x (n, 3)."""
         return 0.5 * float(np.vdot(self.ground, (x - self.elements.mesh.nodes) ** 2))
 
     def gradient(self, x: Array, lam: float) -> Array:
@@ -67,7 +87,7 @@ class ShellOutside:
             x: (n, 3) positions, mm.
             lam: load parameter of the step, 0 to 1.
         """
-        out = self.ground * (x - self.elements.mesh.nodes)
+        out = self._held(x)
         return out if self.pressure is None else out - self._pushes(*self._tangents(x), self.pressure.at(lam))
 
     def push_rate(self, x: Array) -> Array:
@@ -88,7 +108,7 @@ class ShellOutside:
             v: (n, 3) velocities.
             lam: load parameter of the step, 0 to 1.
         """
-        out = self.ground * v
+        out = self._stiff * v
         if self.pressure is None:
             return out
         (a, b), (da, db), p = self._tangents(x), self._tangents(v), self.pressure.at(lam)
@@ -105,7 +125,7 @@ class ShellOutside:
         nodes = self.elements.mesh.triangles
         owner, place = self._owners
         for axis in range(3):
-            K[owner, 3 * place + axis, 3 * place + axis] += self.ground[:, axis]
+            K[owner, 3 * place + axis, 3 * place + axis] += self._stiff[:, axis]
         if self.pressure is None:
             return
         phi, slope, weight = self._rule
@@ -180,7 +200,7 @@ class ShellOutside:
             x: (n, 3) positions, mm.
             lam: load parameter of the step, 0 to 1.
         """
-        found = float(np.abs(self.ground * (x - self.elements.mesh.nodes)).max())
+        found = float(np.abs(self._held(x)).max())
         if self.pressure is None:
             return found
         return max(found, float(np.abs(self._pushes(*self._tangents(x), self.pressure.at(lam))).max()))
@@ -268,7 +288,7 @@ class ShellOutside:
 
 
 def shell_outside(
-    elements: ShellElements, load_step: LoadStep, ground: Array | None, constraints: Constraints
+    elements: ShellElements, load_step: LoadStep, ground: Array | None, constraints: Constraints, begin: Array
 ) -> ShellOutside | None:
     """What acts from outside in a step; None where nothing does.
 
@@ -277,17 +297,24 @@ def shell_outside(
         load_step: of the step.
         ground: (n, 3) stiffness of springs at all nodes, N / mm; None without.
         constraints: of the step.
+        begin: (n, 3) positions of all nodes where the step begins, mm.
 
     Raises:
-        ModelError: a pressure on a sheet that nothing holds.
+        ModelError: a pressure on a sheet that nothing holds, or bodies that the shell does not know.
     """
+    tethers = [
+        GroundSpring(item.at, total=item.total) for item in load_step.bodies if isinstance(item, Tether)
+    ]
+    if len(tethers) < len(load_step.bodies):
+        raise ModelError("the shell knows no bars and pulls; take formulation consistent or bars-and-hinges")
     if constraints.rigid_body and load_step.pressure is not None:
         raise ModelError("a pressure pushes a sheet that nothing holds as a whole; add supports or springs")
-    if load_step.pressure is None and ground is None:
+    if load_step.pressure is None and ground is None and not tethers:
         return None
-    return ShellOutside(
-        elements, load_step.pressure, np.zeros_like(elements.mesh.nodes) if ground is None else ground
-    )
+    mesh = elements.mesh
+    ground = np.zeros_like(mesh.nodes) if ground is None else ground
+    tether = ground_stiffness(tethers, mesh.linear) if tethers else None
+    return ShellOutside(elements, load_step.pressure, ground, tether, begin)
 
 
 def _cross(v: Array) -> Array:

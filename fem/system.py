@@ -70,10 +70,6 @@ class ShellSystem(StoppedShell, CreaseMemory):
             raise ModelError(
                 "given element stiffness is for bars and hinges; the shell takes a sheet (E, nu, t)"
             )
-        if load_step.bodies:
-            raise ModelError(
-                "the shell knows no bars and tethers; take formulation consistent or bars-and-hinges"
-            )
         self.load_step, self.elements = load_step, elements
         mesh = self.mesh = elements.mesh
         step = 0 if start is None else start.step + 1
@@ -86,7 +82,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
         self.constraints = loads.constraints(mesh, model, step, None if start is None else x)
         clamped = mesh.sheet.topology.find_edges(load_step.constraints.clamped)
         self.components = lay_out(elements, self.constraints, self.creases, x, beta, clamped)
-        self.outside = shell_outside(elements, load_step, loads.ground(elements, model), self.constraints)
+        self.outside = shell_outside(elements, load_step, loads.ground(elements, model), self.constraints, x)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
         self.hinder(model, x)

@@ -253,6 +253,22 @@ def test_couple_about_an_axis(formulation: str, along: int, rows: int) -> None:
         bh.trace(model.step(Couple("edge:end", (0.0, 1.0, 0.0))))
 
 
+@pytest.mark.parametrize("formulation", ["consistent", "shell"])
+def test_springs_at_rest_where_a_step_finds_the_sheet(formulation: str) -> None:
+    """A cantilever that is lifted and then tethered stays there; more force then meets both stiffnesses."""
+    kind: Any = "staggered" if formulation == "consistent" else "mirrored"
+    mesh = meshes.structured(meshes.strip(40.0, 8.0), along=16, rows=2, kind=kind)
+    model = Model(mesh, Sheet(E=4000.0, nu=0.0, t=0.3), formulation=formulation)
+    model = model.support("edge:start", "xyz", clamp=True).force("edge:end", total=(0.0, 0.0, 1e-3))
+    soft = 3.0 * 4000.0 * 8.0 * 0.3**3 / 12.0 / 40.0**3
+    held = bh.Tether("edge:end", (0.0, 0.0, 2.0 * soft))
+    model = model.step(held).step(held, bh.Force("edge:end", total=(0.0, 0.0, 4e-3)))
+    ends = {state.step: float(state.displacement("edge:end")[:, 2].mean()) for state in bh.trace(model)}
+    assert ends[0] == pytest.approx(1e-3 / soft, rel=0.02)
+    assert ends[1] == pytest.approx(ends[0], rel=1e-6)
+    assert ends[2] - ends[1] == pytest.approx(3e-3 / (3.0 * soft), rel=0.02)
+
+
 def test_couples_add_and_are_replaced() -> None:
     """Its forces have no resultant, whatever the nodes; another one at the place takes its turn, and files keep it."""
     mesh = meshes.structured(meshes.strip(30.0, 20.0), along=6, rows=4)

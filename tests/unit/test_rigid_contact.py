@@ -191,7 +191,7 @@ def test_bad_bars(change: dict[str, object], message: str) -> None:
 
 
 def test_the_shell_has_no_bars() -> None:
-    with pytest.raises(ModelError, match="no bars and tethers"):
+    with pytest.raises(ModelError, match="no bars and pulls"):
         trace(beam("shell").step(*rig(by=1.0)))
 
 
