@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import bh.studio.messages as asked
+from bh.analysis.contact import self_contact
 from bh.errors import InputError
 from bh.live import Controls, Session, held
 from bh.model.sheet import Sheet
@@ -255,7 +256,14 @@ class Desk:
                 return None
             self._finer = key, found
         found = self._finer[1]
-        head: Json = {"kind": "finer", "heard": heard, "error": found.error, "reason": found.reason}
+        meets = len(self_contact(frame.state))
+        head: Json = {
+            "kind": "finer",
+            "heard": heard,
+            "error": found.error,
+            "reason": found.reason,
+            "meets": meets,
+        }
         state = found.state
         if state is None:
             return packed(head)
