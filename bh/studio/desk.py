@@ -195,7 +195,7 @@ class Desk:
         self._snapped = self._snapped or self.frame.snapped
         if self.frame.note and self.sheet.settles and self.sheet.model.formulation == BARS:
             self._bend()
-        if self.frame.at_rest and time.monotonic() - self._tidied > TIDY:
+        if time.monotonic() - self._tidied > TIDY:
             give_back()
             self._tidied = time.monotonic()
 
