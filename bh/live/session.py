@@ -67,8 +67,9 @@ class Session:
         Raises:
             ModelError: the sheet cannot be solved as described.
         """
-        if any(crease.law is not None and crease.law.remembers for crease in model.creases.values()):
-            raise ModelError("creases that yield remember their way; fold them by bh.trace or bh run")
+        if model.remembers:
+            what = "friction remembers its" if model.rubs else "creases that yield remember their"
+            raise ModelError(f"{what} way; fold the sheet by bh.trace or bh run")
         self.model = replace(model if model.supports else held(model), steps=())
         self._free = (
             held(replace(self.model, supports=())).supports == self.model.supports

@@ -135,7 +135,16 @@ class Settling:
                 return found
 
     def settling_steps(self, system: System, q: Array, lam: float) -> Generator[Array, None, Solution]:
-        """`settle`, one step at a time: gives the unknowns before every step, and returns what came of it."""
+        """`settle`, one step at a time.
+
+        Args:
+            system: that settles.
+            q: (size,) unknowns where it begins.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            what came of it; the unknowns before every step are given on the way.
+        """
         now, shift, still = system.evaluate(q, lam), self.shift, 0
         for step in range(self.most):
             yield q

@@ -207,7 +207,11 @@ class Desk:
         self._news += [self.describe(), line(text)]
 
     def news(self) -> list[Json]:
-        """What came of the work beside frames, since this was asked last: another sheet, a line."""
+        """What came of the work beside frames.
+
+        Returns:
+            since this was asked last: another sheet, a line.
+        """
         news, self._news = self._news, []
         return news
 

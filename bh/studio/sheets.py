@@ -133,7 +133,14 @@ def of_library(
 
 
 def parameters(name: str) -> dict[str, float | list[float]]:
-    """Numbers of a pattern of the library that can be chosen, mm and rad, by key."""
+    """Numbers of a pattern of the library that can be chosen.
+
+    Args:
+        name: of the pattern.
+
+    Returns:
+        mm and rad, by key.
+    """
     table = tomllib.loads(LIBRARY[name])
     return {key: value for key, value in table.items() if key not in ("kind", "fold")}
 
