@@ -27,6 +27,7 @@ from bh.loading.builder import LoadStepBuilder
 from bh.model.actuations import Force
 from bh.model.model import Model
 from bh.model.step import Step
+from bh.runtime.memory import give_back
 from bh.runtime.terminal import say
 from bh.solving.trace import trace
 from bh.studio.desk import Desk
@@ -201,9 +202,13 @@ def own_imbalance(model: Model, frame: Frame) -> float:
 
 
 def resident() -> float:
-    """Memory of this process, MB."""
+    """Memory of this process that is in use, MB: without what waits to be collected, or lies free in the heap."""
+    import gc
+
     import psutil
 
+    gc.collect()
+    give_back()
     return float(psutil.Process().memory_info().rss) / 2**20
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import bh.studio.messages as asked
+from bh.analysis.contact import self_contact
 from bh.errors import InputError
 from bh.live import Controls, Session, held
 from bh.model.sheet import Sheet
@@ -194,7 +195,7 @@ class Desk:
         self._snapped = self._snapped or self.frame.snapped
         if self.frame.note and self.sheet.settles and self.sheet.model.formulation == BARS:
             self._bend()
-        if self.frame.at_rest and time.monotonic() - self._tidied > TIDY:
+        if time.monotonic() - self._tidied > TIDY:
             give_back()
             self._tidied = time.monotonic()
 
@@ -259,7 +260,14 @@ class Desk:
                 return None
             self._finer = key, found
         found = self._finer[1]
-        head: Json = {"kind": "finer", "heard": heard, "error": found.error, "reason": found.reason}
+        meets = len(self_contact(frame.state))
+        head: Json = {
+            "kind": "finer",
+            "heard": heard,
+            "error": found.error,
+            "reason": found.reason,
+            "meets": meets,
+        }
         state = found.state
         if state is None:
             return packed(head)

@@ -112,7 +112,9 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
             "this sheet was given as a model of Python, which no scene describes; take the Python lines"
         )
     model = session.scene()
-    lines = [f"# {sheet.name} as it stood in bh studio; run it by `bh run`. mm, N, rad.", "", sheet.tables]
+    lines = [f"# {sheet.name} as it stood in bh studio; run it by `bh run`. mm, N, rad.", ""]
+    lines += ["contact = false                  # as in the window, where panels pass through each other", ""]
+    lines += [sheet.tables]
     values = {item.name: getattr(model.sheet, item.name) for item in fields(model.sheet)}
     lines += ["[sheet]", *(f"{key} = {value!r}" for key, value in values.items() if value is not None), ""]
     for support in model.supports:

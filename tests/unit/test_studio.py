@@ -99,6 +99,7 @@ def test_a_drawing_comes_out_with_its_scene(tmp_path: Path) -> None:
     with zipfile.ZipFile(io.BytesIO(base64.b64decode(str(answer["data"])))) as archive:
         assert sorted(archive.namelist()) == ["miura.svg", "miura.toml"]
         archive.extractall(tmp_path)
+    assert tomllib.loads((tmp_path / "miura.toml").read_text())["contact"] is False  # as it is in the window
     path = bh.trace(load_scene(tmp_path / "miura.toml").model)
     np.testing.assert_allclose(path[-1].points, desk.frame.points, atol=1e-5)
 

@@ -7,7 +7,7 @@ export const make = (tag, attributes, parent) => {
   parent?.append(item);
   return item;
 };
-export const number = (v, digits = 3) => (v === 0 ? "0" : Math.abs(v) >= 1e-3 && Math.abs(v) < 1e5 ? Number(v.toPrecision(digits)).toString() : v.toExponential(2));
+export const number = (v, digits = 3) => (Math.abs(v) < 1e-12 ? "0" : Math.abs(v) >= 1e-3 && Math.abs(v) < 1e5 ? Number(v.toPrecision(digits)).toString() : v.toExponential(2));
 export const degrees = (rad) => `${(rad * 180 / Math.PI).toFixed(1)}°`;
 
 // The sheet that lies in the window, the numbers of its newest frame, and its positions, mm.

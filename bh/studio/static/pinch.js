@@ -51,7 +51,7 @@ export function moved(ray) {
 }
 export function released() { const held = dragged; dragged = null; return Boolean(held); }
 
-export const said = (pinch) => `${pinch.force < 0 ? "pulled apart by" : "pinch"} ${number(Math.abs(pinch.force))} N, ${number(pinch.apart)} mm apart`;
+export const said = (pinch) => `${pinch.force < -1e-9 ? "pulled apart by" : "pinch"} ${number(Math.abs(pinch.force))} N, ${number(pinch.apart)} mm apart`;
 
 // The slider of the gap, for whom the pointer is no way.
 export function panel(head) {
@@ -63,7 +63,7 @@ export function panel(head) {
   if (document.activeElement !== slider) slider.value = pinch.gap;
   $("gap-out").textContent = `${number(pinch.gap)} mm`;
   const [one, two] = [pinch.a, pinch.b].map((node) => Math.hypot(...head.forces[node] ?? [0]));
-  const uneven = Math.abs(one - two) > 0.05 * Math.max(one, two);
+  const uneven = Math.abs(one - two) > Math.max(0.05 * Math.max(one, two), 1e-9);
   $("pinch-said").textContent = said(pinch) + (uneven ? `; the jaws have ${number(one)} and ${number(two)} N, held points carry the rest` : "");
 }
 $("gap").oninput = ({ target }) => ask({ do: "pinch", a: Number(target.dataset.a), b: Number(target.dataset.b), gap: Number(target.value) });

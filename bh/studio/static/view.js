@@ -32,7 +32,8 @@ function resize() {
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   renderer.setSize(box.clientWidth, box.clientHeight, false);
   camera.aspect = box.clientWidth / Math.max(box.clientHeight, 1);
-  camera.updateProjectionMatrix(); dirty = true;
+  camera.updateProjectionMatrix();
+  picture(); // a canvas of another size is empty
 }
 new ResizeObserver(resize).observe($("stage"));
 controls.addEventListener("change", redraw);
