@@ -29,7 +29,7 @@ def test_links_in_tables_are_links() -> None:
         if not printed_in_tables(page):
             continue
         found = MarkdownIt("commonmark").enable("table").render(page.read_text(encoding="utf-8"))
-        links = found.count(".json\" title=")
+        links = found.count('.json" title=')
         assert links == len(list(printed(page))), page.name
 
 
