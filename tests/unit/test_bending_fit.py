@@ -8,8 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from verification.studies.ch4.bending_fit import KNOWN, MODULUS, PREDICTED, Trial, best, judged
-from verification.studies.ch4.rigs import DEPTH, FREE, GRIP, LSTAR, OFFSET, TAPE, Guess, beside, drawn
+from verification.studies.ch4.bending_fit import KNOWN, PREDICTED, Trial, best, judged
+from verification.studies.ch4.rigs import (
+    DEPTH,
+    FREE,
+    GRIP,
+    LSTAR,
+    MODULUS,
+    OFFSET,
+    TAPE,
+    Guess,
+    beside,
+    drawn,
+)
 
 GUESS = Guess(25.0, "springs", 1.0, "down", 1.0, 0.0, 6.0, 0.0)
 ALL = {f"{kind}/{name}": value for (kind, name), value in KNOWN.items()}
