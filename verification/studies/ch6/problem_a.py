@@ -181,7 +181,7 @@ def run_b(context: Context) -> CaseResult:
         "movement grows with every segment", (steps > 0.0).all(), reference=1.0, source=TIP, tolerance=0.0
     )
     n_all = [float(i) for i in range(1, most + 1)]
-    converged = _converged(result, most)
+    converged = _converged(result, 1 if context.quick else most)
     if most > 2:
         fit = np.polyfit(n_all, moved, 1)
         rest = np.abs(np.polyval(fit, n_all) - moved).max() / moved[-1]
@@ -194,7 +194,7 @@ def run_b(context: Context) -> CaseResult:
             "mm",
             [
                 line("source's model", n_all, moved, "points"),
-                line("model that converges", n_all, converged, "points"),
+                line("model that converges", n_all[: len(converged)], converged, "points"),
             ],
             "Fig. 6.17 (c), and the same asked of the model that converges.",
         )
