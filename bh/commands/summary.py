@@ -51,7 +51,8 @@ def summary(
     say(
         f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
         f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
-        + (f"; contact {energy.contact:.3g} N mm" if path.model.stops_itself else "")
+        + (f"; contact {energy.contact:.3g} N mm" if path.model.hindered else "")
+        + (f"; friction has used up {energy.friction:.3g} N mm" if path.model.rubs else "")
     )
     for name, force in last.contact_forces.items():
         x, y, z = force

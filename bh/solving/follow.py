@@ -221,7 +221,7 @@ def _beside(path: Path, step: int, asked: bool, item: Increment | None) -> str:
     system = path.system(step) if half is None else half.system
     done = [record for record in path.records if record.step <= step]
     doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in done)
-    if not asked and path.model.stops_itself:
+    if not asked and path.model.hindered:
         return ""  # pushed states would have to find ways round all that presses, which takes longer than the path
     if item is not None:
         return look_around(system, item.point, doubtful, Newton(), item.factorised)

@@ -155,7 +155,7 @@ class TurningEdges(SupportedSheet):
         k = self.elements.spring_stiffness
         return k if self.curves is None else self.spring_stiffness(self.turns(x, q[self.moving :], lam))
 
-    def history_at(self, q: Array, lam: float) -> Array:
+    def crease_history_at(self, q: Array, lam: float) -> Array:
         """(m, 2) what creases remember where this state is accepted; see `bh.solvers.system.Remembering`.
 
         Args:

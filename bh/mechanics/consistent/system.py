@@ -213,9 +213,7 @@ class ConsistentSystem(TurningEdges):
         x = self.near(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
-        touched = 0.0 if self.outside is None else self.outside.forces(x, lam, now.f)
-        if self.barrier is not None:
-            touched += self.barrier.forces(x, now.f)
+        touched = self.press(x, lam, now.f)
         energy = (
             now.stretching
             + now.bending
@@ -253,7 +251,7 @@ class ConsistentSystem(TurningEdges):
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, joined = self.elements, self.elements.patches
         x = self.near(q, lam)
-        touching = self._touching(x)
+        touching = self._touching(x, lam)
         pattern = self._pattern
         N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)
@@ -274,7 +272,7 @@ class ConsistentSystem(TurningEdges):
         )
         if self.outside is not None:
             self.outside.tangent(x, lam, *axes, pattern.slots[0], data)
-        if touching is not None:
+        if touching is not None and self.contact_blocks is not None:
             last = -1 if e.coupling is None else -2
             self.contact_blocks.add(*touching, *axes, pattern.slots[last], data)
         if closing or L.any():
@@ -308,7 +306,7 @@ class ConsistentSystem(TurningEdges):
     @cached_property
     def _pattern(self) -> Pattern:
         ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
-        pairs = None if self.barrier is None else self.contact_blocks.pairs
+        pairs = None if self.contact_blocks is None else self.contact_blocks.pairs
         return rotation_pattern(self.mesh, self.elements, self.displacements, ground, pairs)
 
     def _predicted_forces(self, x: Array, slopes: Slopes, closing: bool, forces: Array, dq: Array) -> Array:
@@ -391,8 +389,8 @@ class ConsistentSystem(TurningEdges):
             closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
         if self.outside is not None:
             self.outside.force_rates(x, v, lam, 1.0, f)
-        if self.barrier is not None:
-            f += self.barrier.times(x, v)
+        if self.contact_blocks is not None:
+            f += self.touch_rates(x, v, lam, 1.0)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         if e.growth is not None:
             second += e.growth.second(e.stretching.gamma_rates(x, v))
@@ -427,15 +425,18 @@ class ConsistentSystem(TurningEdges):
             total += float(np.vdot(self.elements.coupling.moments.rate, now.theta))
         if self.outside is not None:
             total += self.outside.power(x, lam)
-            self.outside.forces(x, lam, now.f)
-        if self.barrier is not None:
-            self.barrier.forces(x, now.f)
+        if self.contact_blocks is not None:
+            total += self.touch_power(x, lam)
+        self.press(x, lam, now.f)
         unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
         """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         v = self.displacements.prescribed_motion
-        more = 0.0 if self.outside is None else self.outside.control_stiffness(self.near(q, lam), v, lam)
+        x = self.near(q, lam)
+        more = 0.0 if self.outside is None else self.outside.control_stiffness(x, v, lam)
         more += self.tethers.second(q, lam)
+        if self.contact_blocks is not None:
+            more += self.touch_stiffness(x, v, lam)
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more
