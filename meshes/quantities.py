@@ -120,6 +120,7 @@ _ALLOWED = re.compile(
 )  # no towers of powers
 PATTERN = r"^\s*[-+]?[.0-9].*\S\s*$"  # what editors may check of a text that stands for a number
 LONGEST = 40  # characters
+OTHER = frozenset(("grad", "gon"))  # 60 grad are no misspelt 60 rad, and not known
 
 
 @overload
@@ -265,7 +266,7 @@ def _registry() -> Any:
 def _wrong(value: str, kind: Kind, size: str = "", unit: str = "") -> QuantityError:
     asked = UNITS[kind]
     lower = {name.lower(): name for name in asked.known}
-    other = unit in _WORDS  # of another kind: 3N is no misspelt 3in
+    other = unit in _WORDS or unit.lower() in OTHER  # of another kind: 3N is no misspelt 3in
     near = difflib.get_close_matches(unit.lower(), lower, n=1, cutoff=0.6) if unit and not other else []
     mend = f"write {size}{_short(lower[near[0]])}" if near else f"write one such as {asked.examples}"
     text = value if len(value) <= LONGEST else value[:36] + " ..."

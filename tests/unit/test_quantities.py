@@ -87,6 +87,7 @@ def test_texts_are_numbers_in_the_units_of_the_project(text: str, kind: Kind, va
         ("3 inchs", "length", '"3 inchs" is no length: write 3in'),
         ("4 gpa", "modulus", '"4 gpa" is no modulus: write 4GPa'),
         ("60 degs", "angle", '"60 degs" is no angle: write 60deg'),
+        ("60 grad", "angle", "is no angle: write one such as 60deg or 1.05rad"),
         ("5g", "force", '"5g" is no force: write 5gf'),
         ("3N", "length", '"3N" is no length: write one such as 0.5mm, 3cm or 3in'),
         ("3deg", "length", '"3deg" is no length: write one such as'),
