@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
     from bh.model.imperfection import RandomField, imperfect
     from bh.model.laminate import laminate
-    from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
+    from bh.model.loads import AreaForce, Couple, EdgeMoment, LineForce, Pressure
     from bh.model.model import Model
     from bh.model.mould import Mould
     from bh.model.pinch import Pinch
@@ -74,7 +74,7 @@ _NAMES = {
     "bh.model.growth": "Expand",
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
     "bh.model.imperfection": "RandomField imperfect",
-    "bh.model.loads": "AreaForce EdgeMoment LineForce Pressure",
+    "bh.model.loads": "AreaForce Couple EdgeMoment LineForce Pressure",
     "bh.model.laminate": "laminate",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
@@ -131,6 +131,7 @@ __all__ = [
     "Body",
     "Calibration",
     "Constraint",
+    "Couple",
     "CreaseLaw",
     "Displace",
     "DisplacementControl",

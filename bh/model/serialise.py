@@ -16,7 +16,7 @@ from bh.model.actuations import Displace, Fold, Force, Indenter, Moment, Pull, T
 from bh.model.crease_law import CreaseLaw
 from bh.model.growth import Expand
 from bh.model.hinge_laws import LAWS, HingeLaw
-from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
+from bh.model.loads import AreaForce, Couple, EdgeMoment, LineForce, Pressure
 from bh.model.model import Model
 from bh.model.mould import Mould
 from bh.model.pinch import Pinch
@@ -44,6 +44,7 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "pressure": Pressure,
     "line_force": LineForce,
     "area_force": AreaForce,
+    "couple": Couple,
     "edge_moment": EdgeMoment,
     "expand": Expand,
 }

@@ -16,6 +16,7 @@ from bh.loading.builder import load_steps
 from bh.loading.symmetry import Plane, check, mirror
 from bh.model.actuations import Displace, Force, Tether
 from bh.model.crease_law import CreaseLaw
+from bh.model.loads import Couple
 from bh.model.model import Model, Place
 from bh.model.plugins import consent, made
 from bh.model.refinement import Goal
@@ -406,7 +407,7 @@ def _check_names(model: Model, numbers: Sequence[int]) -> None:
             if crease != "all":
                 with within(f"steps[{i}].{key}.crease"):
                     mesh.crease_edges(crease)
-            if isinstance(item, Force | Displace | Tether):
+            if isinstance(item, Force | Displace | Tether | Couple):
                 with within(f"steps[{i}].{key}.at"):
                     select(mesh, item.at)
 

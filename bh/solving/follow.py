@@ -305,17 +305,20 @@ def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path,
     return path, target
 
 
-def check_resumable(file: FilePath, model: Model) -> None:
+def check_resumable(file: FilePath, model: Model) -> int:
     """See that a path file has steps that a model can go on from.
 
     Args:
         file: the path file.
         model: to be solved.
 
+    Returns:
+        how many.
+
     Raises:
         PathFileError: it has none; one line that names what differs.
     """
-    _kept_steps(Path.load(file), model, file)
+    return _kept_steps(Path.load(file), model, file)
 
 
 def _kept_steps(path: Path, model: Model, file: FilePath) -> int:

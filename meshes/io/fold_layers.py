@@ -82,6 +82,7 @@ def untangled(frame: Frame, orders: Sequence[Order], distance: float) -> Frame:
         FileFormatError: a face cannot be read, or layers that far apart do not fit; one line that names the faces.
     """
     apart = drawn_apart(frame.points, [face[0] for face in frame.faces], orders, distance)
+    _check_room(frame, apart, distance)
     frame = replace(frame, points=apart)
     triangles = _triangles(frame)
     asks = [ask for order in orders for ask in _asked(frame.points, triangles, order)]
@@ -107,6 +108,20 @@ def untangled(frame: Frame, orders: Sequence[Order], distance: float) -> Frame:
         letters=[*frame.letters, *["F"] * len(new)],
         angles=None if frame.angles is None else [*frame.angles, *[0.0] * len(new)],
     )
+
+
+def _check_room(frame: Frame, apart: Array, distance: float) -> None:
+    """Raises `FileFormatError` where a face is smaller than creases inside one another have to be drawn apart."""
+    for number, face in enumerate(frame.faces):
+        ring = list(face[0])
+        k = np.arange(len(ring)) - 1
+        before, after = (points[ring] for points in (frame.points, apart))
+        turns = [np.cross(x - x[k], np.roll(x, -1, axis=0) - x) for x in (before, after)]
+        if (np.einsum("kc,kc->k", *turns) < 0.0).any():
+            raise FileFormatError(
+                f"layers {distance:.4g} mm apart do not fit: creases inside one another, drawn apart by so much, turn "
+                f"face {number} inside out; give a thinner sheet, or wider faces beside its creases"
+            )
 
 
 def _triangles(frame: Frame) -> list[list[list[int]]]:

@@ -48,6 +48,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: line_force": loads.LineForceTable,
     "steps: area_force": loads.AreaForceTable,
     "steps: edge_moment": loads.EdgeMomentTable,
+    "steps: couple": loads.CoupleTable,
     "springs": loads.SpringTable,
     "steps: expand": schema.ExpandTable,
     "imperfection": loads.ImperfectionTable,

@@ -226,3 +226,18 @@ def test_four_panels_without_inner_points_stand_in_wedges(tmp_path: Path) -> Non
     }
     mesh = read_fold(written(tmp_path, form), untangle=0.1)
     assert not intersecting(mesh.points, mesh.triangles, all_pairs(8), 1e-9).any()
+
+
+def test_layers_that_are_too_thick_for_nested_creases_name_a_face() -> None:
+    with pytest.raises(
+        FileFormatError, match=r"layers 1\.5 mm apart do not fit: creases inside one another.*face \d+"
+    ):
+        read_fold(MAP.with_suffix(".fold"), untangle=1.5)
+
+
+def test_layers_nearer_than_contact_allows_are_told_apart_from_ones_that_meet(tmp_path: Path) -> None:
+    written(tmp_path, pleats(3))
+    file = tmp_path / "map.toml"
+    file.write_text(f'contact = "thickness"\n[pattern]\nfile = "form.fold"\nuntangle = 0.1\n{SHEET}')
+    with pytest.raises(bh.ModelError, match=r"parts of the first state are nearer than 0\.2955 mm \(nodes "):
+        bh.trace(load_scene(file).model)

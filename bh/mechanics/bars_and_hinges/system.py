@@ -105,6 +105,7 @@ class BarsAndHingesSystem(SupportedSheet):
         self.size = self.primal + self.elements.prescribed
         self._bar_scale = model.sheet.E * model.sheet.t
         self._moments_start = moments
+        self._let_go(start, self.start())
 
     # ------------------------------------------------------------------------------- unknowns and positions
 
@@ -139,6 +140,7 @@ class BarsAndHingesSystem(SupportedSheet):
         energy += self.press(x, lam, f)
         residual = np.empty(self.size)
         residual[: self.primal] = self.displacements.components(f)
+        energy += self.tethers.push(q, lam, residual)
         gap = penalty = 0.0
         if self.elements.prescribed:
             missed = turn[-self.elements.prescribed :]
@@ -277,6 +279,7 @@ class BarsAndHingesSystem(SupportedSheet):
         if touching is not None and self.contact_blocks is not None:
             axes = (self.constraints.frame_of, self.constraints.frames)
             self.contact_blocks.add(*touching, *axes, pattern.slots[-1], data)
+        self.tethers.stiffen(lam, data, pattern)
         if self.constraints.rigid_body:
             Z = self.displacements.rigid(x)
             ground = self._ground(Z, data)
@@ -320,6 +323,7 @@ class BarsAndHingesSystem(SupportedSheet):
             out += self.touch_rates(x, moving, lam, 1.0)
         rate = np.empty(self.size)
         rate[: self.primal] = self.displacements.components(out)
+        self.tethers.rates(q, lam, rate)
         if e.prescribed:
             turn = np.einsum("hpc,hpc->h", g.reshape(-1, 4, 3), moving[e.hinges]) - e.rest.rate
             rate[self.primal :] = turn[-e.prescribed :]
@@ -336,6 +340,7 @@ class BarsAndHingesSystem(SupportedSheet):
         moment = stiffness * turn + couple  # without the lock, which knows no rest angle
         total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.displacements.home))
+        total += self.tethers.power(q, lam)
         if self.outside is not None:
             total += self.outside.power(x, lam)
         if self.contact_blocks is not None:
@@ -349,6 +354,7 @@ class BarsAndHingesSystem(SupportedSheet):
         x = self.near(q, lam)
         stiffness = self.hinge_stiffness(x, lam)
         total = float(stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
+        total += self.tethers.second(q, lam)
         moving = self.displacements.prescribed_motion
         if moving.any():
             _, _, _, forces, _ = self.internal_forces(x, q, lam)

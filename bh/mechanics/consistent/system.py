@@ -95,6 +95,7 @@ class ConsistentSystem(TurningEdges):
             start_points
         )  # of a kind with all other positions: kernels compile once
         self._frame_of = np.append(self.constraints.frame_of, -1)
+        self._let_go(start, self.start(), -self.elements.let_go)
 
     # ------------------------------------------------------------------------------- unknowns and positions
 
@@ -106,9 +107,11 @@ class ConsistentSystem(TurningEdges):
 
     def start(self) -> Array:
         """Unknowns of the state that the step begins with; the rotations are those of least energy there."""
+        if self.tethers:
+            return self.tethers.begin.copy()
         q = np.zeros(self.size)
         q[: self.moving] = self.displacements.start()
-        q[self.moving :] = self.rotations_at(self._start_points, 0.0)
+        q[self.moving :] = self.rotations_at(self._start_points, 0.0, self.elements.let_go)
         return q
 
     def unknowns_at(self, x: Array, lam: float) -> Array:
@@ -145,7 +148,7 @@ class ConsistentSystem(TurningEdges):
             lam: load parameter of the step, 0 to 1.
         """
         e = self.elements
-        f, r = np.zeros_like(x), e.let_go.at(lam)
+        f, r = np.zeros_like(x), e.turning.at(lam)
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
         turns = np.empty(len(e.springs))
         N, M, S, L = self.split(forces)
@@ -218,9 +221,10 @@ class ConsistentSystem(TurningEdges):
             + now.lock
             + touched
             - float(np.vdot(load, x - self.displacements.home))
-            + float(self.elements.let_go.at(lam) @ q[self.moving :])
+            + float(self.elements.turning.at(lam) @ q[self.moving :])
         )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
+        energy += self.tethers.push(q, lam, residual)
         scale = self._outer_scale(load, x, lam)
         imbalance = self._imbalance(residual, now.size, scale, x) if energy < np.inf else np.inf
         return Evaluation(energy, residual, imbalance, now.forces)
@@ -273,6 +277,7 @@ class ConsistentSystem(TurningEdges):
             self.contact_blocks.add(*touching, *axes, pattern.slots[last], data)
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
+        self.tethers.stiffen(lam, data, pattern)
         matrix: Matrix = pattern.matrix(data)
         if self.constraints.rigid_body:
             matrix = self._free_body(x, data)
@@ -375,7 +380,7 @@ class ConsistentSystem(TurningEdges):
         v = self.displacements.prescribed_motion
         at = Slopes(e.bending.stiffness(now.theta), self.spring_stiffness(now.turns))
         rates, turns = self.force_rates(x, v, np.zeros(e.rotations), at, closing=False, controlled=True)
-        f, r = np.zeros_like(x), e.let_go.rate
+        f, r = np.zeros_like(x), e.turning.rate
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
         e.stretching.force_rates(x, v, N, dN, f)
         kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, M, dM, f, r)
@@ -403,7 +408,8 @@ class ConsistentSystem(TurningEdges):
     def control_rate(self, q: Array, lam: float) -> Array:
         """(size,) d residual / d lambda at fixed q: N for displacements, N mm / rad for rotations."""
         f, r, _ = self._gradient_rates(q, lam)
-        return np.concatenate((self.displacements.components(f - self.force.rate), r))
+        rate = np.concatenate((self.displacements.components(f - self.force.rate), r))
+        return self.tethers.rates(q, lam, rate)
 
     def power(self, q: Array, lam: float) -> float:
         """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
@@ -411,8 +417,8 @@ class ConsistentSystem(TurningEdges):
         now = self.internal(x, q[self.moving :], lam)
         _, M, S, _ = self.split(now.forces)
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
-        total -= float(np.vdot(self.force.rate, x - self.displacements.home))
-        total += float(self.elements.let_go.rate @ q[self.moving :])
+        total += self.tethers.power(q, lam) - float(np.vdot(self.force.rate, x - self.displacements.home))
+        total += float(self.elements.turning.rate @ q[self.moving :])
         if self.elements.growth is not None:
             total += self.elements.growth.power(self.elements.stretching.gamma(x), lam)
         if self.elements.coupling is not None:
@@ -430,6 +436,7 @@ class ConsistentSystem(TurningEdges):
         v = self.displacements.prescribed_motion
         x = self.near(q, lam)
         more = 0.0 if self.outside is None else self.outside.control_stiffness(x, v, lam)
+        more += self.tethers.second(q, lam)
         if self.contact_blocks is not None:
             more += self.touch_stiffness(x, v, lam)
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more

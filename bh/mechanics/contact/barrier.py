@@ -299,6 +299,16 @@ class SheetBarrier:
                 return 1.0
         return part
 
+    def first_meetings(self, x: Array) -> str:
+        """What is wrong with a first state x (n, 3), mm: it meets itself, or parts of it are nearer than the offset."""
+        near = self.offset > 0.0 and not ipctk.has_intersections(self._mesh, x)
+        what = (
+            f"parts of the first state are nearer than {self.offset:.4g} mm"
+            if near
+            else "the first state meets itself"
+        )
+        return f"{what} ({self.meetings(x)})"
+
     def meetings(self, x: Array, most: int = NAMED) -> str:
         """What intersects or lies within the offset at x, in words: the first `most` pairs, by their nodes.
 

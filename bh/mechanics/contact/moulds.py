@@ -91,7 +91,12 @@ class MouldBarrier(SheetBarrier):
         return {mould.name: part.sum(axis=0) for mould, part in zip(self.moulds, parts, strict=True)}
 
     def coefficient(self, nodes: Sequence[int], mu: float) -> float:
-        """Of friction between some nodes, where it is mu in general; a mould may have one of its own."""
+        """Of friction between some nodes; a mould may have one of its own.
+
+        Args:
+            nodes: of the sheet and of moulds.
+            mu: where no mould says another one.
+        """
         number = int(np.searchsorted(self._first, max(nodes), side="right")) - 1
         own = self.moulds[number].friction
         return mu if own is None else own

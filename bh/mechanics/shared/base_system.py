@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
+from bh.loading.tethers import NONE, Tethers, tethers
 from bh.mechanics.shared import penetration as hinge_penetration
 from bh.mechanics.shared.crease_curves import CreaseCurves
 from bh.mechanics.shared.displacements import Displacements
@@ -20,7 +21,6 @@ from bh.mechanics.shared.pressing import PressedSheet
 from bh.model.constraints import MOTIONS, TURNED, rigid_motions
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.model import Model
-from bh.model.ramp import Ramp
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix
 from bh.solvers.hinged import Stops
@@ -44,6 +44,7 @@ class SupportedSheet(PressedSheet):
 
     size: int
     curves: CreaseCurves | None = None  # None where all creases are straight lines
+    tethers: Tethers  # in the place of supports that the step lets go of
 
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
@@ -69,14 +70,12 @@ class SupportedSheet(PressedSheet):
             from bh.mechanics.shared.mirrored import MirroredDisplacements
 
             self.displacements = MirroredDisplacements(self.mesh, load_step.constraints, start_points, plane)
-        if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
-            let_go = start.reactions - self.displacements.reactions(start.reactions)
-            self.force = Ramp(self.force.start + let_go, self.force.end)
+        self.tethers = NONE
         if not load_step.bodies:
             self.displacements.bring_home()
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
-        if self.constraints.rigid_body and (start is None or not load_step.releases):
+        if self.constraints.rigid_body:
             self.displacements.check_balance(self.force)
         if model.stops_itself and plane is not None:
             raise ModelError("contact is solved on the whole sheet; leave out symmetry, or contact")
@@ -87,6 +86,14 @@ class SupportedSheet(PressedSheet):
                 "a pressure pushes a sheet that nothing holds as a whole; add supports or springs"
             )
         self.begin_contact(model, load_step, start, start_points)
+
+    def _let_go(self, start: State | None, begin: Array, couples: Array | None = None) -> None:
+        """Tethers for what the step lets go of, from unknowns `begin` on, and for `couples` (rotations,) of clamps."""
+        if self.load_step.releases and start is not None:
+            exerted = start.reactions - self.displacements.reactions(start.reactions)
+            pull = self.displacements.components(exerted)
+            pull = pull if couples is None else np.concatenate((pull, couples))
+            self.tethers = tethers(begin, pull, self.moving, self.mesh.areas)
 
     @property
     def conservative(self) -> bool:
@@ -137,7 +144,12 @@ class SupportedSheet(PressedSheet):
         return np.vstack((turned, self.friction.history_at(self.near(q, lam), lam)))
 
     def crease_history_at(self, q: Array, lam: float) -> Array:
-        """(m, 2) the part of it that is of creases."""
+        """(m, 2) the part of it that is of creases.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         raise NotImplementedError
 
     def remember(self, history: Array) -> None:

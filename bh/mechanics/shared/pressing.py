@@ -47,7 +47,12 @@ class PressedSheet:
     _kept: Array = np.zeros((0, 2))  # what friction remembers
 
     def near(self, q: Array, lam: float) -> Array:
-        """(n, 3) positions, mm, of unknowns q (size,)."""
+        """(n, 3) positions of the nodes, mm.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         raise NotImplementedError
 
     def begin_contact(self, model: Model, load_step: LoadStep, start: State | None, x: Array) -> None:
@@ -110,9 +115,8 @@ class PressedSheet:
         if self.barrier is not None and not self.barrier.begin(
             x + (self.displacements.home - self.displacements.reference)
         ):
-            met = self.barrier.meetings(x)
             raise ModelError(
-                f"contact: the first state meets itself ({met}); begin with panels apart (layers of a folded form: "
+                f"contact: {self.barrier.first_meetings(x)}; begin with panels apart (layers of a folded form: "
                 "untangle = true)"
             )
 
