@@ -36,6 +36,14 @@ class CreaseMemory:
         if self.creases.laws is not None:
             self.creases.laws.history = history
 
+    def takes(self, history: Array) -> bool:
+        """Can a history (k, 2) from a file be one of this system?
+
+        Args:
+            history: that is asked about.
+        """
+        return history.shape == self.history.shape
+
     def history_at(self, q: Array, lam: float) -> Array:
         """(m p, 2) what creases remember where this state is accepted.
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.formulations.state import State
+from bh.loading.load_step import crease_hinges
 from bh.paths.path import Path
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -105,6 +106,30 @@ class Contact:
         shown = "; ".join(f"{a} and {b}" if a != b else f"{a} and itself" for a, b in self.panels[:3])
         more = f"; and {len(self.panels) - 3} more pairs" if len(self.panels) > 3 else ""
         return f"state {self.state} (step {self.step}, lambda {self.lam:.4g}), {shown}{more}"
+
+
+def least_angle(mesh: SheetMesh, crease: str, t: float) -> Array:
+    """How far a crease closes where panels stop each other by their thickness: angle between its triangles, rad.
+
+    It is 2 asin(t / (2 h)) with h the height of the triangles beside it, the width of the panels where they have one
+    row of cells: there their corners come to rest t apart. A panel of several rows bends beyond and lies on the other
+    one. Without that (`contact=False`, or a gap in its place) a hinge stops within its lock, the last 2 degrees
+    (`Model.hinge_lock`), at an angle that depends on what closes it.
+
+    Args:
+        mesh: of the sheet.
+        crease: its name.
+        t: thickness, mm.
+
+    Returns:
+        (edges,) in order along the crease; pi where triangles are no wider than half the thickness.
+    """
+    topology = mesh.topology
+    hinges = crease_hinges(mesh, crease)
+    ends = mesh.points[topology.hinges[hinges, 1:3]]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    areas = mesh.areas[topology.edge_triangles[topology.hinge_edges[hinges]]].min(axis=1)
+    return np.asarray(2.0 * np.arcsin(np.minimum(1.0, 0.5 * t * lengths / (2.0 * areas))))
 
 
 def self_contact(state: State) -> Ints:
