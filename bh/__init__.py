@@ -34,8 +34,9 @@ if TYPE_CHECKING:
     from bh.model.hinge_laws import Bilinear, ElasticPlastic, HingeLaw, MomentTable, Softening
     from bh.model.imperfection import RandomField, imperfect
     from bh.model.laminate import laminate
-    from bh.model.loads import AreaForce, EdgeMoment, LineForce, Pressure
+    from bh.model.loads import AreaForce, Couple, EdgeMoment, LineForce, Pressure
     from bh.model.model import Model
+    from bh.model.mould import Mould
     from bh.model.pinch import Pinch
     from bh.model.refinement import Goal, Refinement
     from bh.model.sheet import ElementStiffness, Sheet
@@ -73,13 +74,14 @@ _NAMES = {
     "bh.model.growth": "Expand",
     "bh.model.hinge_laws": "Bilinear ElasticPlastic HingeLaw MomentTable Softening",
     "bh.model.imperfection": "RandomField imperfect",
-    "bh.model.loads": "AreaForce EdgeMoment LineForce Pressure",
+    "bh.model.loads": "AreaForce Couple EdgeMoment LineForce Pressure",
     "bh.model.laminate": "laminate",
     "bh.model.model": "Model",
     "bh.model.pinch": "Pinch",
     "bh.model.refinement": "Goal Refinement",
     "bh.model.sheet": "ElementStiffness Sheet",
     "bh.model.springs": "GroundSpring",
+    "bh.model.mould": "Mould",
     "bh.model.step": "Actuation Body Step StepBuilder Zone",
     "bh.model.supports": "Constraint Hold RigidBody Support",
     "bh.model.until": "Until depth",
@@ -129,6 +131,7 @@ __all__ = [
     "Body",
     "Calibration",
     "Constraint",
+    "Couple",
     "CreaseLaw",
     "Displace",
     "DisplacementControl",
@@ -153,6 +156,7 @@ __all__ = [
     "ModelError",
     "Moment",
     "MomentTable",
+    "Mould",
     "Newton",
     "NotReachedError",
     "NotReachedWarning",

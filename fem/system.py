@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
+from bh.loading.tethers import NONE, tethers
 from bh.model.constraints import TURNED, UNBALANCED
 from bh.model.model import Model
 from bh.model.ramp import Ramp
@@ -89,13 +90,15 @@ class ShellSystem(StoppedShell, CreaseMemory):
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
         self.hinder(model, x)
-        if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
-            pull, free = self.gradient(self.at(self.start(), 0.0)), self.components.free
-            carried = np.zeros(len(pull))
-            carried[free] = pull[free]
-            self.load, self._here = Ramp(self.load.start + carried, self.load.end), None
-        elif self.constraints.rigid_body:
-            self._check_balance()
+        self.tethers = NONE
+        if load_step.releases and start is not None:
+            pull = self.gradient(self.at(self.start(), 0.0))[self.components.free]
+            moving = np.searchsorted(self.components.free, self.components.first_alpha)
+            self.tethers = tethers(self.start(), pull, int(moving), mesh.sheet.areas)
+        elif self.constraints.rigid_body and any(
+            self._unbalanced(self.start(), lam) > 1e-9 for lam in (0.0, 1.0)
+        ):
+            raise ModelError(UNBALANCED)
 
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
@@ -234,8 +237,9 @@ class ShellSystem(StoppedShell, CreaseMemory):
         energy = here.energy + float(self.creases.energy(beta, lam).sum())
         energy += self.creases.load_energy(beta, lam)
         energy -= float(self.load.at(lam) @ here.components)
-        energy += here.contact + (0.0 if self.outside is None else self.outside.energy(here.x, lam))
         residual = self.gradient(here)[self.components.free]
+        energy += here.contact + (0.0 if self.outside is None else self.outside.energy(here.x, lam))
+        energy += self.tethers.push(q, lam, residual)
         return Evaluation(energy, residual, self._imbalance(residual, here), here.forces.ravel())
 
     def _imbalance(self, residual: Array, here: Here) -> float:
@@ -244,9 +248,8 @@ class ShellSystem(StoppedShell, CreaseMemory):
         Positions are rounded to eps |x|, which membrane and bending stiffness turn into forces that nobody can balance.
         """
         moves = self.components.free < self.components.first_alpha
-        eps = ROUNDING * float(np.abs(here.x).max())
         load = self.load.at(here.lam)
-        floors = [eps * stiffest for stiffest in self._flat_stiffness[1:]]
+        floors = [ROUNDING * float(np.abs(here.x).max()) * each for each in self._flat_stiffness[1:]]
         couples = self.creases.largest(self.components.beta(here.components), here.lam)
         first, width = self.components.first_alpha, self.elements.moves
         acting = float(np.abs(load[:first]).max())
@@ -296,6 +299,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
         if len(self.creases):
             tangents = self.creases.tangents(self.components.beta(here.components), here.lam)
             np.add.at(data, self._springs.places, tangents[tuple(self._springs.which)])
+        self.tethers.stiffen(here.lam, data, pattern)
         if not self.constraints.rigid_body:
             matrix = pattern.matrix(data)
             if self.outside is None or self.conservative:
@@ -326,13 +330,14 @@ class ShellSystem(StoppedShell, CreaseMemory):
             out -= self.components.spread(
                 np.einsum("tkj,tk->tj", here.B, self.elements.forces(*self.rest.rate))
             )
-        return out[self.components.free]
+        return self.tethers.rates(q, lam, out[self.components.free])
 
     def power(self, q: Array, lam: float) -> float:
         """Derivative of the potential by lambda at fixed q, N mm."""
         here = self.at(q, lam)
         total = float(self.gradient(here) @ self.components.rate) - float(self.load.rate @ here.components)
         total += 0.0 if self.outside is None else self.outside.power(here.x)
+        total += self.tethers.power(q, lam)
         if self.rest is not None:
             total -= float(np.vdot(here.forces, np.hstack(self.rest.rate)))
         return total + self.creases.power(self.components.beta(here.components), lam)
@@ -341,7 +346,8 @@ class ShellSystem(StoppedShell, CreaseMemory):
         """Second derivative of the potential by lambda at fixed q, N mm."""
         c = self.creases
         here = self.at(q, lam)
-        total = float(self._times(here, self.components.rate) @ self.components.rate)
+        total = self.tethers.second(q, lam)
+        total += float(self._times(here, self.components.rate) @ self.components.rate)
         if self.outside is not None:
             moves = self.components.moves(self.components.rate)
             total -= 2.0 * float(np.vdot(self.outside.push_rate(here.x), moves))
@@ -440,8 +446,3 @@ class ShellSystem(StoppedShell, CreaseMemory):
         rigid = free_rigid_motions(self.components, self.elements, self.frames, x)
         work = rigid.T @ load if load.any() else load
         return float(np.abs(work).max(initial=0.0)) / max(float(np.abs(load).sum()), 1e-300)
-
-    def _check_balance(self) -> None:
-        for lam in (0.0, 1.0):
-            if self._unbalanced(self.start(), lam) > 1e-9:
-                raise ModelError(UNBALANCED)

@@ -22,7 +22,7 @@ from bh.applications.inverse.problems import CURVES, Design
 from bh.applications.inverse.reach import Library, Reach, size_of
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.simulate import Landing, Simulated
-from bh.applications.inverse.tolerances import Spreads, Tolerance, predicted
+from bh.applications.inverse.tolerances import Region, Spreads, Tolerance, predicted, region
 from bh.applications.inverse.wants import Wants
 from bh.errors import InputError
 from bh.paths.provenance import versions
@@ -139,6 +139,13 @@ class Answer:
         if not self.surrogate.has_variants:
             return None
         return predicted(self.surrogate, k0, length, on, SPREADS).one()
+
+    @property
+    def region(self) -> Region | None:
+        """The ellipsoid that the ends of most strips are in; None where the model does not know."""
+        if not self.surrogate.has_variants:
+            return None
+        return region(self.surrogate, self.design, SPREADS, PROBABILITY)
 
     @property
     def strip(self) -> Simulated:
@@ -308,7 +315,7 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
         answer.strip.path.save(files[2])
         with replacing(files[3]) as draft:
             picture(answer).savefig(draft, format="png", dpi=110, metadata={"Software": None})
-        tolerance = answer.tolerance
+        tolerance, where = answer.tolerance, answer.region
         about = {
             "segments": answer.design.rows(),
             "total_length_mm": answer.design.total,
@@ -318,7 +325,7 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
             "measures": {
                 name: {"value": value, "unit": unit} for name, (value, unit) in answer.measure.items()
             },
-            "tolerance": None if tolerance is None else _spread(tolerance),
+            "tolerance": None if tolerance is None or where is None else _spread(tolerance, where),
             "data": data,
             "versions": versions(),
         }
@@ -331,26 +338,25 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
     return files
 
 
-def _spread(tolerance: Tolerance) -> dict[str, object]:
+def _spread(tolerance: Tolerance, where: Region) -> dict[str, object]:
     """Spreads, movements and the ellipsoid as plain data."""
-    size, directions = tolerance.axes(PROBABILITY)
     return {
         "spreads": asdict(SPREADS),
         "moves_mm": {name: move.tolist() for name, move in tolerance.moves.items()},
         "probability": PROBABILITY,
-        "semi_axes_mm": size.tolist(),
-        "directions": directions.T.tolist(),
+        "middle_mm": where.middle.tolist(),
+        "semi_axes_mm": where.axes.tolist(),
+        "directions": where.directions.T.tolist(),
     }
 
 
-def _told(tolerance: Tolerance | None) -> str:
+def _told(tolerance: Tolerance | None, where: Region | None) -> str:
     """One line on how the end moves."""
-    if tolerance is None:
+    if tolerance is None or where is None:
         return "tolerances: not known to this model"
-    size = tolerance.axes(PROBABILITY)[0]
     by = sorted(((float(np.linalg.norm(move)), name) for name, move in tolerance.moves.items()), reverse=True)
     most = ", ".join(f"{name} {moved:.2g}" for moved, name in by[:3])
-    axes = " x ".join(f"{axis:.2g}" for axis in size)
+    axes = " x ".join(f"{axis:.2g}" for axis in where.axes)
     return (
         f"{PROBABILITY:.0%} of strips end in an ellipsoid of semi-axes {axes} mm; by one spread of {most} mm"
     )
@@ -426,7 +432,7 @@ def design(
             say(f"segment: k0 {row['k0']:+.6f} /mm, length {row['length']:.2f} mm, {state}")
         for name, (value, unit) in answer.measure.items():
             say(f"{name}: {value:.4g} {unit}")
-        say(_told(answer.tolerance))
+        say(_told(answer.tolerance, answer.region))
         turn = math.degrees(float(np.abs(answer.design.k0 * answer.design.length).sum()))
         say(f"total length {answer.design.total:.1f} mm, the flat crease turns by {turn:.0f} degrees in all")
         say("files: " + " ".join(str(file) for file in files))

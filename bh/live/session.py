@@ -31,6 +31,7 @@ from meshes import SheetMesh
 from meshes.mesh import count
 
 Array = NDArray[np.float64]
+REMEMBERED = 1000  # states at rest that `undo` can go back to
 GRIP = 200.0  # stiffness of a grip in parts of D / L^2, of a panel as large as the sheet: it gives way, yet leads
 JAWS = (
     10.0  # stiffness of the spring of a jaw in parts of that of a grip: the gap is nearly that of the nodes
@@ -55,24 +56,27 @@ class Session:
     rigid motions and nothing else.
     """
 
-    def __init__(self, model: Model, settings: LoadControl | None = None) -> None:
+    def __init__(self, model: Model, settings: LoadControl | None = None, settles: bool = False) -> None:
         """Begin flat and at rest.
 
         Args:
             model: sheet, supports and creases.
             settings: increments and tolerances; None for the driver's own.
+            settles: it is a net of springs: where a branch ends it moves downhill to rest, as `bh.Settling` does.
 
         Raises:
             ModelError: the sheet cannot be solved as described.
         """
-        if any(crease.law is not None and crease.law.remembers for crease in model.creases.values()):
-            raise ModelError("creases that yield remember their way; fold them by bh.trace or bh run")
+        if model.remembers:
+            what = "friction remembers its" if model.rubs else "creases that yield remember their"
+            raise ModelError(f"{what} way; fold the sheet by bh.trace or bh run")
         self.model = replace(model if model.supports else held(model), steps=())
         self._free = (
             held(replace(self.model, supports=())).supports == self.model.supports
         )  # but for its middle
         self._floating = Floating()
         self._settings = settings or LoadControl()
+        self._settles = settles
         self._formulation = formulation(self.model.formulation)
         names = [name for name in self.mesh.creases if self.mesh.folds.get(name) != "flat"]
         self._wanted = Controls(dict.fromkeys(chains(self.mesh, names), 0.0))
@@ -235,6 +239,7 @@ class Session:
             frame = self._frame(snapped, time.perf_counter() - began)
         if frame.at_rest and (not self._past or self._past[-1] != self._wanted):
             self._past.append(self._wanted)
+            del self._past[:-REMEMBERED]
         return frame
 
     def rest(self, most: float = 60.0) -> Frame:
@@ -360,7 +365,7 @@ class Session:
         load = self._builder.build(Step(items))
         system = self._formulation.system(self.model, load, state)
         q = system.start()
-        march = March(system, [point(system, q, 0.0)], 0.0, self._settings)
+        march = March(system, [point(system, q, 0.0)], 0.0, self._settings, self._settles)
         under = _Under(way, load, system, march)
         if load.force.start.any():
             march.target = 1.0

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.model.step import Actuation, StepBuilder
+from bh.model.supports import select
 from meshes import SheetMesh
 from meshes.quantities import Typed, take_units
 from meshes.topology import Ints
@@ -192,6 +193,70 @@ class EdgeMoment(Actuation):
                 f"edge moment at '{self.at}': it lies inside the sheet; use an edge of the boundary, or moment"
             )
         builder.turn(edges, self.to)
+
+
+@dataclass(frozen=True)
+class Couple(Actuation):
+    """A dead couple about any axis on the nodes of a place, made of forces that do not turn with the sheet.
+
+    Node i at r_i of the flat sheet, s_i from the middle of the place, has the force w x s_i with w such that the forces
+    have the moment and no resultant; of all such forces they are the smallest. They keep their directions: where the
+    place turns by a small angle their moment is the one asked for, beyond it changes as the arms between them do.
+
+    Attributes:
+        at: name of a place, or node indices; two nodes or more that do not lie on one line along the axis.
+        total: (3,) moment about the directions of x, y and z at the end of the step, N mm, right-handed.
+    """
+
+    at: str | Sequence[int]
+    total: Sequence[float]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, at: str | Sequence[int], total: Sequence[Typed]) -> None:
+            """See the class."""
+
+    def __post_init__(self) -> None:
+        """Refuse values that cannot be.
+
+        Raises:
+            ModelError: one line that names the value and what to give.
+        """
+        what = f"couple at '{self.at}'"
+        if isinstance(self.total, list | tuple):
+            take_units(self, what, total="energy")
+        _vector(f"{what}: total", self.total, "N mm")
+        _keep(self, "total")
+        if not isinstance(self.at, str):
+            _keep(self, "at")
+
+    @property
+    def key(self) -> str:
+        """By what it is replaced: another one at this place."""
+        return f"couple:{self.at}"
+
+    def apply(self, builder: StepBuilder) -> None:
+        """Ask for the forces.
+
+        Raises:
+            ModelError: the place is one node, or a line along the axis.
+        """
+        mesh = builder.mesh
+        nodes = select(mesh, self.at)
+        arms = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
+        moment = np.asarray(self.total, dtype=float)
+        inertia = float((arms**2).sum()) * np.eye(3) - arms.T @ arms
+        turn = np.linalg.pinv(inertia, rcond=1e-9, hermitian=True) @ moment
+        if not np.allclose(
+            inertia @ turn, moment, rtol=0.0, atol=1e-9 * max(float(np.abs(moment).max()), 1e-300)
+        ):
+            raise ModelError(
+                f"couple at '{self.at}': forces on nodes of one line have no moment about it; give more nodes, or "
+                "edge_moment"
+            )
+        force = np.zeros_like(mesh.points)
+        force[nodes] = np.cross(turn, arms)
+        builder.bear(force, self.key)
 
 
 def edges_at(mesh: SheetMesh, at: str, what: str) -> Ints:

@@ -22,6 +22,7 @@ from bh.scene.reading import (
     Place,
     Pressing,
     Table,
+    Turning,
     arguments,
     as_tables,
     read_table,
@@ -73,6 +74,15 @@ class EdgeMomentTable(Table):
     )
 
 
+class CoupleTable(Table):
+    """Keys of `bh.Couple`."""
+
+    at: Place = Field(description=PLACE)
+    total: Turning = Field(
+        description=VECTOR + " in N mm, a moment about the directions of the axes, right-handed"
+    )
+
+
 class SpringTable(Table):
     """Keys of `bh.GroundSpring`."""
 
@@ -89,6 +99,7 @@ LOADS: dict[str, type[Table]] = {
     "line_force": LineForceTable,
     "area_force": AreaForceTable,
     "edge_moment": EdgeMomentTable,
+    "couple": CoupleTable,
 }
 
 

@@ -77,6 +77,7 @@ SectorAngle = Annotated[float, _SECTOR, spelled("angle", _SECTOR)]
 PinchAngle = Annotated[float, _PINCHED, spelled("angle", _PINCHED)]
 Spot = Annotated[list[Distance], Field(min_length=3, max_length=3)]
 Push = Annotated[list[Annotated[float, _ANY, spelled("force", _ANY)]], Field(min_length=3, max_length=3)]
+Turning = Annotated[list[Annotated[float, _ANY, spelled("energy", _ANY)]], Field(min_length=3, max_length=3)]
 Pressing = Annotated[float, _ANY, spelled("pressure", _ANY)]
 PerArea = Annotated[list[Pressing], Field(min_length=3, max_length=3)]
 PerLength = Annotated[

@@ -136,6 +136,8 @@ def described(
         "material": {"name": material, "E": model.sheet.E, "nu": model.sheet.nu, "t": model.sheet.t},
         "materials": {name: about for name, (_, _, _, about) in MATERIALS.items()},
         "library": list(LIBRARY),
+        "values": dict(sheet.values),
+        "springs": {name: law.Lstar for name, law in model.creases.items()},
         "formats": list(FORMATS),
         "formulation": model.formulation,
         "unknowns": session.size,

@@ -18,6 +18,7 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from bh.errors import InputError
+from bh.runtime.memory import give_back
 from bh.runtime.terminal import say
 from bh.studio.desk import Desk
 from bh.studio.messages import read
@@ -175,6 +176,7 @@ class Window(tornado.websocket.WebSocketHandler):
             if task is not None:
                 task.cancel()
         self.desk = None
+        give_back()
 
     async def _work(self) -> None:
         run = asyncio.get_running_loop().run_in_executor
@@ -198,6 +200,8 @@ class Window(tornado.websocket.WebSocketHandler):
             if desk.busy:
                 try:
                     await run(self.studio.pool, desk.work)
+                    for answer in desk.news():
+                        await self._say(answer)
                     if desk.busy and not self.drawn.is_set():
                         continue  # it is solved as fast as it goes, and shown as fast as the browser draws
                     await self.drawn.wait()

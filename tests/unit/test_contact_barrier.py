@@ -15,7 +15,8 @@ import meshes
 from bh.errors import ModelError
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
-from bh.mechanics.contact.barrier import ContactBlocks, SheetBarrier, sheet_barrier
+from bh.mechanics.contact.barrier import SheetBarrier, sheet_barrier
+from bh.mechanics.contact.blocks import ContactBlocks
 from bh.model.serialise import describe, fingerprint, rebuild
 
 Array = NDArray[Any]

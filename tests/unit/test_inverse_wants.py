@@ -178,6 +178,8 @@ def test_directions_as_residuals() -> None:
         ({"stops": [(1.0, (1.0, 2.0, 3.0))]}, "0 < part < 1"),
         ({"keep_out": [[0.0, 0.0, 0.0, 1.0, 1.0, 0.0]]}, "no room"),
         ({"keep_out": [[0.0, 1.0]]}, "six numbers"),
+        ({"keep_out": [[-5.0, -5.0, -5.0, 5.0, 5.0, 5.0]]}, "the start of the crease .* lies in a box"),
+        ({"keep_out": [[90.0, 40.0, -5.0, 110.0, 60.0, 5.0]]}, r"the target \(100, 50, 0\) lies in a box"),
     ],
 )
 def test_bad_wants(more: dict[str, object], told: str) -> None:
@@ -189,7 +191,7 @@ def test_boxes_are_kept_out_of() -> None:
     """A box on the strip, also between its nodes, and one beside it."""
     end = converged().forward(K0, LENGTH, ON)[0][-1]
     around = np.array([end - 4.0, end + 4.0])
-    assert not Wants.of(end, keep_out=[around]).free(DESIGN, converged())
+    assert not Wants.of((0.0, 0.0, 90.0), keep_out=[around]).free(DESIGN, converged())
     assert Wants.of(end, keep_out=[around + 40.0]).free(DESIGN, converged())
     before = converged().unpinched(K0, LENGTH)[0][-1]  # and where the end is before the pinch
     assert not Wants.of(end, keep_out=[[before - 4.0, before + 4.0]]).free(DESIGN, converged())
@@ -292,8 +294,8 @@ def test_a_zone_is_no_longer_than_its_segment() -> None:
         (Wants.of((0.0, 0.0, 50.0)), r"the nearest ends \d+(\.\d+)? mm away"),
         (Wants.of((100.0, 60.0, -3.0), tangent=(-1.0, 0.0, 0.0)), r"mm away, \d+(\.\d+)? degrees off"),
         (
-            Wants.of((100.0, 60.0, -3.0), keep_out=[[-5.0, -5.0, -5.0, 5.0, 5.0, 5.0]]),
-            "stays out of the boxes",
+            Wants.of((100.0, 60.0, -3.0), keep_out=[[2.0, -30.0, -30.0, 20.0, 30.0, 30.0]]),
+            "no strip that was looked at stays out of them",
         ),
     ],
 )

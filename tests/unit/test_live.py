@@ -17,6 +17,8 @@ from bh.formulations.registry import formulation
 from bh.live import Controls, Grip, Session
 from bh.live.controls import CLOSED, Way
 from bh.loading.builder import load_steps
+from bh.solvers.load_control import LoadControl
+from bh.solvers.newton import Newton
 
 CARD = bh.Sheet(E=4000.0, nu=0.3, t=0.2)
 angles = st.floats(-3.0, 3.0).map(lambda a: round(a, 6))
@@ -238,6 +240,20 @@ def test_a_snap_is_told() -> None:
         told.append(frame.snapped)
         assert frame.at_rest
     assert frame.points[node, 2] < 0.0  # it followed to the other side
+
+
+def test_where_a_branch_ends_it_moves_downhill_to_rest() -> None:
+    """Newton's method is taken away: the motion alone arrives, at the shape of a run from flat, and tells the snap."""
+    model = pleats()
+    for crease in model.mesh.creases:
+        model = model.crease(crease, Lstar=10.0)
+    session = Session(model, LoadControl(newton=Newton(full=1, globalised=1)))
+    session.fold("all", 0.6)
+    frame = session.rest()
+    assert frame.at_rest
+    assert frame.snapped
+    assert session.imbalance() < 1e-6
+    np.testing.assert_allclose(frame.points, bh.trace(session.scene())[-1].points, atol=1e-4)
 
 
 def test_what_cannot_be_asked_is_named() -> None:

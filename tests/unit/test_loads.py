@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +13,23 @@ from numpy.typing import NDArray
 
 import bh
 import meshes
-from bh import AreaForce, EdgeMoment, GroundSpring, LineForce, Model, ModelError, Pressure, SceneError, Sheet
+from bh import (
+    AreaForce,
+    Couple,
+    EdgeMoment,
+    GroundSpring,
+    LineForce,
+    Model,
+    ModelError,
+    Pressure,
+    SceneError,
+    Sheet,
+)
 from bh.formulations.protocols import SheetSystem
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
 from bh.mechanics.shared import outside
+from bh.model.serialise import describe, rebuild
 from bh.scene.load import parse_scene
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix, conservative
@@ -218,6 +231,47 @@ at = "edge:end"
 """
 
 
+@pytest.mark.parametrize(("formulation", "along", "rows"), [("consistent", 24, 4), ("shell", 12, 2)])
+def test_couple_about_an_axis(formulation: str, along: int, rows: int) -> None:
+    """A clamped strip twists by M L / (G J) (1 - tanh(a L) / (a L)), a b = (24 (1 - nu))^(1/2) (Reissner 1952)."""
+    kind: Any = "staggered" if formulation == "consistent" else "mirrored"
+    mesh = meshes.structured(meshes.strip(60.0, 10.0), along=along, rows=rows, kind=kind)
+    model = Model(mesh, Sheet(E=4000.0, nu=0.3, t=0.2), formulation=formulation)
+    model = model.support("edge:start", "xyz", clamp=True)
+    end = mesh.nodes("edge:end")
+    y = mesh.points[end, 1] - 5.0
+    state = bh.trace(model.step(Couple("edge:end", (1e-4, 0.0, 0.0))))[-1]
+    twist = float(y @ state.displacement("edge:end")[:, 2] / (y @ y))
+    a = math.sqrt(24.0 * 0.7) / 10.0 * 60.0
+    held = 1.0 - math.tanh(a) / a
+    assert twist == pytest.approx(1e-4 * 60.0 * held / (4000.0 / 2.6 * 10.0 * 0.2**3 / 3.0), rel=0.015)
+    assert np.abs(state.reaction()).max() < 1e-8
+    state = bh.trace(model.step(Couple("edge:end", (0.0, 0.0, 0.01))))[-1]
+    aside = float(state.displacement("near:45,5")[:, 1].mean())
+    assert aside == pytest.approx(0.01 * 45.0**2 / 2.0 / (4000.0 * 0.2 * 10.0**3 / 12.0), rel=0.02)
+    with pytest.raises(ModelError, match="nodes of one line"):
+        bh.trace(model.step(Couple("edge:end", (0.0, 1.0, 0.0))))
+
+
+def test_couples_add_and_are_replaced() -> None:
+    """Its forces have no resultant, whatever the nodes; another one at the place takes its turn, and files keep it."""
+    mesh = meshes.structured(meshes.strip(30.0, 20.0), along=6, rows=4)
+    nodes = [0, 3, 7, 11, 20]
+    asked = Couple(nodes, ("2 N mm", -1.0, "0.5mJ"))
+    assert asked.total == (2.0, -1.0, 0.5)
+    model = Model(mesh, Sheet(E=4000.0, nu=0.3, t=0.2)).support("edge:start", "xyz", clamp=True).step(asked)
+    model = model.step(Couple("edge:end", (0.0, 0.0, 3.0))).step(Couple(nodes, (0.0, 0.0, 0.0)))
+    first, second, third = (step.force.end for step in load_steps(model))
+    for force, moment in (
+        (first, [2.0, -1.0, 0.5]),
+        (second, [2.0, -1.0, 3.5]),
+        (third, [0.0, 0.0, 3.0]),
+    ):
+        np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12)
+        np.testing.assert_allclose(np.cross(mesh.points, force).sum(axis=0), moment, atol=1e-12)
+    assert rebuild(*describe(model)).steps == model.steps
+
+
 def test_scenes() -> None:
     text = SCENE.format(
         spring="total = [0.1, 0.2, 0.3]",
@@ -228,12 +282,14 @@ def test_scenes() -> None:
     assert model.steps[0].actuations == (Pressure(0.002),)
     loads = """line_force = { at = "edge:end", per_length = ["1 N/m", 0.0, 0.0] }
 area_force = { per_area = [0.0, 0.0, 0.1], triangles = [3, 1] }
-edge_moment = { at = "edge:end", to = 0.5 }"""
+edge_moment = { at = "edge:end", to = 0.5 }
+couple = { at = "edge:end", total = ["2 N mm", 0.0, 0.0] }"""
     found = parse_scene(SCENE.format(spring="each = [0.1, 0.2, 0.3]", load=loads)).model.steps[0].actuations
     assert found == (
         LineForce("edge:end", (0.001, 0.0, 0.0)),
         AreaForce((0.0, 0.0, 0.1), (3, 1)),
         EdgeMoment("edge:end", 0.5),
+        Couple("edge:end", (2.0, 0.0, 0.0)),
     )
 
 
@@ -250,6 +306,17 @@ edge_moment = { at = "edge:end", to = 0.5 }"""
             ["rim", "edge:end"],
         ),
         ("each = [1.0, 1.0, 1.0]", 'edge_moment = { at = "crease:crease", to = 1.0 }', ["inside the sheet"]),
+        (
+            "each = [1.0, 1.0, 1.0]",
+            'couple = { at = "rim", total = [0, 0, 1] }',
+            ["steps[0].couple.at", "rim"],
+        ),
+        ("each = [1.0, 1.0, 1.0]", 'couple = { at = "node:1", total = [0, 0, 1] }', ["one line"]),
+        (
+            "each = [1.0, 1.0, 1.0]",
+            'couple = { at = "all", total = [0, "3mm", 1] }',
+            ["couple.total", "N mm"],
+        ),
         ("each = [0.0, 0.0, 0.0]", "pressure = { p = 1.0 }", ["rotation about y", "free"]),
     ],
 )

@@ -11,6 +11,7 @@ import pytest
 
 import bh
 import meshes
+from bh.errors import InputError
 from reports.records import Case, CaseInfo, Check
 from reports.sheet_map import sheet_map
 from verification.framework.checks import CaseResult
@@ -102,3 +103,13 @@ def test_the_stress_that_is_compared_is_what_five_percent_of_the_area_exceed() -
     strain = 0.001 * (1.0 + 0.0005)  # Green's
     assert high_stress(bh.trace(model)[-1]) == pytest.approx(1000.0 * strain, rel=1e-6)
     assert math.isnan(high_stress(bh.trace(replace(model, formulation="bars-and-hinges"))[-1]))
+
+
+def test_kinds_may_be_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BH_MAP", "network, closed ring")
+    assert case.wanted(("twisted",)) == ["network", "closed ring"]
+    monkeypatch.setenv("BH_MAP", "")
+    assert case.wanted(("twisted",)) == ["twisted"]
+    monkeypatch.setenv("BH_MAP", "networks")
+    with pytest.raises(InputError, match="there is no kind 'networks'; give some of narrow ring"):
+        case.wanted(("twisted",))

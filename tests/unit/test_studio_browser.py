@@ -175,6 +175,41 @@ def test_two_points_are_pinched_by_a_stroke_a_jaw_and_a_slider(window: Visit) ->
     assert window.told == []
 
 
+def test_a_recording_is_played_and_saved_as_a_film_and_a_picture(window: Visit, tmp_path: Path) -> None:
+    page, image = window.page, pytest.importorskip("PIL.Image")
+    page.locator("#record").click()
+    for value in (10, 20, 30):
+        page.locator("#percent").fill(str(value))
+        window.rests(f"Math.abs(Object.values(head.asked)[0] - {0.01 * value} * Math.PI) < 0.01")
+    page.locator("#record").click()
+    page.locator("#percent").fill("5")
+    window.rests("Object.values(head.asked)[0] < 0.2")
+    for what, frames in (("film", 3), ("picture", 1)):
+        with page.expect_download() as waiting:
+            page.locator("#export").select_option(what)
+        file = tmp_path / waiting.value.suggested_filename
+        waiting.value.save_as(file)
+        with image.open(file) as found:
+            assert getattr(found, "n_frames", 1) >= frames
+            colours = found.convert("RGB").getcolors(10**6)
+            assert len(colours) > 50  # the sheet is on it
+    window.rests("Object.values(head.asked)[0] > 0.9")
+    assert window.told == []
+
+
+def test_numbers_of_a_pattern_and_springs_of_creases(window: Visit) -> None:
+    page = window.page
+    page.locator("#values input[data-key=width]").fill("35")
+    page.locator("#values input[data-key=width]").press("Enter")
+    page.wait_for_function("studio.sheet.values.width === 35")
+    page.locator("#percent").fill("30")
+    page.locator("#each summary").click()
+    page.locator("#Lstar").fill("10")
+    page.locator("#spring").click()
+    page.wait_for_function("studio.sheet.springs.crease === 10")
+    window.rests("head.folds.crease > 0.5 && head.folds.crease < 0.999 * head.asked.crease")
+
+
 def test_who_has_no_pointer_pulls_and_pinches_by_numbers(window: Visit) -> None:
     page = window.page
     page.get_by_text("Pull or pinch by numbers").first.click()

@@ -61,6 +61,7 @@ STUDIES = (
     Study("fig5_3", "5", seconds=60),
     Study("appendix_a", "A", seconds=4),
     Study("pinch_shell", "5", seconds=60),
+    Study("bend_twist", "5", long=True),
     Study("scan", "3", seconds=120),
     Study("hard_cases", "solver", seconds=140),
     Study("appendix_b_shell", "B", part_of="appendix_b", seconds=250),
@@ -71,7 +72,9 @@ STUDIES = (
     Study("eigenvalues", "solver"),
     Study("loads", "solver"),
     Study("actuated", "solver", seconds=8),
+    Study("bifurcations", "solver", seconds=60),
     Study("published", "solver", seconds=250),
+    Study("cones", "solver", long=True),
     Study("peers", "solver", seconds=15),
     Study("tables4", "4", seconds=1),
     Study("speed_error", "solver", long=True),
@@ -94,6 +97,7 @@ STUDIES = (
     Study("problem_b", "6"),
     Study("problem_c", "6", long=True),
     Study("landing", "6", long=True),
+    Study("tolerances", "6", long=True),
 )
 BY_NAME = {study.name: study for study in STUDIES}
 ALL_CASES = tuple(BY_NAME)

@@ -48,7 +48,6 @@ class Rig:
         gap: of the contact, mm (`bh.model.actuations.Indenter`).
         stiffness: of the contact (`bh.model.actuations.Indenter`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
-        lean: slope of the bar beside that, rad (`free_bar`).
         grip: mountain creases under the bar are held along x and y where the bar meets them, by this stiffness, N/mm in
             all: a bar that they stick to. 0 is a bar without friction; what friction does lies in between.
         largest: displacement between two states, mm.
@@ -64,7 +63,6 @@ class Rig:
     level: bool = False
     largest: float = 0.5
     offset: float = 0.0
-    lean: float = 0.0
     grip: float = 0.0
     pulled: bool = True
 
@@ -80,8 +78,6 @@ class Rig:
             raise ModelError(f"tape = {self.tape} cannot be; give a stiffness in N/mm, or 0")
         if not (math.isfinite(self.grip) and self.grip >= 0.0):
             raise ModelError(f"grip = {self.grip} cannot be; give a stiffness in N/mm, or 0")
-        if not abs(self.lean) < 1.0:
-            raise ModelError(f"lean = {self.lean} of the bar cannot be; give less than 1 rad")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -172,10 +168,6 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     slope, height = lid(folded, points, along, across, 0.5 * rig.bar)
     if rig.level:
         slope, height = 0.0, float(_under(folded, points, across, 0.5 * rig.bar)[:, 2].max())
-    if rig.lean != 0.0:
-        slope += rig.lean
-        under = _under(folded, points, across, 0.5 * rig.bar)
-        height = float((under[:, 2] - slope * (under @ along)).max())
     if rig.grip > 0.0:
         mountains = crease_nodes(folded.mesh, "mountain")
         held = mountains[np.abs(points[mountains] @ across) <= 0.5 * rig.bar].tolist()

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from bh.applications.inverse.boxes import depths
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.models import Name, model
 from bh.applications.inverse.problems import Design, ReachPoint
@@ -280,8 +281,6 @@ class Reach:
                 continue
             if wants.free(problem.design(x[i], on[i]), book.surrogate):
                 found.append((x[i], on[i]))
-            else:
-                sifted.boxed += 1
         return found
 
     def _good(self, problem: ReachAll, x: Array, on: Bools, sifted: Sifted) -> tuple[Array, Bools]:
@@ -290,7 +289,8 @@ class Reach:
             return x, on
         missed, turned = problem.off(problem.bare(x, on))
         legal = problem.violation(x, on) <= 0.0
-        sifted.add(missed, turned, legal)
+        inside = depths(problem.surrogate, problem.wants.keep_out, *problem.split(x), on)
+        sifted.add(missed, turned, legal, np.asarray((inside <= 0.0).all(axis=1)))
         bars = problem.surrogate.bars(*problem.split(x), on)[0]
         good = legal & (missed <= self.tolerance) & (turned <= self.angle) & (bars <= self.tolerance)
         return x[good], on[good]

@@ -235,6 +235,19 @@ class Surrogate:
         """None: this model does not know what strips do that are made a little differently."""
         return {}
 
+    def made(self, off: Mapping[str, Array]) -> Forward:
+        """Not known to this model: strips that are made a little differently.
+
+        Args:
+            off: how far the fields named are off.
+
+        Raises:
+            DesignError: always.
+        """
+        raise DesignError(
+            f"the source's model does not know strips with another {', '.join(off)}; use model = 'converged'"
+        )
+
     def bars(self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array]:
         """Zero: one mesh has no error bars, see `Forward.bars`.
 

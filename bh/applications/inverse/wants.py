@@ -104,6 +104,16 @@ class Wants:
         if not np.isfinite(boxes).all() or (boxes[:, 0] >= boxes[:, 1]).any():
             raise DesignError("a box of keep_out has no room; give two opposite corners")
         met = tuple(Stop(float(part), _vector(p, "a stop")) for part, p in stops)
+        places = [
+            ("the start of the crease", np.zeros(3)),
+            ("the target", at),
+            *(("a stop", s.point) for s in met),
+        ]
+        for name, place in places:
+            if ((boxes[:, 0] < place) & (place < boxes[:, 1])).all(axis=1).any():
+                raise DesignError(
+                    f"{name} ({place[0]:g}, {place[1]:g}, {place[2]:g}) lies in a box of keep_out; move the box"
+                )
         return cls(at, along, ridge, met, boxes)
 
     @property

@@ -26,7 +26,7 @@ from verification.studies.ch4.three_point import SOURCE
 
 CASE, RUNS = "bending_fit", "bending_fit_runs.json"
 SEED = 20261130
-DRAWN, BESIDE, QUICK = 28, 12, (2, 1)
+DRAWN, BESIDE, QUICK = 12, 5, (2, 1)
 FAR = 0.15  # of a range, to guesses beside the best
 LIMIT_S = 60.0  # processor time of a guess
 SOLVED_WITH = 4000.0  # MPa
