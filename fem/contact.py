@@ -56,6 +56,8 @@ class StoppedShell:
             return
         from bh.mechanics.contact.barrier import sheet_barrier
 
+        if model.rubs:
+            raise ModelError("the shell knows no friction; take formulation consistent or bars-and-hinges")
         if model.contact == "thickness" and any(zone.sheet.t != model.sheet.t for zone in model.zones):
             raise ModelError("contact = thickness: zones have another thickness; give a gap in mm")
         self.barrier = sheet_barrier(Model(self.mesh.linear, model.sheet, contact=model.contact))
