@@ -56,6 +56,8 @@ class StoppedShell:
             return
         from bh.mechanics.contact.barrier import sheet_barrier
 
+        if model.rubs:
+            raise ModelError("the shell knows no friction; take formulation consistent or bars-and-hinges")
         if model.contact == "thickness" and any(zone.sheet.t != model.sheet.t for zone in model.zones):
             raise ModelError("contact = thickness: zones have another thickness; give a gap in mm")
         self.barrier = sheet_barrier(Model(self.mesh.linear, model.sheet, contact=model.contact))
@@ -75,14 +77,16 @@ class StoppedShell:
         """
         return self.node_positions(self.components.whole(q, lam))
 
-    def free_part(self, q: Array, dq: Array, lam: float) -> float:
+    def free_part(self, q: Array, dq: Array, lam: float, since: float | None = None) -> float:
         """How much of a step dq (size,) from q no panels stand in, 0 to 1; see `bh.solvers.system.Limited`."""
+        del since  # prescribed nodes are where they are at the end of the way
         if self.barrier is None:
             return 1.0
         return self.barrier.free_part(self.nodes_at(q, lam), self.nodes_at(q + dq, lam))
 
-    def approach(self, q: Array, dq: Array, lam: float) -> float:
+    def approach(self, q: Array, dq: Array, lam: float, since: float | None = None) -> float:
         """How much of a step dq (size,) from q leads to where panels begin to press on each other, 0 to 1."""
+        del since
         if self.barrier is None:
             return 1.0
         return self.barrier.approach(self.nodes_at(q, lam), self.nodes_at(q + dq, lam))

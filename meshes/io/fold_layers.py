@@ -83,12 +83,12 @@ def untangled(frame: Frame, orders: Sequence[Order], distance: float) -> Frame:
     """
     apart = drawn_apart(frame.points, [face[0] for face in frame.faces], orders, distance)
     _check_room(frame, apart, distance)
-    frame = replace(frame, points=apart)
+    unmoved, frame = frame.points, replace(frame, points=apart)
     triangles = _triangles(frame)
     asks = [ask for order in orders for ask in _asked(frame.points, triangles, order)]
     sides = sorted({side(t[k], t[k - 1]) for each in triangles for t in each for k in range(3)})
     points, wanted = frame.points, np.full(len(asks), distance)
-    for _ in range(ROUNDS):
+    for _ in range(1 if np.array_equal(apart, unmoved) else ROUNDS):
         points = _moved(frame.points, np.array(sides), asks, _normals(frame, triangles), wanted)
         # layers that have become steep are nearer to each other than points above one another
         wanted = np.maximum(wanted, distance / _steepness(points, asks, _normals(frame, triangles)))

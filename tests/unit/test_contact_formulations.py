@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -109,3 +110,9 @@ def test_the_linear_shell_is_the_consistent_formulation_with_contact_too() -> No
     one, other = pressed("consistent")[-1], pressed("linear-shell")[-1]
     assert one.energy.total == pytest.approx(other.energy.total, rel=1e-3)
     assert one.points == pytest.approx(other.points, abs=0.02)
+
+
+def test_a_shell_with_friction_is_refused() -> None:
+    model = replace(pressed("linear-shell").model, friction=0.3)
+    with pytest.raises(bh.ModelError, match="the shell knows no friction"):
+        bh.trace(model)
