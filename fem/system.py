@@ -292,7 +292,7 @@ class ShellSystem(CreaseMemory):
         pattern = self._pattern
         data = np.zeros(pattern.size)
         scatter(K, self.components.sides, pattern.slots, data)
-        if len(self.creases):
+        if len(self._springs.places):
             tangents = self.creases.tangents(self.components.beta(here.components), here.lam)
             np.add.at(data, self._springs.places, tangents[tuple(self._springs.which)])
         if not self.constraints.rigid_body:

@@ -71,7 +71,7 @@ STUDIES = (
     Study("eigenvalues", "solver"),
     Study("loads", "solver"),
     Study("actuated", "solver", seconds=8),
-    Study("bifurcations", "solver", seconds=60),
+    Study("bifurcations", "solver", seconds=150),
     Study("published", "solver", seconds=250),
     Study("peers", "solver", seconds=15),
     Study("tables4", "4", seconds=1),
