@@ -1,16 +1,17 @@
 """Random handling for as long as wanted: `python -m benchmarks.studio_dragging --seconds 3600 --seed 1`.
 
-A seeded hand drags sliders, pulls and lets go of points, holds nodes, undoes, changes the material and opens other
-patterns. Of every state that is shown the forces are computed anew, at rest by a system that knows the controls of
-the frame and nothing else; now and then the controls are solved from flat as well. Seconds are of the processor. It
-ends with exit code 1 where a state is out of balance, the memory has grown by more than `LEAK`, or a state that never
-snapped is not that of the run from flat.
+A seeded hand drags sliders, pulls, pinches and lets go of points, holds nodes, undoes, changes the material and opens
+other patterns. Of every state that is shown the forces are computed anew, at rest by a system that knows the
+controls of the frame and nothing else; now and then the controls are solved from flat as well. Seconds are of the
+processor. It ends with exit code 1 where a state is out of balance, the memory has grown by more than `LEAK`, or a
+state that never snapped is not that of the run from flat.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -43,6 +44,7 @@ WAYS = (
     "fold",
     "drag",
     "drag",
+    "pinch",
     "let-go",
     "undo",
     "redo",
@@ -127,6 +129,11 @@ class Hand:
             far = size * random.choice([0.02, 0.1, 0.3, 3.0], p=[0.4, 0.4, 0.15, 0.05])
             steps = np.cumsum(random.normal(0.0, far / 4.0, (random.integers(1, 15), 3)), axis=0)
             return [{"do": "pull", "node": node, "to": to} for to in (at + steps).tolist()]
+        if way == "pinch":
+            a, b = random.choice(len(session.mesh.points), 2, replace=False).tolist()
+            wide = float(np.linalg.norm(self.desk.frame.points[a] - self.desk.frame.points[b]))
+            parts = np.linspace(1.0, random.uniform(0.3, 1.2), random.integers(1, 10))
+            return [{"do": way, "a": a, "b": b, "gap": wide * part} for part in parts.tolist()]
         if way == "hold":
             node = int(random.integers(len(session.mesh.points)))
             return [{"do": way, "node": node, "on": bool(random.random() < 0.4)}]
@@ -215,6 +222,7 @@ def main() -> int:
         if spent - told > WARM:
             told = spent
             say(f"{spent:.0f} s: {resident():.0f} MB, {hand.log}")
+            sys.stdout.flush()
     grown = resident() - base
     say(f"{spent:.0f} s of the processor, memory grown by {grown:.0f} MB, {hand.log}")
     return int(grown > LEAK or hand.log.worst > TOLERANCE or bool(hand.log.wrong))

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from bh.model.laminate import laminate
     from bh.model.loads import AreaForce, Couple, EdgeMoment, LineForce, Pressure
     from bh.model.model import Model
+    from bh.model.mould import Mould
     from bh.model.pinch import Pinch
     from bh.model.refinement import Goal, Refinement
     from bh.model.sheet import ElementStiffness, Sheet
@@ -80,6 +81,7 @@ _NAMES = {
     "bh.model.refinement": "Goal Refinement",
     "bh.model.sheet": "ElementStiffness Sheet",
     "bh.model.springs": "GroundSpring",
+    "bh.model.mould": "Mould",
     "bh.model.step": "Actuation Body Step StepBuilder Zone",
     "bh.model.supports": "Constraint Hold RigidBody Support",
     "bh.model.until": "Until depth",
@@ -154,6 +156,7 @@ __all__ = [
     "ModelError",
     "Moment",
     "MomentTable",
+    "Mould",
     "Newton",
     "NotReachedError",
     "NotReachedWarning",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
+from bh.loading.tethers import NONE, tethers
 from bh.model.constraints import TURNED, UNBALANCED
 from bh.model.model import Model
 from bh.model.ramp import Ramp
@@ -83,13 +84,15 @@ class ShellSystem(CreaseMemory):
         self.outside = shell_outside(elements, load_step, loads.ground(elements, model), self.constraints, x)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
-        if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
-            pull, free = self.gradient(self.at(self.start(), 0.0)), self.components.free
-            carried = np.zeros(len(pull))
-            carried[free] = pull[free]
-            self.load, self._here = Ramp(self.load.start + carried, self.load.end), None
-        elif self.constraints.rigid_body:
-            self._check_balance()
+        self.tethers = NONE
+        if load_step.releases and start is not None:
+            pull = self.gradient(self.at(self.start(), 0.0))[self.components.free]
+            moving = np.searchsorted(self.components.free, self.components.first_alpha)
+            self.tethers = tethers(self.start(), pull, int(moving), mesh.sheet.areas)
+        elif self.constraints.rigid_body and any(
+            self._unbalanced(self.start(), lam) > 1e-9 for lam in (0.0, 1.0)
+        ):
+            raise ModelError(UNBALANCED)
 
     def _loads(self, model: Model, step: int, moments: EdgeMoments) -> Ramp:
         """(k,) loads on all components: forces in local axes, N, couples on edges, N mm / rad."""
@@ -231,8 +234,9 @@ class ShellSystem(CreaseMemory):
             here.energy + float(self.creases.energy(beta, lam).sum()) + self.creases.load_energy(beta, lam)
         )
         energy -= float(self.load.at(lam) @ here.components)
-        energy += 0.0 if self.outside is None else self.outside.energy(here.x, lam)
         residual = self.gradient(here)[self.components.free]
+        energy += 0.0 if self.outside is None else self.outside.energy(here.x, lam)
+        energy += self.tethers.push(q, lam, residual)
         return Evaluation(energy, residual, self._imbalance(residual, here), here.forces.ravel())
 
     def _imbalance(self, residual: Array, here: Here) -> float:
@@ -241,9 +245,8 @@ class ShellSystem(CreaseMemory):
         Positions are rounded to eps |x|, which membrane and bending stiffness turn into forces that nobody can balance.
         """
         moves = self.components.free < self.components.first_alpha
-        eps = ROUNDING * float(np.abs(here.x).max())
         load = self.load.at(here.lam)
-        floors = [eps * stiffest for stiffest in self._flat_stiffness[1:]]
+        floors = [ROUNDING * float(np.abs(here.x).max()) * each for each in self._flat_stiffness[1:]]
         couples = self.creases.largest(self.components.beta(here.components), here.lam)
         first, width = self.components.first_alpha, self.elements.moves
         acting = float(np.abs(load[:first]).max())
@@ -295,6 +298,7 @@ class ShellSystem(CreaseMemory):
         if len(self._springs.places):
             tangents = self.creases.tangents(self.components.beta(here.components), here.lam)
             np.add.at(data, self._springs.places, tangents[tuple(self._springs.which)])
+        self.tethers.stiffen(here.lam, data, pattern)
         if not self.constraints.rigid_body:
             matrix = pattern.matrix(data)
             if self.outside is None or self.conservative:
@@ -325,13 +329,14 @@ class ShellSystem(CreaseMemory):
             out -= self.components.spread(
                 np.einsum("tkj,tk->tj", here.B, self.elements.forces(*self.rest.rate))
             )
-        return out[self.components.free]
+        return self.tethers.rates(q, lam, out[self.components.free])
 
     def power(self, q: Array, lam: float) -> float:
         """Derivative of the potential by lambda at fixed q, N mm."""
         here = self.at(q, lam)
         total = float(self.gradient(here) @ self.components.rate) - float(self.load.rate @ here.components)
         total += 0.0 if self.outside is None else self.outside.power(here.x)
+        total += self.tethers.power(q, lam)
         if self.rest is not None:
             total -= float(np.vdot(here.forces, np.hstack(self.rest.rate)))
         return total + self.creases.power(self.components.beta(here.components), lam)
@@ -340,7 +345,8 @@ class ShellSystem(CreaseMemory):
         """Second derivative of the potential by lambda at fixed q, N mm."""
         c = self.creases
         here = self.at(q, lam)
-        total = float(self._times(here, self.components.rate) @ self.components.rate)
+        total = self.tethers.second(q, lam)
+        total += float(self._times(here, self.components.rate) @ self.components.rate)
         if self.outside is not None:
             moves = self.components.moves(self.components.rate)
             total -= 2.0 * float(np.vdot(self.outside.push_rate(here.x), moves))
@@ -435,8 +441,3 @@ class ShellSystem(CreaseMemory):
         rigid = free_rigid_motions(self.components, self.elements, self.frames, x)
         work = rigid.T @ load if load.any() else load
         return float(np.abs(work).max(initial=0.0)) / max(float(np.abs(load).sum()), 1e-300)
-
-    def _check_balance(self) -> None:
-        for lam in (0.0, 1.0):
-            if self._unbalanced(self.start(), lam) > 1e-9:
-                raise ModelError(UNBALANCED)

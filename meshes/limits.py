@@ -38,6 +38,7 @@ class Limits:
         crossings: of a drawing's lines where none has a node.
         loose_ends: of a drawing's lines within a face, some milliseconds each to tie to its rim.
         control_points: of one spline.
+        solid_triangles: of a body that presses, read from a file; some microseconds each in every increment.
         megabytes: of a drawing's file, unpacked.
         stored_megabytes: of a path file, a journal or a data set, unpacked; most of them are held in memory.
         stored_rows: of a table of a path file (states) or a journal (points).
@@ -61,6 +62,7 @@ class Limits:
     crossings: int = 10_000
     loose_ends: int = 1_000
     control_points: int = 2_000
+    solid_triangles: int = 50_000
     megabytes: int = 32
     stored_megabytes: int = 500
     stored_rows: int = 100_000

@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,20 @@ from bh.plotting import interactive
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import replacing
 from reports import formatting
-from reports.changes import MOST, changes
+from reports.changes import MOST, changes, since_kept
 from reports.claims import Claim, claims, claims_csv
-from reports.figures import Plot, ReportError, csv_link, legend, markup, picture_link, plot_rows, svg, typeset
+from reports.figures import (
+    Plot,
+    ReportError,
+    csv_link,
+    legend,
+    markup,
+    picture_link,
+    plot_rows,
+    svg,
+    typeset,
+    with_prefix,
+)
 from reports.records import Case, CaseInfo, Frames, Results, known_cases, read, schema, shortfall, validated
 from reports.sheet_map import CASE, sheet_map
 from reports.verdicts import counted, groups, tally, verdicts_csv
@@ -121,6 +133,7 @@ class Site:
         self.results = read(folder / "checks.json")
         self.cases = _cases(self.results, folder)
         self.changes = changes(folder, self.results)
+        self.since_kept = since_kept(self.results)
         self.verdicts = groups(self.results.checks)
         ran = [case.name for case in self.cases]
         self.missing = [name for name in known_cases() if name not in ran]
@@ -132,6 +145,16 @@ class Site:
     def scenes(self) -> bool:
         """Whether any page has sheets to be turned."""
         return any(page.scenes for page in self.pages)
+
+    @cached_property
+    def map_plots(self) -> list[dict[str, Any]]:
+        """Plots of the map of sheets, which the front page shows too."""
+        return _shown_twice(self.cases, CASE, lambda _plot: True)
+
+    @cached_property
+    def pareto(self) -> tuple[Case, list[dict[str, Any]]] | None:
+        """Error against time, which the front page shows too."""
+        return _pareto(self.cases)
 
     def _page(self, chapter: Chapter) -> Page:
         cases = [case for case in self.cases if chapter_of(case.name) == chapter]
@@ -166,8 +189,8 @@ class Site:
                 most_failures=MOST_FAILURES,
                 most_moves=MOST,
                 sheets=sheet_map(every),
-                map_plots=_shown_twice(every, CASE, lambda _plot: True),
-                pareto=_pareto(every),
+                map_plots=self.map_plots,
+                pareto=self.pareto,
                 claims_csv=claims_csv(claim for shown in self.pages for claim in shown.claims),
                 odd=[item for case in every for item in case.checks if item[1].passed and item[1].use > 1.0],
                 seconds_in_all=sum(case.info.wall_time_s or 0.0 for case in every),
@@ -265,13 +288,7 @@ def _pareto(cases: Sequence[Case]) -> tuple[Case, list[dict[str, Any]]] | None:
 def _shown_twice(cases: Iterable[Case], name: str, wanted: Callable[[Plot], bool]) -> list[dict[str, Any]]:
     """Plots of a case that the front page shows too, with ids of their own."""
     items = [item for case in cases if case.name == name for item in case.plots if wanted(item["plot"])]
-    return [_renamed(item, "front-") for item in items]
-
-
-def _renamed(item: dict[str, Any], prefix: str) -> dict[str, Any]:
-    """A plot that is shown twice, with ids of its own."""
-    drawn = svg(item["plot"], f"{prefix}{item['plot'].id}-")
-    return {**item, "svg": drawn}
+    return [{**item, "svg": with_prefix(item["svg"], "front-")} for item in items]
 
 
 def _cases(results: Results, folder: Path) -> list[Case]:

@@ -1,15 +1,17 @@
-"""What became of the records since the last stored results."""
+"""What became of the records since the last stored results, and since those that are kept with the project."""
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from reports.figures import ReportError
 from reports.records import Check, Results, read
+from verification.framework.run import RECORDS
 
 PREVIOUS = "previous.json"
 FOUND = ("rate", "error_bar", "finest")  # parameters that are results: they do not tell records apart
@@ -40,10 +42,50 @@ def changes(folder: Path, results: Results) -> Changes | None:
         before = read(file)
     except ReportError as error:
         return Changes("", unreadable=str(error))
+    return _compared(before.date, before.checks, results)
+
+
+def since_kept(results: Results, records: Path = RECORDS) -> tuple[Changes, list[str]] | None:
+    """Against the records that are kept with the project, which a release makes anew, of the cases that were run since.
+
+    Args:
+        results: of this report.
+        records: folder of the kept ones, a file a case.
+
+    Returns:
+        the changes and the names of the cases; None where no case that has a record was run anew.
+    """
+    ran = {info.name: info for info in results.cases if not info.quick}
+    checks: list[Check] = []
+    names: list[str] = []
+    dates: list[str] = []
+    for file in sorted(records.glob("*.json")):
+        try:
+            kept = read(file)
+        except ReportError as error:
+            return Changes("", unreadable=str(error)), []
+        for info in kept.cases:
+            now = ran.get(info.name)
+            if now is None or (now.date, now.versions) == (info.date, info.versions):
+                continue
+            names.append(info.name)
+            dates.append(info.date or "")
+            checks += [check for check in kept.checks if check.case == info.name]
+    if not names:
+        return None
+    return _compared(min(dates), checks, results, frozenset(names)), names
+
+
+def _compared(
+    date: str, before: Sequence[Check], results: Results, only: frozenset[str] | None = None
+) -> Changes:
+    """What became of the records `before`; of some cases only, where they are named."""
     known = _by_key(before)
-    found = Changes(before.date, gone=0)
+    found = Changes(date, gone=0)
     new = same = 0
-    for key, (number, check) in _by_key(results).items():
+    for key, (number, check) in _by_key(results.checks).items():
+        if only is not None and check.case not in only:
+            continue
         old = known.pop(key, None)
         if old is None:
             new += 1
@@ -58,12 +100,12 @@ def changes(folder: Path, results: Results) -> Changes | None:
         else:
             same += 1
     found.moved.sort(key=lambda row: -row[3])
-    return Changes(before.date, found.broken, found.mended, found.moved, new, len(known), same)
+    return Changes(date, found.broken, found.mended, found.moved, new, len(known), same)
 
 
-def _by_key(results: Results) -> dict[Any, tuple[int, Check]]:
+def _by_key(checks: Sequence[Check]) -> dict[Any, tuple[int, Check]]:
     found: dict[Any, tuple[int, Check]] = {}
-    for number, check in enumerate(results.checks, start=1):
+    for number, check in enumerate(checks, start=1):
         params = {key: value for key, value in check.params.items() if key not in FOUND}
         key = (check.case, check.quantity, check.source, json.dumps(params, sort_keys=True))
         twice = 0

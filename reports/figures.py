@@ -120,6 +120,12 @@ def svg(plot: Plot, prefix: str) -> str:
     return _inline(sink.getvalue(), plot, prefix)
 
 
+def with_prefix(drawn: str, prefix: str) -> str:
+    """An `<svg>` of `svg` with `prefix` before every id in it, to stand on a page that shows the plot already."""
+    drawn = re.sub(r'( id="|url\(#|href="#)', rf"\1{prefix}", drawn)
+    return re.sub(r'(aria-labelledby=")(\S+) (\S+)"', rf'\1{prefix}\2 {prefix}\3"', drawn)
+
+
 def legend(plot: Plot) -> list[tuple[str, str]]:
     """For every series a small `<svg>` swatch and its label, both HTML."""
     found = []

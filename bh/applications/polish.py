@@ -20,6 +20,7 @@ from bh.errors import InputError, ModelError
 from bh.paths.path import Path
 from bh.solvers.outcome import Outcome
 from bh.solvers.walk import Strategy
+from bh.solving.follow import look_beside
 from bh.solving.trace import trace
 
 Array = NDArray[np.float64]
@@ -110,7 +111,7 @@ def polish(
     if not ((low <= p) & (p <= high)).all():
         raise ModelError("the start lies outside its bounds; move it inside")
     observables = [observable for observable, _ in targets]
-    path = trace(build(p), strategy=how.strategy, warn=False)
+    path = trace(build(p), strategy=how.strategy, warn=False, neighbours=False)
     if not path.reached:
         raise ModelError(f"the start cannot be solved ({path.outcome}): {path.reason}")
     missed = _values(path, observables) - wanted
@@ -136,6 +137,7 @@ def polish(
         if better is not None:
             path, p, missed = better
             history.append(float((np.abs(missed) / allowed).max()))
+    look_beside(path)  # once, at the answer: on the way nobody asks for other stable states
     return Polished(p, path, missed + wanted, missed, solves, tuple(history), outcome)
 
 
@@ -168,7 +170,7 @@ def _better(
 ) -> tuple[Path, Array, Array] | None:
     """The solved model of a design, the design and what it misses; None if that is no less than what is missed now."""
     try:
-        path = trace(build(p), strategy=strategy, warn=False)
+        path = trace(build(p), strategy=strategy, warn=False, neighbours=False)
     except InputError:
         return None
     if not path.reached:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -27,9 +27,6 @@ from bh.commands.fold_options import fold
 from bh.commands.response import response
 from bh.runtime.consent import take_options
 from bh.runtime.terminal import say, shortened
-
-if TYPE_CHECKING:
-    from bh.paths.path import Path as Trace
 
 COMMANDS = "bh.commands"
 ABOUT = {  # what commands of other packages say of themselves; `bh --help` must not import them
@@ -205,19 +202,21 @@ def run(
     """Solve a scene into a folder: path.bh and result.json."""
     from bh.commands.occupied import UNFINISHED
     from bh.commands.place import load_marking
+    from bh.commands.resuming import say_from
     from bh.commands.run import holds_states, solve, write_extras
     from bh.commands.summary import summary
+    from bh.errors import InputError
 
     asked = [*(changes or ()), *([f"model.formulation={formulation}"] if formulation else [])]
     loaded = load_marking(scene, asked, (output or Path()).parent)
     if formulation is not None and loaded.accuracy is not None:
-        from bh.errors import InputError
-
         raise InputError(
             f"--formulation {formulation}: this scene is solved to an accuracy, which chooses the formulation; "
             "give it a mesh (--set mesh.rows=4 --set mesh.along=32), or use bh compare"
         )
     folder = Path(f"{loaded.name}-out") if output is None else output
+    if resume and not quiet:
+        say_from(folder, loaded)
     try:
         path, names, before, contact, yields = solve(
             loaded,
@@ -236,8 +235,7 @@ def run(
         ) from None
     if before and not quiet:
         say(f"{loaded.name}: this run had reached its end before; nothing was left to solve")
-    written = [folder / name for name in names]
-    written += write_extras(path, loaded, folder, pictures, vtu)
+    written = [*(folder / name for name in names), *write_extras(path, loaded, folder, pictures, vtu)]
     if not quiet:
         summary(path, loaded, written, contact, yields)
     if path.reached and path.accuracy is not None and not path.accuracy.met:
@@ -288,6 +286,7 @@ def view(
 ) -> None:
     """Show a state of a solved path, or draw it to a file."""
     from bh.commands.occupied import path_file
+    from bh.commands.summary import in_browser
     from bh.errors import InputError
     from bh.paths.path import Path as Trace
 
@@ -312,20 +311,7 @@ def view(
         if bh.plotting.has_display():
             bh.plotting.show(solved[state])
         else:
-            _in_browser(solved, path)
-
-
-def _in_browser(solved: Trace, path: Path) -> None:
-    """Write the page that turns in a browser beside the path, and open it where $BROWSER says by what."""
-    import webbrowser
-
-    import bh.plotting.interactive
-
-    page = (path if path.is_dir() else path.parent) / "view.html"
-    page = bh.plotting.interactive.view(solved, title=path.name).save(page)
-    say(f"no display for a window; wrote {page}, to turn in a browser")
-    if os.environ.get("BROWSER"):  # else Python would take one that draws in the terminal
-        webbrowser.open(page.as_uri())
+            in_browser(solved, path)
 
 
 app.command()(export)

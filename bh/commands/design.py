@@ -22,7 +22,7 @@ from bh.applications.inverse.problems import CURVES, Design
 from bh.applications.inverse.reach import Library, Reach, size_of
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.simulate import Landing, Simulated
-from bh.applications.inverse.tolerances import Spreads, Tolerance, predicted
+from bh.applications.inverse.tolerances import Region, Spreads, Tolerance, predicted, region
 from bh.applications.inverse.wants import Wants
 from bh.errors import InputError
 from bh.paths.provenance import versions
@@ -119,8 +119,8 @@ class Answer:
         measure: name, value and unit of what was asked for, by the surrogate and by the simulation of the
             strip.
         goal: (k, 3) point or curve to be drawn beside it, mm.
-        point: the goal is a point to be reached.
         surrogate: the model that it was made with.
+        wants: all that was asked for of a point to be reached; None for other goals.
         verdict: the shell's, where that was asked for.
     """
 
@@ -129,7 +129,7 @@ class Answer:
     measure: dict[str, tuple[float, str]]
     goal: Array
     surrogate: Forward
-    point: bool = False
+    wants: Wants | None = None
     verdict: Verdict | None = None
 
     @property
@@ -139,6 +139,13 @@ class Answer:
         if not self.surrogate.has_variants:
             return None
         return predicted(self.surrogate, k0, length, on, SPREADS).one()
+
+    @property
+    def region(self) -> Region | None:
+        """The ellipsoid that the ends of most strips are in; None where the model does not know."""
+        if not self.surrogate.has_variants:
+            return None
+        return region(self.surrogate, self.design, SPREADS, PROBABILITY)
 
     @property
     def strip(self) -> Simulated:
@@ -153,7 +160,7 @@ class Answer:
         """
         verdict = judge(*self.design.lists(), self.surrogate.setting)
         more = {"end by the shell, change with its mesh": (verdict.change, "mm")}
-        if self.point:
+        if self.wants is not None:
             more = {"distance of the strip by the shell": (verdict.missed(self.goal[0]), "mm"), **more}
         return replace(self, verdict=verdict, measure={**self.measure, **more})
 
@@ -212,11 +219,15 @@ def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answ
         "its error bar": (found.bar, "mm"),
         "clears itself in space": (float(found.clear), "1 yes, 0 no"),
     }
+    if wants.stops:  # the distances above are the largest ones of all points
+        measure["points on the way of the pinch"] = float(len(wants.stops)), "met, too"
+    if len(wants.keep_out):
+        measure["boxes that it stays out of"] = float(len(wants.keep_out)), "folded and pinched"
     if wants.directed:
         measure["angle of the simulated strip to its direction"] = math.degrees(found.turned_simulated), "deg"
         measure["error bar of the angle"] = math.degrees(found.turn_bar), "deg"
     goal = np.array([target.point], dtype=float)
-    return Answer(found.design, found.landing, measure, goal, surrogate, point=True)
+    return Answer(found.design, found.landing, measure, goal, surrogate, wants)
 
 
 def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> Answer:
@@ -304,7 +315,7 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
         answer.strip.path.save(files[2])
         with replacing(files[3]) as draft:
             picture(answer).savefig(draft, format="png", dpi=110, metadata={"Software": None})
-        tolerance = answer.tolerance
+        tolerance, where = answer.tolerance, answer.region
         about = {
             "segments": answer.design.rows(),
             "total_length_mm": answer.design.total,
@@ -314,7 +325,7 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
             "measures": {
                 name: {"value": value, "unit": unit} for name, (value, unit) in answer.measure.items()
             },
-            "tolerance": None if tolerance is None else _spread(tolerance),
+            "tolerance": None if tolerance is None or where is None else _spread(tolerance, where),
             "data": data,
             "versions": versions(),
         }
@@ -327,26 +338,25 @@ def write(answer: Answer, folder: str | Path, data: str = "shipped") -> list[Pat
     return files
 
 
-def _spread(tolerance: Tolerance) -> dict[str, object]:
+def _spread(tolerance: Tolerance, where: Region) -> dict[str, object]:
     """Spreads, movements and the ellipsoid as plain data."""
-    size, directions = tolerance.axes(PROBABILITY)
     return {
         "spreads": asdict(SPREADS),
         "moves_mm": {name: move.tolist() for name, move in tolerance.moves.items()},
         "probability": PROBABILITY,
-        "semi_axes_mm": size.tolist(),
-        "directions": directions.T.tolist(),
+        "middle_mm": where.middle.tolist(),
+        "semi_axes_mm": where.axes.tolist(),
+        "directions": where.directions.T.tolist(),
     }
 
 
-def _told(tolerance: Tolerance | None) -> str:
+def _told(tolerance: Tolerance | None, where: Region | None) -> str:
     """One line on how the end moves."""
-    if tolerance is None:
+    if tolerance is None or where is None:
         return "tolerances: not known to this model"
-    size = tolerance.axes(PROBABILITY)[0]
     by = sorted(((float(np.linalg.norm(move)), name) for name, move in tolerance.moves.items()), reverse=True)
     most = ", ".join(f"{name} {moved:.2g}" for moved, name in by[:3])
-    axes = " x ".join(f"{axis:.2g}" for axis in size)
+    axes = " x ".join(f"{axis:.2g}" for axis in where.axes)
     return (
         f"{PROBABILITY:.0%} of strips end in an ellipsoid of semi-axes {axes} mm; by one spread of {most} mm"
     )
@@ -379,6 +389,13 @@ def picture(answer: Answer) -> Figure:
             ax.plot(*x[mesh.nodes(name)][:, [i, j]].T, color=colour, lw=1.0)
         style = "*" if len(answer.goal) == 1 else "-"
         ax.plot(answer.goal[:, i], answer.goal[:, j], style, color="C3", ms=11, label="target")
+        if answer.wants is not None:
+            for stop in answer.wants.stops:
+                ax.plot(stop.point[i], stop.point[j], "x", color="C3", ms=8)
+                ax.annotate(f"{stop.part:.0%}", stop.point[[i, j]], fontsize=8)
+            for low, high in answer.wants.keep_out:
+                corners = [(low[i], low[j]), (high[i], low[j]), (high[i], high[j]), (low[i], high[j])]
+                ax.fill(*np.transpose(corners), color="0.7", zorder=0)
         ax.set(title=title, xlabel="xyz"[i] + ", mm", ylabel="xyz"[j] + ", mm", aspect="equal")
         ax.margins(0.08)
     flat.legend(fontsize=8)
@@ -415,7 +432,7 @@ def design(
             say(f"segment: k0 {row['k0']:+.6f} /mm, length {row['length']:.2f} mm, {state}")
         for name, (value, unit) in answer.measure.items():
             say(f"{name}: {value:.4g} {unit}")
-        say(_told(answer.tolerance))
+        say(_told(answer.tolerance, answer.region))
         turn = math.degrees(float(np.abs(answer.design.k0 * answer.design.length).sum()))
         say(f"total length {answer.design.total:.1f} mm, the flat crease turns by {turn:.0f} degrees in all")
         say("files: " + " ".join(str(file) for file in files))

@@ -28,7 +28,7 @@ from bh.scene.folding import Proposal, Wish, proposals
 from bh.scene.load import Scene, parse_scene
 from bh.solvers.automatic import Automatic
 from bh.solvers.points import Increment, Point
-from bh.solvers.system import Evaluation, System, Tangent
+from bh.solvers.system import Evaluation, Hindered, System, Tangent
 from bh.solvers.walk import Strategy
 from bh.solving.levels import folder_of, move
 from meshes.io.export import replacing
@@ -111,6 +111,10 @@ class _Clock:
         """Another evaluation of a system of this size, or its tangent, with the factors that it is made for."""
         self.spent += TANGENT + FACTORED * unknowns if factored else EVALUATION + UNKNOWN * unknowns
 
+    def count_looks(self, seconds: float) -> None:
+        """What looks at panels that stop each other have taken."""
+        self.spent += seconds
+
     def check(self, lam: float) -> None:
         """Raise `TimeUpError` if the time is over."""
         if self.spent <= self._share:
@@ -158,14 +162,25 @@ class _TimedSystem:
 
     def __init__(self, system: System, clock: _Clock) -> None:
         self._system, self._clock = system, clock
+        self._hindered = system if isinstance(system, Hindered) and system.hindered else None
+        self._looked = 0.0
 
     def evaluate(self, q: Array, lam: float) -> Evaluation:
         self._clock.count(len(q))
+        self._count_looks()
         self._clock.check(lam)
         return self._system.evaluate(q, lam)
 
+    def _count_looks(self) -> None:
+        """What looks for contact have taken since the last time, in this evaluation or between two."""
+        if self._hindered is not None:
+            taken = self._hindered.looking
+            self._clock.count_looks(taken - self._looked)
+            self._looked = taken
+
     def tangent(self, q: Array, lam: float, forces: Array) -> Tangent:
         self._clock.count(len(q), factored=True)
+        self._count_looks()
         return self._system.tangent(q, lam, forces)
 
 

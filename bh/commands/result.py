@@ -55,6 +55,7 @@ def result(
         "spring_energy": _number(last.energy.ground),
         "contact_energy": _number(last.energy.contact),
         "dissipated": _number(last.energy.dissipated),
+        "friction_energy": _number(last.energy.friction),
         "press": {name: [_number(f) for f in force] for name, force in last.contact_forces.items()},
         "fold_angle": {
             crease: {"mean": _number(a.mean()), "min": _number(a.min()), "max": _number(a.max())}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,7 +51,8 @@ def summary(
     say(
         f"energy: stretching {energy.stretching:.5g}, bending {energy.bending:.5g}, "
         f"folding {energy.folding:.5g}, total {energy.total:.5g} N mm"
-        + (f"; contact {energy.contact:.3g} N mm" if path.model.stops_itself else "")
+        + (f"; contact {energy.contact:.3g} N mm" if path.model.hindered else "")
+        + (f"; friction has used up {energy.friction:.3g} N mm" if path.model.rubs else "")
     )
     for name, force in last.contact_forces.items():
         x, y, z = force
@@ -98,3 +100,21 @@ def scene_of_drawing(file: Path) -> Scene:
     for line in first.assumed:
         say(f"assumed: {line}")
     return parse_scene(first.text, file.parent, file.stem)
+
+
+def in_browser(solved: Trace, path: Path) -> None:
+    """Write the page that turns in a browser beside a path, and open it where $BROWSER says by what.
+
+    Args:
+        solved: the path.
+        path: its file, or the folder that has it.
+    """
+    import webbrowser
+
+    import bh.plotting.interactive
+
+    page = (path if path.is_dir() else path.parent) / "view.html"
+    page = bh.plotting.interactive.view(solved, title=path.name).save(page)
+    say(f"no display for a window; wrote {page}, to turn in a browser")
+    if os.environ.get("BROWSER"):  # else Python would take one that draws in the terminal
+        webbrowser.open(page.as_uri())

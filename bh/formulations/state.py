@@ -25,9 +25,11 @@ class Energy:
             of the theory and of none of the others, but of what the actuation has done as work:
             work = change of (total + lock + contact + ground).
         dissipated: what creases that yield have used up, as `lock` no part of the others; work = change of
-            (total + lock + contact + ground + dissipated) where their angles are not imposed.
+            (total + lock + contact + ground + dissipated + friction) where their angles are not imposed.
         ground: what springs to the ground hold (`bh.GroundSpring`), zero otherwise; apart like the locks.
-        contact: what panels hold that press on each other (`Model.contact`), zero otherwise; apart like the locks.
+        contact: what panels hold that press on each other (`Model.contact`), or that moulds press on, zero otherwise;
+            apart like the locks.
+        friction: what friction has used up (`Model.friction`), and holds where it sticks, zero otherwise; apart, too.
     """
 
     stretching: float
@@ -37,6 +39,7 @@ class Energy:
     contact: float = 0.0
     dissipated: float = 0.0
     ground: float = 0.0
+    friction: float = 0.0
 
     @property
     def total(self) -> float:
@@ -72,7 +75,7 @@ class State:
         crease_moments: (m,) moment a length carried by each crease hinge, N mm / mm, nan off creases; positive
             where it works to open the dihedral angle below the sheet against the crease. Near closed with what the
             lock carries (`Model.hinge_lock`).
-        contact_forces: force of every `Indenter` of the step on the sheet, (3,), N, by its name.
+        contact_forces: force of every `Indenter` and `Mould` of the step on the sheet, (3,), N, by its name.
         edge_slopes: (e,) at edges of the boundary the angle from the triangle up to the sheet's tangent plane, rad, nan
             inside; and `clamp_couples` (e,) what clamps carry there, N mm. None where a formulation has no slopes, or
             keeps them otherwise.

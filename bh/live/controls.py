@@ -10,28 +10,15 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.live.grips import Grip, Jaws
 from bh.model.actuations import Fold, Force, Pull
 from bh.model.crease_law import CreaseLaw
 from bh.model.step import Actuation
 
 Array = NDArray[np.float64]
-Vector = tuple[float, float, float]
 CLOSED = math.pi - 1e-3  # rad; the largest fold angle that a slider can ask for
 UNIT = 1.0  # rad of the crease that turns most, a unit of the way between two controls
 PARALLEL = 1e-9  # parts by which a direction may differ and still be the same
-
-
-@dataclass(frozen=True)
-class Grip:
-    """A node that is pulled by a spring.
-
-    Attributes:
-        to: (3,) the point that it is pulled to, mm.
-        stiffness: of the spring, N/mm.
-    """
-
-    to: Vector
-    stiffness: float
 
 
 @dataclass(frozen=True)
@@ -42,10 +29,12 @@ class Controls:
         folds: fold angle of creases by name, rad, positive the way that each is drawn. Creases that are not here are
             left alone.
         grips: pulled nodes.
+        jaws: pairs of pulled nodes that are pinched.
     """
 
     folds: Mapping[str, float] = field(default_factory=dict)
     grips: Mapping[int, Grip] = field(default_factory=dict)
+    jaws: tuple[Jaws, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze what was given."""
@@ -63,10 +52,10 @@ class Controls:
 
     def like(self, other: Controls) -> bool:
         """Whether both speak of the same creases, nodes and springs, so that there is a straight way between them."""
-        springs = {node: grip.stiffness for node, grip in self.grips.items()}
-        return list(self.folds) == list(other.folds) and springs == {
-            node: grip.stiffness for node, grip in other.grips.items()
-        }
+        springs, others = (
+            [(node, grip.stiffness) for node, grip in each.grips.items()] for each in (self, other)
+        )
+        return list(self.folds) == list(other.folds) and springs == others
 
     def moved(self, vector: Array) -> Controls:
         """The same creases and nodes with the numbers of `vector`, as of `Controls.vector`."""
@@ -76,7 +65,29 @@ class Controls:
             node: Grip((x, y, z), grip.stiffness)
             for (node, grip), (x, y, z) in zip(self.grips.items(), points, strict=True)
         }
-        return Controls(folds, grips)
+        return Controls(folds, grips, self.jaws)
+
+    def gripped(self, grips: Mapping[int, Grip], jaws: Jaws | None = None) -> Controls:
+        """With other nodes pulled, too; what held these nodes before is opened.
+
+        Args:
+            grips: by node.
+            jaws: that pull them; None where a hand does.
+        """
+        kept = tuple(old for old in self.jaws if not grips.keys() & {old.a, old.b})
+        opened = {node for old in self.jaws if old not in kept for node in (old.a, old.b)} - grips.keys()
+        left = {node: grip for node, grip in self.grips.items() if node not in opened}
+        new = () if jaws is None else (jaws,)
+        return Controls(self.folds, {**left, **grips}, (*kept, *new))
+
+    def without(self, node: int | None) -> Controls:
+        """Without the pull or the pinch of a node; None lets go of all."""
+        if node is None:
+            return Controls(self.folds)
+        opened = [old for old in self.jaws if node in (old.a, old.b)]
+        gone = {node, *(n for old in opened for n in (old.a, old.b))}
+        left = {n: grip for n, grip in self.grips.items() if n not in gone}
+        return Controls(self.folds, left, tuple(old for old in self.jaws if old not in opened))
 
 
 @dataclass(frozen=True)

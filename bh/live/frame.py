@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.formulations.state import State
-from bh.live.controls import Controls, Vector
+from bh.live.controls import Controls
+from bh.live.grips import Jaws, Vector
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ class Frame:
         note: why it cannot go on to what is wanted, or an empty string.
         iterations: of Newton's method in all so far.
         seconds: that the update took.
-        fading: what has pulled until now still does, a part of it.
+        fading: what has pulled until now still does, a part of it, or jaws do not press alike yet.
     """
 
     state: State
@@ -48,6 +49,19 @@ class Frame:
     def points(self) -> Array:
         """(n, 3) node positions, mm."""
         return self.state.points
+
+    def pinches(self) -> dict[Jaws, float]:
+        """Pinches that are at work.
+
+        Returns:
+            the force by which each presses its two nodes together, N.
+        """
+        grips = self.controls.grips
+        return {
+            jaws: jaws.force(grips, self.points)
+            for jaws in self.wanted.jaws
+            if jaws.a in grips and jaws.b in grips
+        }
 
     def fold_angles(self) -> dict[str, float]:
         """Mean fold angle of every crease that is handled.

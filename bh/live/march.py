@@ -12,10 +12,14 @@ from bh.solvers.load_control import LoadControl, jump
 from bh.solvers.modes import lowest_mode
 from bh.solvers.newton import Solution
 from bh.solvers.points import Point, extrapolate, point
+from bh.solvers.settling import Settling
 from bh.solvers.system import System
 
 Array = NDArray[np.float64]
 SMALLEST = 1e-3  # part of the first increment from which on the sheet may leave its branch: it snaps
+BRISK = 2  # cuts of an increment, after which a net of springs moves to rest downhill
+BOLD = 2.0  # such a motion is for, in first increments
+MOTION = Settling(most=600)
 PUSH = 1e-2  # along the lowest mode of an unstable state, in parts of the size of the sheet
 
 
@@ -28,6 +32,7 @@ class March:
         points: states in equilibrium, the newest last.
         target: lambda to go to; it may be changed between two iterations.
         settings: increments and tolerances of the driver.
+        settles: it is a net of springs, whose branches are very many: where one ends it moves downhill.
         snapped: the newest state lies on another branch than the one before.
         stuck: why it cannot go on, or an empty string.
         iterations: so far.
@@ -37,6 +42,7 @@ class March:
     points: list[Point]
     target: float
     settings: LoadControl
+    settles: bool = False
     snapped: bool = False
     stuck: str = ""
     iterations: int = 0
@@ -105,10 +111,23 @@ class March:
                         self.settings.limits(self.system)[1], 2.0 * size if not cuts else size
                     )
                     return
+            if free or (self.settles and cuts == BRISK):
+                far = min(abs(self.target - here.lam), BOLD * self.settings.limits(self.system)[0])
+                if (yield from self._to_rest(here.lam + float(np.copysign(far, left)))):
+                    return
             if free:
                 self.stuck = reason
                 return
             size, cuts = 0.5 * min(size, abs(left)), cuts + 1
+
+    def _to_rest(self, lam: float) -> Generator[Array, None, bool]:
+        """Downhill from the newest state to rest at `lam`, past any branches; whether it came to rest."""
+        found = yield from MOTION.settling_steps(self.system, self.here.q, lam)
+        if not found.converged or found.stable is False:
+            return False
+        self.points = [point(self.system, found.q, lam, evaluation=found.evaluation, negative=found.negative)]
+        self.snapped, self._increment = True, self.settings.limits(self.system)[0]
+        return True
 
     def _solve(self, lam: float, patient: bool) -> Generator[Array, None, Solution]:
         """A state at `lam` near the last ones; `patient` goes downhill where full steps do not converge."""

@@ -13,8 +13,10 @@ from bh.errors import ModelError
 from bh.formulations.protocols import SheetSystem
 from bh.formulations.registry import formulation
 from bh.formulations.state import State
-from bh.live.controls import CLOSED, Controls, Grip, Vector, Way, fold_of
+from bh.live.controls import CLOSED, Controls, Way, fold_of
+from bh.live.floating import Floating
 from bh.live.frame import Frame
+from bh.live.grips import Grip, Jaws, Vector
 from bh.live.holding import chains, held
 from bh.live.march import March
 from bh.loading.builder import LoadStepBuilder
@@ -29,7 +31,11 @@ from meshes import SheetMesh
 from meshes.mesh import count
 
 Array = NDArray[np.float64]
+REMEMBERED = 1000  # states at rest that `undo` can go back to
 GRIP = 200.0  # stiffness of a grip in parts of D / L^2, of a panel as large as the sheet: it gives way, yet leads
+JAWS = (
+    10.0  # stiffness of the spring of a jaw in parts of that of a grip: the gap is nearly that of the nodes
+)
 
 
 @dataclass(eq=False)
@@ -50,20 +56,27 @@ class Session:
     rigid motions and nothing else.
     """
 
-    def __init__(self, model: Model, settings: LoadControl | None = None) -> None:
+    def __init__(self, model: Model, settings: LoadControl | None = None, settles: bool = False) -> None:
         """Begin flat and at rest.
 
         Args:
             model: sheet, supports and creases.
             settings: increments and tolerances; None for the driver's own.
+            settles: it is a net of springs: where a branch ends it moves downhill to rest, as `bh.Settling` does.
 
         Raises:
             ModelError: the sheet cannot be solved as described.
         """
-        if any(crease.law is not None and crease.law.remembers for crease in model.creases.values()):
-            raise ModelError("creases that yield remember their way; fold them by bh.trace or bh run")
+        if model.remembers:
+            what = "friction remembers its" if model.rubs else "creases that yield remember their"
+            raise ModelError(f"{what} way; fold the sheet by bh.trace or bh run")
         self.model = replace(model if model.supports else held(model), steps=())
+        self._free = (
+            held(replace(self.model, supports=())).supports == self.model.supports
+        )  # but for its middle
+        self._floating = Floating()
         self._settings = settings or LoadControl()
+        self._settles = settles
         self._formulation = formulation(self.model.formulation)
         names = [name for name in self.mesh.creases if self.mesh.folds.get(name) != "flat"]
         self._wanted = Controls(dict.fromkeys(chains(self.mesh, names), 0.0))
@@ -114,7 +127,7 @@ class Session:
             raise ModelError(f"fold of crease '{crease}' by {angle} cannot be; give a number of rad")
         angle = min(max(angle, -CLOSED), CLOSED)
         folds = {name: angle if crease in (name, "all") else old for name, old in self._wanted.folds.items()}
-        self._ask(Controls(folds, self._wanted.grips))
+        self._ask(replace(self._wanted, folds=folds))
 
     def pull(self, node: int, to: Vector, stiffness: float | None = None) -> None:
         """Pull a node to a point by a spring.
@@ -136,12 +149,37 @@ class Session:
         old = self._wanted.grips.get(node)
         given = stiffness or (old.stiffness if old else self._soft)
         x, y, z = (float(c) for c in to)
-        self._ask(Controls(self._wanted.folds, {**self._wanted.grips, node: Grip((x, y, z), given)}))
+        self._ask(self._wanted.gripped({node: Grip((x, y, z), given)}))
+
+    def pinch(self, a: int, b: int, gap: float | None = None, stiffness: float | None = None) -> None:
+        """Squeeze two nodes together between jaws, which move along the line between them.
+
+        The line is that between the nodes when they are pinched first; `let_go` opens the jaws.
+
+        Args:
+            a: a node of the mesh.
+            b: another one.
+            gap: between the jaws, mm; None to touch the nodes where they are, without a force.
+            stiffness: of the spring of each jaw, N/mm; None for one that suits the sheet.
+
+        Raises:
+            ModelError: no such node, both at one point, or no gap.
+        """
+        if gap is not None and not (math.isfinite(gap) and gap >= 0.0):
+            raise ModelError(
+                f"a pinch with a gap of {gap} mm cannot be; give a number of mm that is not negative"
+            )
+        jaws = next((old for old in self._wanted.jaws if (old.a, old.b) == (a, b)), None)
+        if jaws is None:
+            points = self._state().points
+            jaws = Jaws.on(points, a, b, stiffness or JAWS * self._soft)
+            gap = float(np.linalg.norm(points[b] - points[a])) if gap is None else gap
+        if gap is not None:
+            self._ask(self._wanted.gripped(jaws.grips(gap), jaws))
 
     def let_go(self, node: int | None = None) -> None:
         """Let go of a node, or of all of them; what pulled fades out."""
-        left = {} if node is None else {n: grip for n, grip in self._wanted.grips.items() if n != node}
-        self._ask(Controls(self._wanted.folds, left))
+        self._ask(self._wanted.without(node))
 
     def undo(self) -> bool:
         """Go back to what was wanted when the sheet last was at rest with something else; False if there is nothing."""
@@ -173,6 +211,7 @@ class Session:
             self.fold(name, angle)
         for node, grip in wanted.grips.items():
             self.pull(node, grip.to, grip.stiffness)
+        self._ask(replace(self._wanted, jaws=wanted.jaws))
 
     # ------------------------------------------------------------------------------- what it answers
 
@@ -200,6 +239,7 @@ class Session:
             frame = self._frame(snapped, time.perf_counter() - began)
         if frame.at_rest and (not self._past or self._past[-1] != self._wanted):
             self._past.append(self._wanted)
+            del self._past[:-REMEMBERED]
         return frame
 
     def rest(self, most: float = 60.0) -> Frame:
@@ -249,13 +289,19 @@ class Session:
         if wanted != self._wanted:
             self._wanted, self._undone = wanted, []
             self._under.march.stuck = ""
+            self._floating.again()
 
     def _busy(self) -> bool:
         """One iteration more; False where there is nothing left to do."""
         if self._under.march.advance():
             return True
-        if self._under.march.stuck or (self._now() == self._wanted and not self._fading()):
+        if self._under.march.stuck:
             return False
+        if self._now() == self._wanted and not self._fading():
+            points = self._state().points if self._floats else None
+            if points is None or not self._floating.due(self._wanted, points):
+                return False
+            self._wanted = self._floating.moved(self._wanted, points)
         self._aim()
         return self._under.march.advance()
 
@@ -281,11 +327,17 @@ class Session:
             old = now.grips.get(node)
             if old is None or old.stiffness != grip.stiffness:  # it begins without a force
                 x, y, z = state.points[node].tolist()
-                start = Controls(start.folds, {**start.grips, node: Grip((x, y, z), grip.stiffness)})
+                start = replace(start, grips={**start.grips, node: Grip((x, y, z), grip.stiffness)})
         kept = {node: start.grips[node] for node in self._wanted.grips}
-        start = Controls(start.folds, kept)
+        start = Controls(start.folds, kept, self._wanted.jaws)
         way = Way(start, self._wanted) if self._gone else Way.toward(start, self._wanted)
         self._under = self._begin(way, state)
+
+    @property
+    def _floats(self) -> bool:
+        """Whether nothing but jaws acts on the sheet, which are moved until both press alike."""
+        jawed = {node for jaws in self._wanted.jaws for node in (jaws.a, jaws.b)}
+        return self._free and bool(jawed) and jawed == self._wanted.grips.keys()
 
     def _fading(self) -> bool:
         """Whether the way in hand lets forces fade out that are still there: it has to be gone to its end."""
@@ -313,7 +365,7 @@ class Session:
         load = self._builder.build(Step(items))
         system = self._formulation.system(self.model, load, state)
         q = system.start()
-        march = March(system, [point(system, q, 0.0)], 0.0, self._settings)
+        march = March(system, [point(system, q, 0.0)], 0.0, self._settings, self._settles)
         under = _Under(way, load, system, march)
         if load.force.start.any():
             march.target = 1.0
@@ -343,6 +395,7 @@ class Session:
     def _frame(self, snapped: bool, seconds: float) -> Frame:
         state, now = self._state(), self._now()
         iterations = self._iterations + self._under.march.iterations
+        uneven = self._floats and now == self._wanted and self._floating.due(now, state.points)
         return Frame(
             state,
             now,
@@ -352,7 +405,7 @@ class Session:
             self._under.march.stuck,
             iterations,
             seconds,
-            self._fading(),
+            self._fading() or uneven,
         )
 
     def __repr__(self) -> str:

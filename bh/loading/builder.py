@@ -18,6 +18,7 @@ from bh.model.crease_law import CreaseLaw
 from bh.model.hinge_laws import HingeLaw
 from bh.model.laws import PRESCRIBED, SPRING
 from bh.model.model import Model, drawn_flat
+from bh.model.mould import Mould
 from bh.model.ramp import Ramp
 from bh.model.sheet import Sheet
 from bh.model.springs import ground_stiffness
@@ -230,10 +231,10 @@ class LoadStepBuilder:
         """Let a body act on the sheet in this step.
 
         Raises:
-            ModelError: another indenter of the step has its name, by which its force is told.
+            ModelError: another indenter or mould of the step has its name, by which its force is told.
         """
-        names = {other.name for other in self._step.bodies if isinstance(other, Indenter)}
-        if isinstance(body, Indenter) and body.name in names:
+        names = {other.name for other in self._step.bodies if isinstance(other, Indenter | Mould)}
+        if isinstance(body, Indenter | Mould) and body.name in names:
             raise ModelError(f"two indenters of a step are named '{body.name}'; give each a name of its own")
         self._step.bodies.append(body)
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.model.mould import check_friction
 from bh.model.step import Actuation, Body, StepBuilder
 from bh.model.supports import AXES, select
 from meshes.quantities import Typed, degrees_meant, take_units
@@ -296,7 +297,7 @@ class Displace(Actuation):
 
 @dataclass(frozen=True)
 class Indenter(Body):
-    """A rigid body that presses on the sheet, without friction, in the step that names it.
+    """A rigid body that presses on the sheet in the step that names it.
 
     Its section is a rectangle with rounded edges, its axis as long as it needs to be. Indenters take the place of the
     rigid-body support in their step.
@@ -309,6 +310,7 @@ class Indenter(Body):
             cylinder.
         by: how far it moves while lambda runs from 0 to 1, mm.
         stiffness: of its surface, N/mm for every mm of the mesh's edges; gap: distance at which it begins to press, mm.
+        friction: coefficient between it and the sheet; None for that of the model.
     """
 
     name: str
@@ -321,6 +323,7 @@ class Indenter(Body):
     tilt: float = 0.0
     stiffness: float = 50.0
     gap: float = 0.05
+    friction: float | None = None
 
     if TYPE_CHECKING:
 
@@ -336,6 +339,7 @@ class Indenter(Body):
             tilt: Typed = 0.0,
             stiffness: float = 50.0,
             gap: Typed = 0.05,
+            friction: float | None = None,
         ) -> None:
             """See the attributes."""
 
@@ -355,6 +359,7 @@ class Indenter(Body):
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0.0):
                 raise ModelError(f"indenter '{self.name}': {key} = {value} cannot be; give a positive number")
+        check_friction(self.friction, what)
         if 2.0 * self.radius > min(self.width, self.height) * (1.0 + 1e-12):
             raise ModelError(
                 f"indenter '{self.name}': its radius {self.radius:g} mm is more than half of its section"

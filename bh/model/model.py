@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from bh.errors import ModelError
 from bh.model.actuations import Displace, Fold, Force, Moment
 from bh.model.crease_law import CreaseLaw
+from bh.model.mould import Mould, check_friction
 from bh.model.moving import legs
 from bh.model.pinch import Pinch
 from bh.model.sheet import ElementStiffness, Sheet
@@ -49,6 +50,8 @@ class Model:
         contact: panels that share no node stop each other: "auto" (by their thickness, from where they meet in a path
             that is solved without at first), "thickness" (their middle surfaces stay the sheet's thickness apart in
             every state), a gap in mm, or False (they pass through each other: `bh.contact.first_contact` tells).
+        friction: coefficient of Coulomb's friction where panels press on each other, and where bodies press that have
+            none of their own; 0 for none.
         zones: parts of the sheet that are made of something else.
         springs: to the ground, in all steps; they carry the sheet beside its supports, or alone.
     """
@@ -64,6 +67,7 @@ class Model:
     contact: Contact = "auto"
     zones: tuple[SheetZone, ...] = ()
     springs: tuple[GroundSpring, ...] = ()
+    friction: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be.
@@ -106,6 +110,7 @@ class Model:
         number = isinstance(gap, int | float) and not isinstance(gap, bool) and 0.0 < gap < math.inf
         if not (number or gap is False or gap in ("thickness", "auto")):
             raise ModelError(f"contact = {gap!r} cannot be; give 'thickness', 'auto', a gap in mm, or False")
+        check_friction(self.friction, "model")
 
     @property
     def sections(self) -> Sections:
@@ -116,6 +121,22 @@ class Model:
     def stops_itself(self) -> bool:
         """Do panels stop each other in every state? Not with "auto", which asks for another model once they meet."""
         return self.contact is not False and self.contact != "auto"
+
+    @property
+    def rubs(self) -> bool:
+        """Is there friction where something presses, in any step?"""
+        own = (getattr(item, "friction", None) for step in self.steps for item in step.actuations)
+        return self.friction > 0.0 or any(each is not None and each > 0.0 for each in own)
+
+    @property
+    def hindered(self) -> bool:
+        """Does something stand in the way of the sheet: panels that stop each other, or a mould?"""
+        return self.stops_itself or any(isinstance(item, Mould) for s in self.steps for item in s.actuations)
+
+    @property
+    def remembers(self) -> bool:
+        """Does a state depend on the way to it: creases that yield, or friction?"""
+        return self.rubs or any(c.law is not None and c.law.remembers for c in self.creases.values())
 
     def __repr__(self) -> str:
         """One line: "Model(384 triangles, 1 crease, 4 supports, 1 step, consistent)"."""

@@ -16,6 +16,7 @@ from bh.errors import ModelError
 from bh.model.actuations import Fold, Force, Indenter
 from bh.model.growth import Expand
 from bh.model.model import Model
+from bh.model.mould import Mould
 from bh.model.supports import Support, select
 from meshes import CreasePattern, SheetMesh
 from meshes.cells import Kind
@@ -172,9 +173,11 @@ def _check_actuation(model: Model, item: Any, where: str) -> None:
             raise ModelError(
                 f"{where} gives every triangle of one mesh its own; give one for all, or no accuracy"
             )
-    elif isinstance(item, Indenter):
+    elif isinstance(item, Indenter | Mould):
         raise ModelError(
             f"{where}: the surface of a bar is as stiff as the edges of one mesh are long; give a mesh, no accuracy"
+            if isinstance(item, Indenter)
+            else f"{where}: what a mould presses on depends on the mesh; give a mesh, no accuracy"
         )
     elif hasattr(item, "at") and not isinstance(
         item.at, float | int

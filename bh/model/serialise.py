@@ -18,6 +18,7 @@ from bh.model.growth import Expand
 from bh.model.hinge_laws import LAWS, HingeLaw
 from bh.model.loads import AreaForce, Couple, EdgeMoment, LineForce, Pressure
 from bh.model.model import Model
+from bh.model.mould import Mould
 from bh.model.pinch import Pinch
 from bh.model.plugins import consent, from_file
 from bh.model.sheet import ElementStiffness, Sheet
@@ -49,7 +50,12 @@ ACTUATIONS: dict[str, type[Actuation]] = {
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}
 SUPPORTS: dict[str, type[Constraint]] = {"hold": Hold}
-STEP_ITEMS: dict[str, type[Actuation]] = {**ACTUATIONS, "indenter": Indenter, "tether": Tether}
+STEP_ITEMS: dict[str, type[Actuation]] = {
+    **ACTUATIONS,
+    "indenter": Indenter,
+    "tether": Tether,
+    "mould": Mould,
+}
 FORMAT = 2  # raised with every change of the description
 
 
@@ -70,6 +76,7 @@ def describe(model: Model) -> tuple[dict[str, Any], dict[str, AnyArray]]:
         "formulation": model.formulation,
         "hinge_lock": model.hinge_lock,
         **({"contact": model.contact} if model.stops_itself else {}),
+        **({"friction": model.friction} if model.friction else {}),
         "green": model.stiffness is not None and model.stiffness.green,
         "sheet": _sheet(model.sheet),
         **({"zones": [_zone(zone) for zone in model.zones]} if model.zones else {}),
@@ -129,6 +136,7 @@ def rebuild(data: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> Model:
             else None,
             hinge_lock=data.get("hinge_lock", False),  # files of versions that had no lock
             contact=data.get("contact", False),
+            friction=data.get("friction", 0.0),
             springs=tuple(GroundSpring(**item) for item in data.get("springs", ())),
         )
     except (KeyError, TypeError) as missing:
@@ -209,8 +217,9 @@ def _untagged(data: Mapping[str, Any], kinds: Mapping[str, type], kind: type | N
 def _step(step: Step) -> dict[str, object]:
     actuations = [_tagged(item, STEP_ITEMS) for item in step.actuations]
     for item in actuations:  # models of versions without it keep their fingerprint
-        if item.get("further", 0.0) is None:
-            del item["further"]
+        for key in ("further", "friction"):
+            if item.get(key, 0.0) is None:
+                del item[key]
     found: dict[str, object] = {
         "actuations": actuations,
         "until": None if step.until is None else _plain(step.until),

@@ -18,8 +18,8 @@ ADVICE: dict[Outcome, str] = {
 }
 
 LETTING_GO = (
-    "what is let go of carries much that nothing else can: fold the sheet free and hold it as it lies (hold), in place "
-    "of a support from the beginning, or let go of less at a time"
+    "what is let go of carries much, and no state was found that the sheet would spring to: let go of less at a time, "
+    "or fold the sheet free and hold it as it lies (hold)"
 )
 
 

@@ -57,7 +57,7 @@ def _between(path: Path, gap: int, parts: Array) -> list[State]:
     nearer = [ends[int(part > 0.5)] for part in parts.tolist()]
     record, before = path.records[gap + 1], path.records[gap]
     inner = [part for part in parts.tolist() if 0.0 < part < 1.0]
-    if not inner or record.jumped or record.history is not None or path.model.stops_itself:
+    if not inner or record.jumped or record.history is not None or path.model.hindered:
         return nearer
     system = path.system(record.step)
     begin, lam = (before.q, before.lam) if before.step == record.step else (system.start(), 0.0)

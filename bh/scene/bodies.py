@@ -1,16 +1,36 @@
-"""Bodies in the steps of a scene: bars that press on the sheet (`press`), and soft springs that hold it (`tether`)."""
+"""Bodies in the steps of a scene: bars and moulds that press on the sheet (`press`), soft springs that hold it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from bh.errors import SceneError
 from bh.model.actuations import Indenter, Tether
+from bh.model.mould import Mould
 from bh.model.step import Actuation
-from bh.scene.reading import PLACE, Length, Place, Positive, Spot, Table, Vector, arguments
+from bh.scene.reading import (
+    PLACE,
+    Length,
+    Place,
+    Positive,
+    Spot,
+    Table,
+    Turn,
+    Vector,
+    arguments,
+    inside,
+    read_table,
+    shown,
+    within,
+)
+
+GAP = "the distance in mm at which it begins to press, positive"
+FRICTION = "the coefficient of friction between it and the sheet, 0 or more, unless that of the scene holds"
+Rubbing = Annotated[float, Field(ge=0.0, le=100.0)]
 
 
 class PressTable(Table):
@@ -39,7 +59,8 @@ class PressTable(Table):
         50.0,
         description="the stiffness of its surface in N/mm for every mm of the edges of the mesh, positive",
     )
-    gap: Length = Field(0.05, description="the distance in mm at which it begins to press, positive")
+    gap: Length = Field(0.05, description=GAP)
+    friction: Rubbing | None = Field(None, description=FRICTION)
 
     @model_validator(mode="after")
     def has_a_width(self) -> PressTable:
@@ -51,6 +72,34 @@ class PressTable(Table):
         return self
 
 
+class MouldTable(Table):
+    """A body of triangles from a file, `bh.Mould`."""
+
+    file: Annotated[str, Field(min_length=1, max_length=300)] = Field(
+        description="the name of an STL or OBJ file with a closed body, in the folder of the scene"
+    )
+    unit: Annotated[str, Field(min_length=1, max_length=20)] = Field(
+        description='the unit of length in the file, such as "mm", "cm", "m" or "in"; the file does not say it'
+    )
+    name: Annotated[str, Field(min_length=1, max_length=60)] = Field(
+        "mould", description="a name by which its force is told, another one for every body of the step"
+    )
+    at: Spot = Field(
+        [0.0, 0.0, 0.0],
+        description="three numbers [x, y, z] in mm, where the origin of the file lies where the step begins",
+    )
+    axis: Vector = Field(
+        [0.0, 0.0, 1.0],
+        description="three numbers [x, y, z], the axis through the origin of the file that it is turned about before",
+    )
+    angle: Turn = Field(0.0, description="the angle in rad by which it is turned about the axis")
+    travel: Spot = Field(
+        [0.0, 0.0, 0.0], description="three numbers [x, y, z] in mm, how far it moves during the step"
+    )
+    gap: Length = Field(0.05, description=GAP)
+    friction: Rubbing | None = Field(None, description=FRICTION)
+
+
 class TetherTable(Table):
     """Keys of `bh.Tether`."""
 
@@ -60,8 +109,7 @@ class TetherTable(Table):
     )
 
 
-def _indenter(table: Table) -> Indenter:
-    assert isinstance(table, PressTable)
+def _indenter(table: PressTable) -> Indenter:
     x, y, z = table.direction
     along = math.hypot(x, y)
     return Indenter(
@@ -75,25 +123,42 @@ def _indenter(table: Table) -> Indenter:
         tilt=math.atan2(z, along),
         stiffness=table.stiffness,
         gap=table.gap,
+        friction=table.friction,
     )
 
 
-def _tether(table: Table) -> Tether:
-    return Tether(**arguments(table))
+def _mould(table: MouldTable, folder: Path, at: str) -> Mould:
+    given = arguments(table)
+    file, by = inside(folder, given.pop("file"), f"{at}.file"), given.pop("travel")
+    if not file.is_file():
+        raise SceneError(f"{at}.file = {shown(table.file)} is not there; check the name and the folder")
+    with within(at):
+        return Mould.read(file, by=by, **given)
 
 
 BODIES: dict[str, type[Table]] = {"press": PressTable, "tether": TetherTable}
-_MAKERS: dict[str, Callable[[Table], Actuation]] = {"press": _indenter, "tether": _tether}
+OTHERS: dict[str, type[Table]] = {"press": MouldTable}  # what a body may be in place of that
+FILE = "file"  # the key that makes a mould of what presses
 
 
-def body(key: str, table: Table) -> Actuation:
+def body(key: str, item: object, at: str, folder: Path) -> Actuation:
     """The body of a table.
 
     Args:
         key: one of `BODIES`.
-        table: that has been read.
+        item: what the scene has there.
+        at: its dotted path.
+        folder: where files that it names are looked for.
 
     Raises:
-        ModelError: its values do not go together; one line.
+        SceneError: its values cannot be, or do not go together; one line.
     """
-    return _MAKERS[key](table)
+    if key == "press" and isinstance(item, dict) and FILE in item:
+        return _mould(read_table(MouldTable, item, at), folder, at)
+    if key == "tether":
+        tether = read_table(TetherTable, item, at)
+        with within(at):
+            return Tether(**arguments(tether))
+    bar = read_table(PressTable, item, at)
+    with within(at):
+        return _indenter(bar)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bh.scene import tables
-from bh.scene.bodies import BODIES
+from bh.scene.bodies import BODIES, OTHERS
 from bh.scene.loads import ImperfectionTable, SpringTable
 from bh.scene.moving import MoveTable
 from bh.scene.patterns import LIBRARY, DrawingPattern
@@ -46,6 +46,8 @@ def schema() -> Schema:
     patterns: list[type[Table]] = [*LIBRARY.values(), DrawingPattern]
     acting = {**tables.ACTUATIONS, **BODIES}
     steps = {key: _one_or_more(_table(found, kind)) for key, kind in acting.items()}
+    for key, other in OTHERS.items():
+        steps[key] = _one_or_more({"anyOf": [_table(found, BODIES[key]), _table(found, other)]})
     steps["until"] = _table(found, tables.UntilTable)
     steps["move"] = _table(found, MoveTable)
     support: Schema = {"anyOf": [_table(found, tables.SupportTable), OWN]}
@@ -62,6 +64,7 @@ def schema() -> Schema:
         "contact": {
             "anyOf": [{"enum": ["thickness", "auto", False]}, {"type": "number", "exclusiveMinimum": 0}]
         },
+        "friction": {"type": "number", "minimum": 0},
         "symmetry": {"anyOf": [{"enum": ["x", "y"]}, VECTOR]},
         "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},
         "steps": {

@@ -26,7 +26,7 @@ from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, 
 from bh.model.until import Until
 from bh.scene.bodies import BODIES, body
 from bh.scene.changes import set_keys
-from bh.scene.contact import contact_of
+from bh.scene.contact import check_friction, contact_of, friction_of
 from bh.scene.crease_tables import crease_law
 from bh.scene.loads import check_springs, not_flat, springs_of
 from bh.scene.meshing import Drawn, mesh_of
@@ -75,6 +75,7 @@ SECTIONS = (
     "accuracy",
     "symmetry",
     "contact",
+    "friction",
     "zones",
 )
 ACTING = {**ACTUATIONS, **BODIES}
@@ -224,7 +225,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     outputs = read_table(OutputsTable, data.get("outputs", {}), "outputs")
     supports = as_tables(data.get("supports", []), "supports")
     creases = as_table(data.get("creases", {}), "creases")
-    asked = [_steps(item, f"steps[{i}]") for i, item in enumerate(steps)]
+    asked = [_steps(item, f"steps[{i}]", folder) for i, item in enumerate(steps)]
     numbers = [i for i, legs in enumerate(asked) for _ in legs]
     drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data, sheet.t)
     model = Model(
@@ -237,9 +238,11 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
         formulation=name,
         hinge_lock=how.hinge_lock,
         contact=contact_of(data.get("contact", "auto")),
+        friction=friction_of(data.get("friction", 0.0)),
         springs=springs_of(data.get("springs", [])),
     )
     check_springs(model)
+    check_friction(model)
     _check_names(model, numbers)
     _check_steps(model, numbers)
     return Scene(
@@ -309,7 +312,7 @@ def _crease(item: object, at: str) -> CreaseLaw:
         return CreaseLaw(table.Lstar, table.stiffness, table.rest, law)
 
 
-def _steps(item: object, at: str) -> tuple[Step, ...]:
+def _steps(item: object, at: str, folder: Path) -> tuple[Step, ...]:
     """The step of a table, or those of its move."""
     step = as_table(item, at)
     check_keys(at, {key: step[key] for key in step if ":" not in key}, (*ACTING, "move", "until", *CHANGES))
@@ -317,10 +320,10 @@ def _steps(item: object, at: str) -> tuple[Step, ...]:
         raise SceneError(f"{at} is empty; add one of {', '.join((*ACTING, 'move', *CHANGES))}")
     if "move" in step:
         return moved(step, at, *_changes(step, at))
-    return (_step(step, at),)
+    return (_step(step, at, folder),)
 
 
-def _step(step: dict[str, object], at: str) -> Step:
+def _step(step: dict[str, object], at: str, folder: Path) -> Step:
     found: list[Actuation] = []
     until = None
     support, release = _changes(step, at)
@@ -331,7 +334,7 @@ def _step(step: dict[str, object], at: str) -> Step:
             until = _until(value, f"{at}.until")
             continue
         for where, each in one_or_more(value, f"{at}.{key}"):
-            found.append(_actuation(key, each, where))
+            found.append(body(key, each, where, folder) if key in BODIES else _actuation(key, each, where))
     with within(at):
         return Step(tuple(found), until, support, release)
 
@@ -364,9 +367,6 @@ def _actuation(key: str, item: object, at: str) -> Actuation:
             own: Actuation = made(key, as_table(item, at), Actuation)
             return own
     table = read_table(ACTING[key], item, at)
-    if key in BODIES:
-        with within(at):
-            return body(key, table)
     given = arguments(table)
     if isinstance(given.get("direction"), tuple):
         given["direction"] = _direction(given["direction"], f"{at}.direction")

@@ -11,6 +11,7 @@ from bh.solvers.load_control import AtBifurcation, LoadControl
 from bh.solvers.newton import Solution
 from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.points import ARC, LOAD, Increment, Point, point
+from bh.solvers.snapping import lets_go
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import System
 
@@ -50,6 +51,9 @@ class Automatic:
         load = replace(self.load, at_bifurcation=self.at_bifurcation)
         hasty = replace(load, smallest=max(self.patience, load.smallest), foresee=True, brisk=NEVER)
         failure: Increment | None = None
+        if lets_go(system) and self.at_bifurcation == "stable":  # no branch is of use that turns back
+            yield from load.follow(system, points[-3:], increment)
+            return
         while True:
             if points[-1].mode != ARC:
                 failure = yield from self._run(hasty.follow(system, points[-3:], increment), points)

@@ -15,3 +15,12 @@ def creeping(merits: Sequence[float]) -> bool:
         merits: of the states so far, N mm.
     """
     return len(merits) > STEPS and merits[-1 - STEPS] - merits[-1] < LEAST * abs(merits[-1])
+
+
+def slow(sizes: Sequence[float]) -> bool:
+    """Do the sizes of Newton's steps, from the fifth on, not even halve in two iterations?
+
+    The first ones say nothing: the second is often the largest, when the stretching that large rotations have left in
+    the linear prediction is taken out.
+    """
+    return len(sizes) > 4 and sizes[-1] > 0.5 * sizes[-3]

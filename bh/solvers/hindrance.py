@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.points import Point, extrapolate, ways
-from bh.solvers.system import Hindered, System, clear_part, meeting, pressing
+from bh.solvers.system import Hindered, Lagging, System, clear_part, meeting, pressing
 
 Array = NDArray[np.float64]
 SMALLEST = 1e-5  # part of a step that an increment up to a contact may be
@@ -105,7 +105,7 @@ def up_to_contact(system: System, points: Sequence[Point], lam: float) -> tuple[
     meets = pressing(system, here.q, here.lam)
     for _ in range(2):
         q, _ = extrapolate(points, lam)
-        part = meeting(system, here.q, q - here.q, lam)
+        part = meeting(system, here.q, q - here.q, lam, here.lam)
         if part >= 1.0 or part * (lam - here.lam) < SMALLEST:
             break
         lam, meets = here.lam + part * (lam - here.lam), True
@@ -131,12 +131,12 @@ def clear_guess(
     Returns:
         unknowns (n,) and element forces (f,) to which nothing stands in the way.
     """
-    part = clear_part(system, here.q, guess[0] - here.q, lam)
+    part = clear_part(system, here.q, guess[0] - here.q, lam, here.lam)
     if part >= 1.0:
         return guess
     if other is not None:
         tangent = other()
-        along = clear_part(system, here.q, tangent[0] - here.q, lam)
+        along = clear_part(system, here.q, tangent[0] - here.q, lam, here.lam)
         if along > part:
             part, guess = along, tangent
     part = 1.0 if part >= 1.0 else 0.9 * part
@@ -156,6 +156,8 @@ def slipped(system: System, here: Point, there: Point) -> str:
         there: the next one.
     """
     if not (isinstance(system, Hindered) and system.hindered):
+        return ""
+    if isinstance(system, Lagging) and system.lags:  # what slides does not go back the way it came
         return ""
     if not (pressing(system, here.q, here.lam) or pressing(system, there.q, there.lam)):
         return ""

@@ -30,6 +30,7 @@ from bh.solvers.points import (
     point,
     power_rate,
 )
+from bh.solvers.snapping import FALLS, fall, lets_go
 from bh.solvers.stability import leave_saddle, locate
 from bh.solvers.system import System
 
@@ -163,6 +164,9 @@ class LoadControl:
                 cuts, iterations = [], 0
                 continue
             imbalance = tried.solution.evaluation.imbalance
+            if tried.objection and len(cuts) >= FALLS and self.at_bifurcation == "stable" and lets_go(system):
+                tried = _fallen(system, here, lam, tried, self.newton)
+                iterations += tried.iterations
             if tried.objection:
                 cuts.append(f"lambda {lam:.6g}: {tried.objection}")
                 step = 0.5 * (lam - here.lam)
@@ -361,6 +365,15 @@ def downhill(system: System, q: Array, lam: float, newton: Newton) -> Solution:
 def _lost(found: Solution) -> bool:
     """Whether a branch has no stable state where Newton's method went."""
     return found.reason == INDEFINITE or found.stable is False
+
+
+def _fallen(system: System, here: Point, lam: float, tried: _Trial, newton: Newton) -> _Trial:
+    """A trial that has found no state near by, where the sheet is let fall to one; as it was where there is none."""
+    found, note = fall(system, here, lam, newton)
+    if not note:
+        return replace(tried, iterations=found.iterations)
+    there = point(system, found.q, lam, evaluation=found.evaluation, negative=found.negative)
+    return _Trial(there, found, found, "", note, found.iterations)
 
 
 def _neutral(system: System, here: Point, known: bool) -> Array | None:

@@ -165,6 +165,14 @@ class Storage:
         """Whether the values are those of a band."""
         return self.sparse is None
 
+    def diagonal(self, unknowns: Ints) -> Ints:
+        """(k,) where the values of some unknowns (k,) on the diagonal are."""
+        row = np.empty(len(self.order), dtype=np.int64)
+        row[self.order] = np.arange(len(row))
+        if self.sparse is None:
+            return row[unknowns] * (self.bandwidth + 1)
+        return self.sparse.indptr[row[unknowns]].astype(np.int64)
+
     def matrix(self, data: Array) -> BandMatrix | SparseMatrix:
         """The matrix of values data (size,), which it keeps without a copy."""
         if self.sparse is None:

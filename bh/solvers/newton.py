@@ -5,14 +5,15 @@ Where both stop, a pseudo-transient motion to rest is the last resort (`bh.solve
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.creeping import CREEPS, creeping
+from bh.solvers.creeping import CREEPS, creeping, slow
 from bh.solvers.factor import Descent, Factor, IndefiniteError, Matrix
+from bh.solvers.lagging import Guess, lagged
 from bh.solvers.modes import (
     GAP,
     KNOWN_GAP,
@@ -59,7 +60,11 @@ class Solution:
     @property
     def stable(self) -> bool | None:
         """True if no mode is negative, None where that was not looked at."""
-        return None if self.negative is None else self.negative == 0
+        return None if self.negative is None else not self.negative
+
+    def after(self, iterations: int) -> Solution:
+        """The same with iterations that were spent before."""
+        return replace(self, iterations=iterations + self.iterations)
 
 
 @dataclass(frozen=True)
@@ -101,19 +106,22 @@ class Newton:
         q: Array,
         lam: float,
         forces: Array | None = None,
-        second_guess: Callable[[], tuple[Array, Array]] | None = None,
+        second_guess: Guess | None = None,
     ) -> Solution:
         """Equilibrium at `lam` from the guess `q`; `forces` are the element forces that go with the guess.
-
-        `second_guess` makes another one, tried by full Newton before the globalised way.
 
         Args:
             system: whose equilibrium is sought.
             q: (n,) guess.
             lam: load parameter of the step, 0 to 1.
             forces: (f,) element forces that go with the guess; None for those of the system there.
-            second_guess: makes unknowns and forces of another guess.
+            second_guess: makes unknowns and forces of another guess, for full Newton before the globalised way.
         """
+        return lagged(self._solve, system, q, lam, forces, second_guess)
+
+    def _solve(
+        self, system: System, q: Array, lam: float, forces: Array | None, second_guess: Guess | None
+    ) -> Solution:
         first = self.solve_full(system, q, lam, forces)
         if first.reason == ALONG:
             return first
@@ -333,15 +341,6 @@ def exhaust(steps: Generator[Array, None, Solution]) -> Solution:
         except StopIteration as end:
             found: Solution = end.value
             return found
-
-
-def slow(sizes: Sequence[float]) -> bool:
-    """Do the sizes of Newton's steps, from the fifth on, not even halve in two iterations?
-
-    The first ones say nothing: the second is often the largest, when the stretching that large rotations have left in
-    the linear prediction is taken out.
-    """
-    return len(sizes) > 4 and sizes[-1] > 0.5 * sizes[-3]
 
 
 def roll_off(

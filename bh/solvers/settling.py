@@ -9,7 +9,7 @@ its energy has a minimum, never through a closed hinge: where one is about to cl
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -126,8 +126,28 @@ class Settling:
         Returns:
             the stable state; not converged, with the reason, where the steps were too few.
         """
+        motion = self.settling_steps(system, q, lam)
+        while True:
+            try:
+                next(motion)
+            except StopIteration as done:
+                found: Solution = done.value
+                return found
+
+    def settling_steps(self, system: System, q: Array, lam: float) -> Generator[Array, None, Solution]:
+        """`settle`, one step at a time.
+
+        Args:
+            system: that settles.
+            q: (size,) unknowns where it begins.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            what came of it; the unknowns before every step are given on the way.
+        """
         now, shift, still = system.evaluate(q, lam), self.shift, 0
         for step in range(self.most):
+            yield q
             matrix = system.tangent(q, lam, now.forces).matrix
             if now.imbalance <= self.newton.tolerance or (still > 3 and now.imbalance <= CALM):
                 return Solution(q, now, step, True, "", count_negative(matrix), True)

@@ -221,13 +221,14 @@ class Rounded(Protocol):
 class Limited(Protocol):
     """Ability of a system: something can stand in the way of a step, which then has to be shorter."""
 
-    def free_part(self, q: Array, dq: Array, lam: float) -> float:
+    def free_part(self, q: Array, dq: Array, lam: float, since: float | None = None) -> float:
         """How much of the step dq (n,) from q nothing stands in, 0 to 1.
 
         Args:
             q: (n,) unknowns, with nothing in their way.
             dq: (n,) step.
             lam: load parameter of the step, 0 to 1.
+            since: that of q, where what stands in the way moves with lambda meanwhile.
         """
         ...
 
@@ -239,6 +240,11 @@ class Hindered(Limited, Protocol):
     @property
     def hindered(self) -> bool:
         """Does anything stand in the way, ever?"""
+        ...
+
+    @property
+    def looking(self) -> float:
+        """What looks at what stands in the way have taken so far, s of one core of 2.5 GHz, counted by their work."""
         ...
 
     def unhindered(self) -> AbstractContextManager[None]:
@@ -297,7 +303,7 @@ def limited(system: System, q: Array, dq: Array, lam: float) -> Array:
     return dq if part >= 1.0 else 0.9 * part * dq
 
 
-def clear_part(system: System, q: Array, dq: Array, lam: float) -> float:
+def clear_part(system: System, q: Array, dq: Array, lam: float, since: float | None = None) -> float:
     """How much of the step dq (n,) from q nothing stands in, 0 to 1.
 
     Args:
@@ -305,13 +311,15 @@ def clear_part(system: System, q: Array, dq: Array, lam: float) -> float:
         q: (n,) unknowns.
         dq: (n,) step.
         lam: load parameter of the step, 0 to 1.
+        since: that of q, where it is another one.
     """
     # asked in every iteration: looking for the method takes 0.1 microseconds, `isinstance` of a protocol 20
-    free_part: Callable[[Array, Array, float], float] | None = getattr(system, "free_part", None)
-    return 1.0 if free_part is None else free_part(q, dq, lam)
+    free_part: Callable[[Array, Array, float, float | None], float] | None
+    free_part = getattr(system, "free_part", None)
+    return 1.0 if free_part is None else free_part(q, dq, lam, since)
 
 
-def meeting(system: System, q: Array, dq: Array, lam: float) -> float:
+def meeting(system: System, q: Array, dq: Array, lam: float, since: float) -> float:
     """How much of the step dq (n,) from q leads to where something new begins to press, 0 to 1; 1 where nothing does.
 
     Args:
@@ -319,9 +327,10 @@ def meeting(system: System, q: Array, dq: Array, lam: float) -> float:
         q: (n,) unknowns.
         dq: (n,) step.
         lam: load parameter of the step, 0 to 1.
+        since: that of q.
     """
-    approach: Callable[[Array, Array, float], float] | None = getattr(system, "approach", None)
-    return 1.0 if approach is None else approach(q, dq, lam)
+    approach: Callable[[Array, Array, float, float], float] | None = getattr(system, "approach", None)
+    return 1.0 if approach is None else approach(q, dq, lam, since)
 
 
 def pressing(system: System, q: Array, lam: float) -> bool:
@@ -403,5 +412,37 @@ class Remembering(Protocol):
 
         Args:
             history: as `history_at` gives it.
+        """
+        ...
+
+    def takes(self, history: Array) -> bool:
+        """Can an array from a file be a history of this system?
+
+        Args:
+            history: that is asked about.
+        """
+        ...
+
+
+@runtime_checkable
+class Lagging(Protocol):
+    """Ability of a system: its energy holds something that is taken from a state before, such as normal forces."""
+
+    @property
+    def lags(self) -> bool:
+        """Does it, in this model?"""
+        ...
+
+    def lag_back(self) -> None:
+        """Take it from the state that was accepted last."""
+        ...
+
+    def lag(self, q: Array, lam: float, settled: float) -> bool:
+        """Take it from a state, unless it changes by less than a part of `settled`; whether it has changed.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+            settled: largest change, in parts of it.
         """
         ...

@@ -221,7 +221,7 @@ def _beside(path: Path, step: int, asked: bool, item: Increment | None) -> str:
     system = path.system(step) if half is None else half.system
     done = [record for record in path.records if record.step <= step]
     doubtful = asked or any(r.cuts or r.jumped or r.critical or r.iterations >= HARD for r in done)
-    if not asked and path.model.stops_itself:
+    if not asked and path.model.hindered:
         return ""  # pushed states would have to find ways round all that presses, which takes longer than the path
     if item is not None:
         return look_around(system, item.point, doubtful, Newton(), item.factorised)
@@ -305,17 +305,20 @@ def _resume(model: Model, file: FilePath, symmetry: Plane | None) -> tuple[Path,
     return path, target
 
 
-def check_resumable(file: FilePath, model: Model) -> None:
+def check_resumable(file: FilePath, model: Model) -> int:
     """See that a path file has steps that a model can go on from.
 
     Args:
         file: the path file.
         model: to be solved.
 
+    Returns:
+        how many.
+
     Raises:
         PathFileError: it has none; one line that names what differs.
     """
-    _kept_steps(Path.load(file), model, file)
+    return _kept_steps(Path.load(file), model, file)
 
 
 def _kept_steps(path: Path, model: Model, file: FilePath) -> int:

@@ -28,7 +28,7 @@ def neighbour(before: Path, model: Model) -> Path | None:
         return None
     if any(step.until is not None for step in model.steps):
         return None
-    if any(law.law is not None and law.law.remembers for law in model.creases.values()):
+    if model.remembers:
         return None
     path = Path(model)
     ends = {record.step: index for index, record in enumerate(before.records)}

@@ -1,9 +1,37 @@
-"""A window in which a sheet is folded, pulled and read while it is handled: `bh studio`, `bh.studio.open_window`.
+"""A window in which a sheet is folded, pulled and read while it is handled: `bh studio`, `bh.studio(model)`.
 
-The physics is `bh.live`; the server speaks to a browser on the same machine and to nobody else.
+The physics is `bh.live`; the server speaks to a browser on the same machine and to nobody else. The module is called
+as a function: `bh.studio(model)` opens the window, in a notebook as a frame (`bh.studio.opening.opened`).
 """
 
-from bh.studio.server import open_window
-from bh.studio.sheets import of_file, of_library, of_model
+from __future__ import annotations
 
-__all__ = ["of_file", "of_library", "of_model", "open_window"]
+import sys
+from pathlib import Path
+from types import ModuleType
+
+from bh.model.model import Model
+from bh.studio.opening import Opened, opened
+from bh.studio.server import open_window
+from bh.studio.sheets import LiveSheet, of_file, of_library, of_model
+
+__all__ = ["Opened", "of_file", "of_library", "of_model", "open_window"]
+
+
+class _Module(ModuleType):
+    """A module that is called."""
+
+    def __call__(
+        self,
+        what: Model | LiveSheet | Path | str | None = None,
+        *,
+        material: str = "card",
+        port: int = 0,
+        browser: bool | None = None,
+        wait: bool | None = None,
+    ) -> Opened:
+        """Open the window; see `bh.studio.opening.opened`."""
+        return opened(what, material=material, port=port, browser=browser, wait=wait)
+
+
+sys.modules[__name__].__class__ = _Module

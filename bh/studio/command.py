@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from bh.errors import InputError
+from bh.studio.opening import sheet_of
 from bh.studio.server import open_window
-from bh.studio.sheets import LIBRARY, LONGEST, LiveSheet, of_file, of_library
+from bh.studio.sheets import LIBRARY
 
 
 def studio(
@@ -32,19 +31,4 @@ def studio(
     Raises:
         InputError: the file cannot be read or meshed, or the port is taken.
     """
-    open_window(_sheet(file, material), port, browser)
-
-
-def _sheet(file: str | None, material: str) -> LiveSheet | None:
-    if file is None:
-        return None if material == "card" else of_library(next(iter(LIBRARY)), material)
-    if file in LIBRARY and not Path(file).exists():
-        return of_library(file, material)
-    try:
-        with Path(file).open("rb") as stream:
-            data = stream.read(LONGEST + 1)
-    except OSError as error:
-        raise InputError(
-            f"'{file}' cannot be read ({error.strerror}); give a drawing, or one of {', '.join(LIBRARY)}"
-        ) from error
-    return of_file(file, data, material)
+    open_window(sheet_of(file, material), port, browser)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -12,14 +14,16 @@ import bh.studio.messages as asked
 from bh.errors import InputError
 from bh.live import Controls, Session, held
 from bh.model.sheet import Sheet
+from bh.runtime.memory import give_back
 from bh.solving.trace import trace
 from bh.studio.colours import offered, top_of
-from bh.studio.exports import export
+from bh.studio.exports import export, film
 from bh.studio.finer import Finer, finer
 from bh.studio.frames import Json, creases_of, described, head_of, line, packed, surface
-from bh.studio.sheets import LiveSheet, material_of, of_file, of_library
+from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
 
 BUDGET = 0.03  # s of an update
+TIDY = 5.0  # s between two times that free memory goes back to the system
 
 
 class Desk:
@@ -37,6 +41,8 @@ class Desk:
         self._shown: tuple[object, ...] = ()
         self._snapped = False  # since the last picture
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
+        self._tidied = time.monotonic()
+        self._news: list[Json] = []
         self.put(sheet or of_library("arc"))
 
     # ------------------------------------------------------------------------------- what is asked
@@ -50,10 +56,12 @@ class Desk:
         """
         model = sheet.model if sheet.model.supports else held(sheet.model)
         self.sheet = replace(sheet, model=model)
-        self.session = Session(model)
+        self.session = Session(model, settles=sheet.settles)
         if controls is not None:
             self.session.ask(controls)
         self.frame = self.session.update(0.0)
+        self._finer = None  # it is of another sheet
+        give_back()
         self._colours = offered(self.frame.state)
         if self._colour != "none" and self._colour not in self._colours:
             self._colour = "bending"
@@ -81,6 +89,8 @@ class Desk:
                     self.session.fold(crease, 0.01 * value * self.sheet.full[crease])
             case asked.Pull(node=node, to=to):
                 self.session.pull(node, to)
+            case asked.Pinch(a=a, b=b, gap=gap):
+                self.session.pinch(a, b, gap)
             case asked.LetGo(node=node):
                 self.session.let_go(node)
             case asked.Plain(do=what):
@@ -90,6 +100,9 @@ class Desk:
             case asked.Export(what=what):
                 name, data = export(what, self.sheet, self.session, self.session.rest(20.0))
                 return [{"kind": "file", "name": name, "data": base64.b64encode(data).decode()}]
+            case asked.Film(pictures=pictures, ms=ms):
+                name, data = f"{Path(self.sheet.name).stem or 'sheet'}.gif", film(pictures, ms)
+                return [{"kind": "file", "name": name, "data": base64.b64encode(data).decode()}]
         return []
 
     def _laid(self, message: asked.Asked) -> bool:
@@ -97,8 +110,10 @@ class Desk:
         match message:
             case asked.Open(name=name, data=data):
                 self.put(of_file(name, data, self.material))
-            case asked.Pattern(name=name):
-                self.put(of_library(name, self.material))
+            case asked.Pattern(name=name, values=values):
+                self.put(of_library(name, self.material, values))
+            case asked.Spring(crease=crease, Lstar=Lstar):
+                self.put(self.sheet.sprung(crease, Lstar), self.session.wanted)
             case asked.Hold(node=node, on=on):
                 self._hold(node, on)
             case asked.Material():
@@ -137,7 +152,7 @@ class Desk:
         if message.name is not None:
             young, nu, t, _ = material_of(message.name)
             self.material, now = message.name, Sheet(E=young, nu=nu, t=t)
-        nu = now.nu if self.sheet.model.formulation != "bars-and-hinges" else 0.0
+        nu = now.nu if self.sheet.model.formulation != BARS else 0.0
         sheet = replace(
             now, E=message.E or now.E, nu=nu if message.nu is None else message.nu, t=message.t or now.t
         )
@@ -177,6 +192,27 @@ class Desk:
         self._shown = self._now()
         self.frame = self.session.update(budget)
         self._snapped = self._snapped or self.frame.snapped
+        if self.frame.note and self.sheet.settles and self.sheet.model.formulation == BARS:
+            self._bend()
+        if self.frame.at_rest and time.monotonic() - self._tidied > TIDY:
+            give_back()
+            self._tidied = time.monotonic()
+
+    def _bend(self) -> None:
+        """Slender faces of bars collapse under stiff springs: the same faces, which may bend, fold further."""
+        note, nu = self.frame.note, material_of(self.material)[1]
+        self.put(self.sheet.bent(nu), self.session.wanted)
+        text = f"bars and hinges cannot go on ({note}); now its faces may bend, and it folds anew"
+        self._news += [self.describe(), line(text)]
+
+    def news(self) -> list[Json]:
+        """What came of the work beside frames.
+
+        Returns:
+            since this was asked last: another sheet, a line.
+        """
+        news, self._news = self._news, []
+        return news
 
     def picture(self) -> bytes:
         """The newest frame as it travels.

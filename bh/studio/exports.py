@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from bh.model.supports import Support
 from bh.paths.export import FLAT, FOLDED, write_flat, write_state
 from bh.studio.sheets import LiveSheet, quoted
 
+MOST_PIXELS = 1_000_000  # of a picture of a film
 FORMATS = (
     "scene",
     "python",
@@ -66,6 +69,32 @@ def export(what: str, sheet: LiveSheet, session: Session, frame: Frame) -> tuple
         else:
             raise InputError(f"there is no format '{what}'; choose one of {', '.join(FORMATS)}")
         return f"{stem}-{kind}{dot}{suffix}", file.read_bytes()
+
+
+def film(pictures: Sequence[str], ms: int) -> bytes:
+    """A GIF of pictures.
+
+    Args:
+        pictures: JPEG or PNG in base64, of one size, at most `MOST_PIXELS` each.
+        ms: between two of them.
+
+    Raises:
+        InputError: one is no picture, too large, or of another size.
+    """
+    from PIL import Image  # of matplotlib's own needs
+
+    frames: list[Image.Image] = []
+    for text in pictures:
+        try:
+            found = Image.open(io.BytesIO(base64.b64decode(text, validate=True)), formats=("PNG", "JPEG"))
+            if found.width * found.height > MOST_PIXELS or (frames and found.size != frames[0].size):
+                raise InputError(f"pictures of a film are of one size, at most {MOST_PIXELS:,} pixels")
+            frames.append(found.convert("RGB").quantize(128))
+        except (ValueError, OSError, Image.DecompressionBombError) as error:
+            raise InputError("a picture of the film cannot be read; record it anew") from error
+    out = io.BytesIO()
+    frames[0].save(out, "GIF", save_all=True, append_images=frames[1:], duration=ms, loop=0)
+    return out.getvalue()
 
 
 def scene_text(sheet: LiveSheet, session: Session) -> str:

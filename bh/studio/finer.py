@@ -132,7 +132,7 @@ def _moved(model: Model, mesh: SheetMesh, state: State, wanted: Controls) -> tup
         x, y, z = (np.array(grip.to) + shape[there] - state.points[node]).tolist()
         grips[there] = Grip((x, y, z), grip.stiffness)
     mesh = replace(mesh, folds=old.folds)
-    return replace(model, mesh=mesh, supports=supports), replace(wanted, grips=grips), shape
+    return replace(model, mesh=mesh, supports=supports), Controls(wanted.folds, grips), shape
 
 
 def _solve(model: Model, wanted: Controls, shape: Array, going: Callable[[], bool]) -> State | str | None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.live import Frame, Session
+from bh.live import Frame, Jaws, Session
 from bh.scene.folding import MATERIALS
 from bh.studio.colours import Colour
 from bh.studio.exports import FORMATS
@@ -58,9 +58,23 @@ def head_of(frame: Frame) -> Json:
         "folds": frame.fold_angles(),
         "grips": {str(n): list(g.to) for n, g in frame.wanted.grips.items()},
         "forces": {str(n): list(f) for n, f in frame.forces.items()},
+        "pinches": [_pinched(frame, jaws, force) for jaws, force in frame.pinches().items()],
         "strain": float(np.abs(frame.state.strain).max()),
         "ms": 1e3 * frame.seconds,
         "iterations": frame.iterations,
+    }
+
+
+def _pinched(frame: Frame, jaws: Jaws, force: float) -> Json:
+    """Nodes, line, distances (mm) and force (N) of a pinch."""
+    return {
+        "a": jaws.a,
+        "b": jaws.b,
+        "middle": list(jaws.middle),
+        "along": list(jaws.along),
+        "gap": jaws.gap(frame.wanted.grips),
+        "apart": float(np.linalg.norm(frame.points[jaws.b] - frame.points[jaws.a])),
+        "force": force,
     }
 
 
@@ -122,6 +136,8 @@ def described(
         "material": {"name": material, "E": model.sheet.E, "nu": model.sheet.nu, "t": model.sheet.t},
         "materials": {name: about for name, (_, _, _, about) in MATERIALS.items()},
         "library": list(LIBRARY),
+        "values": dict(sheet.values),
+        "springs": {name: law.Lstar for name, law in model.creases.items()},
         "formats": list(FORMATS),
         "formulation": model.formulation,
         "unknowns": session.size,

@@ -39,10 +39,27 @@ class Open(Message):
 
 
 class Pattern(Message):
-    """A pattern of the library."""
+    """A pattern of the library, with numbers in place of its own (mm, rad)."""
 
     do: Literal["pattern"]
     name: str
+    values: dict[str, Finite | Annotated[list[Finite], Field(max_length=20)]] = {}
+
+
+class Spring(Message):
+    """A crease, or "all", to a spring of a length scale, mm; None for an angle that is imposed."""
+
+    do: Literal["spring"]
+    crease: str
+    Lstar: Positive | None = None
+
+
+class Film(Message):
+    """Pictures of the folded sheet, as JPEG or PNG, to a GIF."""
+
+    do: Literal["film"]
+    pictures: Annotated[list[Annotated[str, Field(max_length=400_000)]], Field(min_length=1, max_length=200)]
+    ms: Annotated[int, Field(ge=20, le=1000)] = 80
 
 
 class Fold(Message):
@@ -66,6 +83,15 @@ class Pull(Message):
     do: Literal["pull"]
     node: Annotated[int, Field(ge=0)]
     to: Point
+
+
+class Pinch(Message):
+    """Two nodes to jaws that are a gap apart, mm; without one the jaws touch them where they are."""
+
+    do: Literal["pinch"]
+    a: Annotated[int, Field(ge=0)]
+    b: Annotated[int, Field(ge=0)]
+    gap: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
 
 
 class LetGo(Message):
@@ -113,7 +139,22 @@ class Export(Message):
     what: str
 
 
-Asked = Open | Pattern | Fold | Percent | Pull | LetGo | Material | Hold | Plain | Colour | Export
+Asked = (
+    Open
+    | Pattern
+    | Spring
+    | Film
+    | Fold
+    | Percent
+    | Pull
+    | Pinch
+    | LetGo
+    | Material
+    | Hold
+    | Plain
+    | Colour
+    | Export
+)
 _ADAPTER: TypeAdapter[Asked] = TypeAdapter(Annotated[Asked, Field(discriminator="do")])
 
 

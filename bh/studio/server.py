@@ -18,6 +18,7 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from bh.errors import InputError
+from bh.runtime.memory import give_back
 from bh.runtime.terminal import say
 from bh.studio.desk import Desk
 from bh.studio.messages import read
@@ -27,7 +28,7 @@ HOST = "127.0.0.1"
 STATIC = Path(__file__).with_name("static")
 LONGEST_MESSAGE = LONGEST * 4 // 3 + 4096  # bytes of a file in base64, and its name
 LONGEST_REQUEST = 65_536  # bytes of a request's body; no page takes one
-MOVES = ["fold", "percent", "pull"]  # of which only the last counts
+MOVES = ["fold", "percent", "pull", "pinch"]  # of which only the last counts
 WINDOWS = 8  # at once
 QUIET = 0.4  # s without a wish before a finer mesh is begun
 POLICY = (
@@ -54,7 +55,7 @@ class Studio:
         """A new token."""
         self.token = secrets.token_urlsafe(16)
         self.sheet = sheet
-        self.windows: set[Window] = set()
+        self.windows: dict[Window, None] = {}  # in the order in which they were opened
         self.pool = ThreadPoolExecutor(2 * WINDOWS, thread_name_prefix="bh-studio")
 
     def application(self) -> tornado.web.Application:
@@ -154,7 +155,7 @@ class Window(tornado.websocket.WebSocketHandler):
             args: of the address; there are none.
             kwargs: none.
         """
-        self.studio.windows.add(self)
+        self.studio.windows[self] = None
         self.drawn.set()
         self.work = asyncio.create_task(self._work())
 
@@ -169,12 +170,13 @@ class Window(tornado.websocket.WebSocketHandler):
 
     def on_close(self) -> None:
         """Give everything back."""
-        self.studio.windows.discard(self)
+        self.studio.windows.pop(self, None)
         self.going.clear()
         for task in (self.work, self.finer):
             if task is not None:
                 task.cancel()
         self.desk = None
+        give_back()
 
     async def _work(self) -> None:
         run = asyncio.get_running_loop().run_in_executor
@@ -198,6 +200,8 @@ class Window(tornado.websocket.WebSocketHandler):
             if desk.busy:
                 try:
                     await run(self.studio.pool, desk.work)
+                    for answer in desk.news():
+                        await self._say(answer)
                     if desk.busy and not self.drawn.is_set():
                         continue  # it is solved as fast as it goes, and shown as fast as the browser draws
                     await self.drawn.wait()
@@ -275,7 +279,7 @@ def _subject(message: str | bytes) -> tuple[object, ...] | None:
         return None
     if not isinstance(data, dict) or data.get("do") not in MOVES:
         return None
-    return str(data["do"]), repr(data.get("crease")), repr(data.get("node"))
+    return str(data["do"]), *(repr(data.get(key)) for key in ("crease", "node", "a", "b"))
 
 
 def _fault(error: Exception) -> dict[str, object]:

@@ -6,8 +6,9 @@ import json
 import math
 import re
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from bh.model.model import Model
 from bh.model.sheet import Sheet
 from bh.scene.folding import MATERIALS, PERCENT, Wish, proposals
 from bh.scene.load import Outputs, Scene, parse_scene
+from bh.solvers.settling import Settling
 from meshes import SheetMesh
 
 LONGEST = 5_000_000  # bytes of a drawing
@@ -30,6 +32,7 @@ LIBRARY: Mapping[str, str] = {
     'fold = ["mountain", "valley", "mountain"]',
     "strip": 'kind = "strip"\nlength = 120.0\nwidth = 60.0\ncreases = [20.0, 40.0]\nfold = ["mountain", "valley"]',
 }
+BARS, BENT = "bars-and-hinges", "consistent"
 ODD = re.compile(r"[^\w .()+,=@~-]")
 ALONG, ROWS = 24, 3  # cells of the library's patterns
 
@@ -46,6 +49,8 @@ class LiveSheet:
         remarks: one line each: what was assumed, and what to know of the sheet.
         drawing: name and bytes of the file that `tables` speak of; None for a pattern of the library.
         percent: of the way that is shown first.
+        values: numbers of a pattern of the library that can be chosen, by key.
+        settles: its springs move it downhill to rest where a branch ends, as in its scene.
     """
 
     name: str
@@ -55,29 +60,89 @@ class LiveSheet:
     remarks: tuple[str, ...] = ()
     drawing: tuple[str, bytes] | None = None
     percent: float = PERCENT
+    settles: bool = False
+    values: Mapping[str, float | Sequence[float]] = field(default_factory=dict)
 
     def of(self, sheet: Sheet) -> LiveSheet:
         """The same pattern of another material."""
         return replace(self, model=replace(self.model, sheet=sheet))
 
+    def sprung(self, crease: str, Lstar: float | None) -> LiveSheet:
+        """With a crease that is a spring, or one whose angle is imposed.
 
-def of_library(name: str, material: str = "card") -> LiveSheet:
+        Args:
+            crease: its name, or "all".
+            Lstar: length scale of its stiffness E t^3 / (12 Lstar), mm; None for an imposed angle.
+
+        Raises:
+            InputError: there is no such crease.
+        """
+        folded = [name for name, kind in self.model.mesh.folds.items() if kind != "flat"]
+        if crease not in (*folded, "all"):
+            raise InputError(f"there is no crease '{crease}'; choose one of {', '.join(folded)}, or all")
+        names = folded if crease == "all" else [crease]
+        laws = {name: law for name, law in self.model.creases.items() if name not in names}
+        if Lstar is not None:
+            laws.update({name: CreaseLaw(Lstar) for name in names})
+        return replace(self, model=replace(self.model, creases=laws))
+
+    def bent(self, nu: float) -> LiveSheet:
+        """The same faces as panels that bend, in place of bars and hinges.
+
+        Args:
+            nu: Poisson's ratio, which bars and hinges do not know.
+        """
+        model = replace(self.model, formulation=BENT, sheet=replace(self.model.sheet, nu=nu))
+        tables = self.tables.replace(f'formulation = "{BARS}"', f'formulation = "{BENT}"')
+        return replace(self, model=model, tables=tables)
+
+
+def of_library(
+    name: str, material: str = "card", values: Mapping[str, float | Sequence[float]] | None = None
+) -> LiveSheet:
     """A pattern of the library.
 
     Args:
         name: one of `LIBRARY`.
         material: one of `MATERIALS`.
+        values: numbers in place of those of the library, mm and rad, by key; lists keep their length.
 
     Raises:
-        InputError: there is no such pattern or material.
+        InputError: there is no such pattern, key or material, or the pattern cannot be.
     """
     if name not in LIBRARY:
         raise InputError(f"there is no pattern '{name}'; choose one of {', '.join(LIBRARY)}")
-    tables = f'[pattern]\n{LIBRARY[name]}\n\n[mesh]\nkind = "staggered"\nalong = {ALONG}\nrows = {ROWS}\n'
+    table = tomllib.loads(LIBRARY[name])
+    known = parameters(name)
+    for key, value in (values or {}).items():
+        if key not in known:
+            raise InputError(f"pattern '{name}' has no '{key}' to choose; it has {', '.join(known)}")
+        old = known[key]
+        if isinstance(old, list) != isinstance(value, Sequence) or (
+            isinstance(old, list) and isinstance(value, Sequence) and len(old) != len(value)
+        ):
+            wanted = f"{len(old)} numbers" if isinstance(old, list) else "one number"
+            raise InputError(f"'{key}' of pattern '{name}' takes {wanted}")
+        table[key] = list(value) if isinstance(value, Sequence) else value
+    text = "\n".join(f"{key} = {json.dumps(value)}" for key, value in table.items())
+    tables = f'[pattern]\n{text}\n\n[mesh]\nkind = "staggered"\nalong = {ALONG}\nrows = {ROWS}\n'
     young, nu, t, _ = material_of(material)
     step = '[[steps]]\nfold = { crease = "all", by = 0.5 }\n'
     scene = parse_scene(f"{tables}\n[sheet]\nE = {young}\nnu = {nu}\nt = {t}\n\n{step}", name=name)
-    return _live(name, scene, tables, ())
+    return replace(_live(name, scene, tables, ()), values={**known, **(values or {})})
+
+
+def parameters(name: str) -> dict[str, float | list[float]]:
+    """Numbers of a pattern of the library that can be chosen.
+
+    Args:
+        name: of the pattern.
+
+    Returns:
+        mm and rad, by key.
+    """
+    table = tomllib.loads(LIBRARY[name])
+    return {key: value for key, value in table.items() if key not in ("kind", "fold")}
 
 
 def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
@@ -166,7 +231,8 @@ def _live(name: str, scene: Scene, tables: str, assumed: tuple[str, ...]) -> Liv
                         laws.setdefault(crease, CreaseLaw(item.Lstar, item.stiffness))
     model = replace(model, creases=laws, steps=())
     said = tuple(str(remark) for remark in remarks(model))
-    return LiveSheet(name, model, _full(model.mesh), tables, (*assumed, *said))
+    settles = isinstance(scene.strategy, Settling)
+    return LiveSheet(name, model, _full(model.mesh), tables, (*assumed, *said), settles=settles)
 
 
 def _full(mesh: SheetMesh) -> dict[str, float]:

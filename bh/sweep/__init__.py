@@ -110,7 +110,8 @@ def scene(
         why = getattr(error, "strerror", None) or error
         raise SweepError(f"the scene '{file}' cannot be read ({why}); check the name") from error
     every = {name: (key,) if isinstance(key, str) else tuple(key) for name, key in keys.items()}
-    return SceneTask(text, every, Path(file).parent.resolve(), tuple(places), shape, values=tuple(values))
+    folder, name = Path(file).parent.resolve(), Path(file).name
+    return SceneTask(text, every, folder, tuple(places), shape, values=tuple(values), name=name)
 
 
 def run(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -157,7 +157,7 @@ def _sweep(data: dict[str, object], file: Path) -> Sweep:
         for name, value in measure.values.items()
     )
     place = inside(file.parent, file_of_scene, "scene")
-    task = scene(place, keys, measure.places, measure.shape, values)
+    task = replace(scene(place, keys, measure.places, measure.shape, values), asked_by=str(file))
     return Sweep(task, points, labels, file.stem)
 
 

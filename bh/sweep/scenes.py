@@ -15,6 +15,7 @@ from bh.model.supports import select
 from bh.paths.path import Path as Trace
 from bh.scene.changes import setter
 from bh.scene.load import Scene, scene_from_tables
+from bh.scene.reading import one_line
 from bh.scene.toml_text import read_toml
 from bh.solvers.arc_length import ArcLength
 from bh.solvers.automatic import Automatic
@@ -53,6 +54,8 @@ class SceneTask:
             `bh.sweep.warm`.
         labels: of the parameters, in front of those that the task knows.
         values: numbers to read beside energies and angles.
+        name: of the scene's file, for messages.
+        asked_by: the sweep file, for messages; empty where there is none.
 
     Raises:
         SweepError: the scene has no such key.
@@ -66,6 +69,8 @@ class SceneTask:
     warm: bool = False
     labels: Mapping[str, Label] = field(default_factory=dict)
     values: tuple[Measure, ...] = ()
+    name: str = "scene"
+    asked_by: str = ""
 
     def __post_init__(self) -> None:
         """See that the scene has the keys."""
@@ -107,7 +112,7 @@ class SceneTask:
         for name, value in parameters.items():
             for key in self.keys[name]:
                 _setter(tables, key, name)(value)
-        return scene_from_tables(tables, self.folder)
+        return scene_from_tables(tables, self.folder, self.name)
 
     def __call__(self, parameters: Mapping[str, Value]) -> Measured:
         """Solve the scene of a point and measure its last state."""
@@ -200,6 +205,7 @@ class SceneTask:
 
         Raises:
             SceneError, ModelError: none does; the first one's error.
+            SweepError: the same of a sweep file, whose name it begins with.
         """
         errors = []
         for parameters in tried:
@@ -212,6 +218,8 @@ class SceneTask:
                 return
             except InputError as error:
                 errors.append(error)
+        if self.asked_by:
+            raise SweepError(one_line(f"{self.asked_by}: {errors[0]}")) from errors[0]
         raise errors[0]
 
 

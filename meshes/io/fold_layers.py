@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from meshes.errors import FileFormatError
 from meshes.io.fold_faces import triangulate
 from meshes.io.fold_frame import Frame, show, side
+from meshes.io.fold_nested import drawn_apart
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,6 +32,8 @@ Ask = tuple[Place, Place, int, int]  # the upper and the lower point, and the fa
 ON = 1e-9  # weights and parts of an edge from which a point lies on a corner or a side
 LEFT = 1e-6  # of the distance: what may be wanting
 FEW = 0.1  # a move costs so much of a difference of moves
+ROUNDS = 3  # in which layers that have become steep are moved farther apart
+STEEPEST = 0.5  # cosine of the slope that is reckoned with
 DEAR = 1e3  # what is wanting costs so much more than a move
 
 
@@ -78,10 +81,17 @@ def untangled(frame: Frame, orders: Sequence[Order], distance: float) -> Frame:
     Raises:
         FileFormatError: a face cannot be read, or layers that far apart do not fit; one line that names the faces.
     """
+    apart = drawn_apart(frame.points, [face[0] for face in frame.faces], orders, distance)
+    _check_room(frame, apart, distance)
+    frame = replace(frame, points=apart)
     triangles = _triangles(frame)
     asks = [ask for order in orders for ask in _asked(frame.points, triangles, order)]
     sides = sorted({side(t[k], t[k - 1]) for each in triangles for t in each for k in range(3)})
-    points = _moved(frame.points, np.array(sides), asks, _normals(frame, triangles), distance)
+    points, wanted = frame.points, np.full(len(asks), distance)
+    for _ in range(ROUNDS):
+        points = _moved(frame.points, np.array(sides), asks, _normals(frame, triangles), wanted)
+        # layers that have become steep are nearer to each other than points above one another
+        wanted = np.maximum(wanted, distance / _steepness(points, asks, _normals(frame, triangles)))
     # as triangles, since a corner that has moved may change which diagonal is the shorter one
     faces = [[list(triangle)] for each in triangles for triangle in each]
     own = {
@@ -98,6 +108,20 @@ def untangled(frame: Frame, orders: Sequence[Order], distance: float) -> Frame:
         letters=[*frame.letters, *["F"] * len(new)],
         angles=None if frame.angles is None else [*frame.angles, *[0.0] * len(new)],
     )
+
+
+def _check_room(frame: Frame, apart: Array, distance: float) -> None:
+    """Raises `FileFormatError` where a face is smaller than creases inside one another have to be drawn apart."""
+    for number, face in enumerate(frame.faces):
+        ring = list(face[0])
+        k = np.arange(len(ring)) - 1
+        before, after = (points[ring] for points in (frame.points, apart))
+        turns = [np.cross(x - x[k], np.roll(x, -1, axis=0) - x) for x in (before, after)]
+        if (np.einsum("kc,kc->k", *turns) < 0.0).any():
+            raise FileFormatError(
+                f"layers {distance:.4g} mm apart do not fit: creases inside one another, drawn apart by so much, turn "
+                f"face {number} inside out; give a thinner sheet, or wider faces beside its creases"
+            )
 
 
 def _triangles(frame: Frame) -> list[list[list[int]]]:
@@ -163,8 +187,23 @@ def _within(flat: Array, node: int, triangle: Triangle) -> Place:
     return dict(zip(triangle, weights, strict=True)) if min(weights) >= -ON else {}
 
 
-def _moved(points: Array, sides: Ints, asks: Sequence[Ask], normals: Array, distance: float) -> Array:
-    """Points after the least moves that do what is asked."""
+def _steepness(points: Array, asks: Sequence[Ask], normals: Array) -> Array:
+    """(asks,) distance of layers a unit apart along the normals (faces, 3) that they had when they lay flat."""
+    found = np.ones(len(asks))
+    for row, (over, under, _, lower) in enumerate(asks):
+        one, two = points[list(over)], points[list(under)]
+        if len(one) == len(two):  # edges that cross
+            normal = np.cross(one[1] - one[0], two[1] - two[0])
+        else:
+            a, b, c = one if len(one) == 3 else two
+            normal = np.cross(b - a, c - a)
+        size = float(np.linalg.norm(normal))
+        found[row] = abs(float(normal @ normals[lower])) / size if size > 0.0 else 1.0
+    return np.maximum(found, STEEPEST)
+
+
+def _moved(points: Array, sides: Ints, asks: Sequence[Ask], normals: Array, wanted: Array) -> Array:
+    """Points after the least moves that leave so much room (asks,), mm, along the normals (faces, 3) of lower faces."""
     import scipy.sparse as sp
     from scipy.optimize import linprog
 
@@ -177,7 +216,7 @@ def _moved(points: Array, sides: Ints, asks: Sequence[Ask], normals: Array, dist
             weights[node] = weights.get(node, 0.0) - weight
         sign = normals[lower]
         apart = sum(weight * float(points[node] @ sign) for node, weight in weights.items())
-        short[row] = distance - apart
+        short[row] = wanted[row] - apart
         for node, weight in weights.items():
             rows += [row] * 3
             columns += [3 * node, 3 * node + 1, 3 * node + 2]
@@ -198,10 +237,10 @@ def _moved(points: Array, sides: Ints, asks: Sequence[Ask], normals: Array, dist
         raise FileFormatError(f"the layers cannot be untangled ({found.message})")
     wanting = found.x[2 * size : 2 * size + len(asks)]
     worst = int(np.argmax(wanting))
-    if wanting[worst] > LEFT * distance:
+    if wanting[worst] > LEFT * wanted[worst]:
         _, _, f, g = asks[worst]
         raise FileFormatError(
-            f"layers {distance:.4g} mm apart do not fit between faces {f} and {g}: faceOrders ask for more than the "
-            "creases between them leave; draw nested creases apart, or give a thinner sheet or another order"
+            f"layers {wanted[worst]:.4g} mm apart do not fit between faces {f} and {g}: faceOrders ask for more "
+            "than the creases between them leave; draw nested creases apart, or give a thinner sheet or another order"
         )
     return np.asarray(points + (found.x[:size] - found.x[size : 2 * size]).reshape(-1, 3))

@@ -15,6 +15,7 @@ from bh import Displace, Fold, Force, Hold, Model, ModelError, RigidBody, Sheet,
 from bh.analysis.situation import Situation
 from bh.commands.cli import main
 from bh.loading.builder import load_steps
+from bh.loading.tethers import left
 from bh.model.serialise import describe, fingerprint, rebuild
 from bh.scene.load import parse_scene
 from bh.scene.report import report
@@ -277,13 +278,63 @@ def test_what_cannot_be_in_python() -> None:
         Situation(path, -1)
 
 
-def test_letting_go_of_much_is_no_mechanism() -> None:
-    """An edge that was pinned flat while the sheet folded carries much: without it the sheet springs away."""
-    mesh = meshes.structured(meshes.annulus_sector(101.6, 10.0, 1.0472), along=10, rows=2)
-    model = (
-        Model(mesh, Sheet(E=4200.0, nu=0.2, t=0.3)).support("edge:start", clamp=True).fold("crease", by=0.35)
-    )
-    path = trace(model.step(release="edge:start"), warn=False, estimate=False)
-    assert path.outcome == "unstable"
-    assert "the sheet would leave its last state: node" in path.reason
-    assert "hold it as it lies (hold), in place of a support" in path.early_end
+# ------------------------------------------------------------------------------------------ let go of under load
+
+
+def shape(state: bh.State) -> np.ndarray:
+    """(n, n) distances of all nodes, mm: the shape without where it lies."""
+    return np.asarray(np.linalg.norm(state.points[:, None] - state.points[None], axis=-1))
+
+
+@pytest.mark.parametrize(
+    ("formulation", "by"),
+    [("consistent", 0.35), ("consistent", 1.5), ("bars-and-hinges", 1.5), ("shell", 0.8)],
+)
+def test_what_a_crease_was_folded_through_is_let_go_of(formulation: str, by: float) -> None:
+    """An edge held flat while the sheet folds is let go of: the sheet becomes the one that was folded without it."""
+    mesh = meshes.structured(meshes.annulus_sector(101.6, 10.0, 1.0472), along=6, rows=2)
+    sheet = Model(mesh, Sheet(E=4200.0, nu=0.2, t=0.3), formulation=formulation)
+    free = trace(sheet.fold("crease", by=by), estimate=False)[-1]
+    places = ["edge:start", "corner:outer-end"]
+    held = sheet.support("edge:start", clamp=formulation in SLOPES).support("corner:outer-end", "z")
+    path = trace(held.fold("crease", by=by).step(release=places), estimate=False)
+    before, after = ends(path)
+    assert before.energy.total > 5.0 * free.energy.total
+    assert path.stable
+    assert after.energy.total == pytest.approx(free.energy.total, rel=1e-6)
+    np.testing.assert_allclose(shape(after), shape(free), atol=1e-6 * mesh.size)
+
+
+@pytest.mark.parametrize("formulation", [*SLOPES, "bars-and-hinges"])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_strip_let_go_of_between_two_wells_falls_into_the_nearer_one(formulation: str, side: float) -> None:
+    """A buckled strip held beside its hilltop falls into the well on that side, and says where it snaps."""
+    mesh = meshes.structured(meshes.strip(60.0, 10.0, [5.0]), along=8)
+    middle = np.flatnonzero(np.abs(mesh.points[:, 0] - 30.0) < 1e-9).tolist()
+    clamp = formulation in SLOPES
+    model = Model(mesh, SHEET, formulation=formulation).support("edge:start", clamp=clamp)
+    model = model.support("edge:end", "yz", clamp=clamp).displace(middle, "z", 6.0)
+    model = model.displace("edge:end", "x", -1.2).step(release=[middle])
+    path = trace(model.displace(middle, "z", 0.2 * side).step(release=[middle]), estimate=False)
+    *_, up, held, free = ends(path)
+    assert path.stable
+    assert held.energy.total > 1.5 * up.energy.total
+    assert free.energy.total == pytest.approx(up.energy.total, rel=1e-6)
+    height = [float(state.points[middle, 2].mean()) for state in (up, free)]
+    assert height[0] > 4.0
+    assert height[1] == pytest.approx(side * height[0], rel=1e-6)
+    snaps = [line for line in path.remarks if "the sheet snaps where it is let go of" in line]
+    assert len(snaps) == sum(record.jumped for record in path.records if record.step == len(path.steps) - 1)
+    assert snaps or formulation != "consistent"
+    for line in snaps:
+        fall = float(line.split("falls by ")[1].split()[0])
+        assert 0.0 < fall < held.energy.total - free.energy.total
+
+
+def test_what_is_left_of_tethers() -> None:
+    lam, h = 0.3, 1e-4
+    assert left(0.0) == 1.0
+    assert left(1.0) == 0.0
+    for order in (0, 1):
+        slope = (left(lam + h, order) - left(lam - h, order)) / (2.0 * h)
+        assert left(lam, order + 1) == pytest.approx(slope, rel=1e-5)

@@ -15,7 +15,8 @@ import meshes
 from bh.errors import ModelError
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
-from bh.mechanics.contact.barrier import ContactBlocks, SheetBarrier, sheet_barrier
+from bh.mechanics.contact.barrier import SheetBarrier, sheet_barrier
+from bh.mechanics.contact.blocks import ContactBlocks
 from bh.model.serialise import describe, fingerprint, rebuild
 
 Array = NDArray[Any]
@@ -129,6 +130,11 @@ def test_a_new_pattern_only_where_a_pair_is_new() -> None:
     assert blocks.known(pairs[:1])
     assert blocks.known(pairs[::-1])
     assert not blocks.known(np.array([[5, 1]]))
+    assert blocks.known(pairs)  # those of before are kept
+    many = np.array([[9, 0], [9, 1], [9, 2], [9, 3], [9, 4]])
+    assert not blocks.known(many)
+    assert not blocks.known(np.array([[8, 3]]))
+    assert not blocks.known(many)  # but not when they are many more than press now
 
 
 @pytest.mark.parametrize("name", FORMULATIONS)
@@ -291,6 +297,21 @@ def test_a_barrier_asleep_is_none_and_wakes_up(
         assert not barrier.presses(x)
         assert not f.any()
     assert barrier.forces(x, f) > 0.0
+
+
+def test_time_of_looks_is_counted_by_work_not_by_the_clock() -> None:
+    mesh, x = two_layers(5.0)
+    down = x - [0.0, 0.0, 6.0] * (np.arange(6) > 2)[:, None]
+    counted = []
+    for _ in range(2):
+        barrier = SheetBarrier(mesh, 0.0, GAP, 2.0)
+        assert barrier.seconds == 0.0
+        barrier.free_part(x, down)
+        looked = barrier.seconds
+        barrier.forces(x, np.zeros_like(x))
+        counted.append((looked, barrier.seconds))
+    assert 0.0 < counted[0][0] < counted[0][1] < 1e-3
+    assert counted[0] == counted[1]
 
 
 @pytest.mark.parametrize("name", FORMULATIONS)

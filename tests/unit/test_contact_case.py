@@ -6,10 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bh.analysis.contact import first_contact
 from verification.framework.checks import CaseResult
-from verification.studies.solver.contact import meeting, pressed, read
+from verification.studies.solver import contact_strips
+from verification.studies.solver.contact import lift_off, meeting, orders, pressed, read
 from verification.studies.solver.contact_layers import block, height
 from verification.studies.solver.contact_scenes import Row, drawn, play
+from verification.theory import touching
 from verification.theory.wrapped import wrapped, wrapped_by
 
 GOOD = Row(0, "a letter", "reached", pressed=True, fine="reached", apart=1e-9)
@@ -78,7 +81,55 @@ def test_the_elastica_on_a_cylinder_is_one_on_a_point_before_it_wraps_and_the_ar
 
 
 def test_the_strip_has_the_force_of_the_elastica_on_a_coarse_mesh() -> None:
-    deflection, force, arm = read(pressed(32, 0.2))
+    path = pressed(32, 0.2)
+    deflection, force, arm = read(path)
     exact = wrapped_by(deflection, 40.0, 60.0, 4000.0 * 5.0 * 0.3**3 / 12.0)
     assert force == pytest.approx(exact.force, rel=0.05)
     assert arm == pytest.approx(exact.arm, rel=0.1)
+    assert lift_off(path, arm) == pytest.approx(60.0 * math.sin(exact.phi), rel=0.02)
+
+
+def test_elasticas_that_meet_themselves_are_those_of_small_slopes() -> None:
+    EI = 45.0
+    flat = touching.pressed(
+        0.02, 1000.0, 40.0, EI
+    )  # EI / (R V) from its end, and rises by what is left of its bow
+    assert flat.flat == pytest.approx(40.0 - 2.25, rel=1e-3)
+    with pytest.raises(ValueError, match="leave its image"):
+        touching.pressed(1e-3, 1000.0, 40.0, EI)
+    # a ring: (pi / 4 - 2 / pi) F R^3 / EI by Castigliano
+    shorter = 0.002
+    assert touching.squeezed(1.0, 1.0, 2.0 - shorter) == pytest.approx(
+        shorter / (math.pi / 4.0 - 2.0 / math.pi), rel=1e-2
+    )
+    assert touching.squeezed(20.0, EI) == pytest.approx(touching.squeezed(1.0, 1.0) * EI / 400.0, rel=1e-6)
+
+
+def test_bowed_strips_lie_flat_as_far_as_their_elastica_and_hand_on_the_force_of_their_ends() -> None:
+    at, force, end = contact_strips.read_strips(contact_strips.two_strips(16, 0.1))
+    assert force == pytest.approx(end, rel=1e-6)
+    exact = touching.pressed(end, contact_strips.BOW, contact_strips.HALF, contact_strips.EI)
+    assert at == pytest.approx(exact.flat, rel=0.01)
+
+
+def test_a_ring_that_is_squeezed_shut_keeps_its_shape_and_presses_on_itself() -> None:
+    path = contact_strips.ring(16, 0.1)
+    shut = 0.5 * touching.squeezed(contact_strips.RADIUS, contact_strips.EI)
+    assert path.outcome == "reached"
+    assert contact_strips.read_ring(path) == pytest.approx((contact_strips.FACTOR - 1.0) * shut, rel=0.02)
+    assert first_contact(path) is None
+
+
+def test_orders_are_read_from_the_widest_and_the_least_gap_of_the_finest_mesh() -> None:
+    result = CaseResult("contact", "Contact", "", "")
+    for gap in (0.2, 0.1, 0.05):
+        for along in (16, 32):
+            result.check(
+                "force",
+                1.0 + gap**2 * (1.0 if along == 32 else 3.0),
+                reference=1.0,
+                params={"gap": gap, "along": along},
+            )
+    orders(result)
+    assert result.checks[-1].quantity == "order in the gap: force"
+    assert result.checks[-1].value == pytest.approx(2.0)

@@ -53,6 +53,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "steps: expand": schema.ExpandTable,
     "imperfection": loads.ImperfectionTable,
     "steps: press": scene_bodies.PressTable,
+    "steps: press, file": scene_bodies.MouldTable,
     "steps: tether": scene_bodies.TetherTable,
     "steps: until": schema.UntilTable,
     "outputs": schema.OutputsTable,
@@ -103,9 +104,11 @@ def test_nothing_is_left_out() -> None:
     assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS) - {
         "symmetry",
         "contact",
+        "friction",
     }
     assert "`symmetry = " in PAGE
     assert "`contact = " in PAGE
+    assert "`friction = " in PAGE
     assert PAGE.count("\n### ") == len(TABLES)
 
 

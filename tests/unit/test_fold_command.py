@@ -10,15 +10,19 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import bh
 from bh.commands.cli import main
-from bh.commands.fold import TimeUpError, _Clock, fold_file
+from bh.commands.fold import TimeUpError, _Clock, _timed, fold_file
 from bh.errors import InputError
+from bh.formulations.registry import formulation
+from bh.loading.builder import load_steps
 from bh.runtime.progress import Silent
 from bh.scene.folding import Wish, proposals
 from bh.scene.load import load_scene, parse_scene
-from meshes import unstructured
+from bh.solvers.system import clear_part
+from meshes import strip, structured, unstructured
 from meshes.errors import FileFormatError
 from meshes.io import read_fold, read_pattern
 from meshes.quantities import spoken
@@ -250,6 +254,22 @@ class TestOneCommand:
         clock.count(50_000, factored=True)
         with pytest.raises(TimeUpError, match=r"its 1 s were over at lambda = 0\.20"):
             clock.check(0.2)
+
+    def test_looks_for_contact_are_counted_too(self) -> None:
+        mesh = structured(strip(10.0, 60.0, [20.0, 40.0]), along=3, rows=2)
+        spent = []
+        for contact in (0.1, False):
+            model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), contact=contact)
+            model = model.step(bh.Fold(mesh.creases[0], by=0.3))
+            clock = _Clock(Silent(), 10.0, 10.0)
+            system = formulation(model.formulation).system(model, load_steps(model)[0], None)
+            timed = _timed(system, clock)
+            q = system.start()
+            spread: NDArray[np.float64] = 0.1 * np.arange(len(q), dtype=float)
+            clear_part(timed, q, spread, 0.0)  # between two evaluations
+            timed.tangent(q, 0.0, timed.evaluate(q, 0.0).forces)
+            spent.append(clock.spent)
+        assert spent[0] > spent[1] + 1e-5
 
     def test_angles(self) -> None:
         assert spoken("90deg", "angle") == pytest.approx(math.pi / 2)

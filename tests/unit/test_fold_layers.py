@@ -15,6 +15,7 @@ from bh.analysis.triangles import intersecting
 from bh.scene.load import load_scene
 from meshes.errors import FileFormatError
 from meshes.io import read_fold
+from meshes.io.fold_nested import WEDGE, drawn_apart
 
 SHEET = (
     '[sheet]\nE = 3000.0\nnu = 0.3\nt = 0.3\n[[steps]]\nfold = { crease = "all", by = 0.0, Lstar = 5.0 }\n'
@@ -154,8 +155,64 @@ def test_a_cube_opens_to_its_net(tmp_path: Path) -> None:
     assert isinstance(mesh, meshes.SheetMesh)
 
 
-def test_a_sheet_that_is_folded_twice_across_is_refused(tmp_path: Path) -> None:
-    """The inner two of four layers would have to fold inside the crease of the outer two, where there is no room."""
+MAP = Path(__file__).resolve().parents[2] / "examples" / "map.toml"
+
+
+def turns(mesh: meshes.SheetMesh, node: int) -> float:
+    """Sum of the angles of the triangles round a node, rad."""
+    total = 0.0
+    for triangle in mesh.triangles.tolist():
+        if node in triangle:
+            k = triangle.index(node)
+            u, v = (mesh.points[triangle[(k + n) % 3]] - mesh.points[node] for n in (1, 2))
+            total += math.acos(float(u @ v) / float(np.linalg.norm(u) * np.linalg.norm(v)))
+    return total
+
+
+def test_a_map_that_is_folded_twice_across_opens_and_nothing_passes_through() -> None:
+    """Creases that lie one inside the other are drawn apart, so that all of it still lies flat."""
+    model = load_scene(MAP).model
+    mesh = model.mesh
+    centre, width = 40, 30.0
+    assert turns(mesh, centre) == pytest.approx(
+        2.0 * math.pi, abs=0.05
+    )  # layers are moved out of their plane, too
+    path = bh.trace(model)
+    assert path.outcome == "reached"
+    pairs = all_pairs(len(mesh.triangles))
+    for state in path:
+        assert not intersecting(state.points, mesh.triangles, pairs, 1e-9).any()
+    angles = [float(path[0].fold_angle(name).mean()) for name in ("m1", "v1", "v2", "v3")]
+    assert min(abs(angle) for angle in angles) > 2.8
+    assert max(abs(float(path[-1].fold_angle(name).mean())) for name in ("m1", "v1", "v2", "v3")) < 0.1
+    size = np.linalg.svd(path[-1].points - path[-1].points.mean(axis=0), compute_uv=False)
+    assert size[2] < 0.03 * size[1]
+    corners = path[-1].points[[0, 8, 72, 80]]
+    assert math.dist(corners[0], corners[3]) == pytest.approx(2.0 * width * math.sqrt(2.0), rel=0.03)
+    assert math.dist(corners[1], corners[2]) == pytest.approx(2.0 * width * math.sqrt(2.0), rel=0.03)
+
+
+def test_nested_creases_are_turned_about_the_corner_that_they_share() -> None:
+    """In the plane angles sum to a full turn, and the inner crease goes inwards as far as the outer one outwards."""
+    a, d = 20.0, 0.1
+    points = [[0, 0], [a, 0], [a, a], [0, a], [a, a], [a, 0], [a, a], [0, a], [a, a]]
+    x = np.column_stack((np.array(points, float), np.zeros(9)))
+    rings = [[0, 1, 2, 3], [0, 3, 4, 5], [0, 5, 6, 7], [0, 7, 8, 1]]
+    orders = [(1, 0, 1), (2, 1, -1), (3, 2, 1), (2, 0, 1), (3, 0, 1), (3, 1, -1)]
+    moved = drawn_apart(x, rings, orders, d)
+    assert moved[5] - x[5] == pytest.approx([0.0, 0.5 * WEDGE * d, 0.0])  # the inner crease, of faces 1 and 2
+    assert moved[1] - x[1] == pytest.approx([0.0, -0.5 * WEDGE * d, 0.0])
+    assert np.delete(moved, [1, 5], axis=0) == pytest.approx(np.delete(x, [1, 5], axis=0))
+    # without a corner in common what is inside goes inwards, and nothing else moves
+    flap = np.array([[0, 0], [a, 0], [a, a], [0, a], [a, a], [0, a], [5, 0], [15, 0], [15, 9], [5, 9]], float)
+    y = np.column_stack((flap, np.zeros(10)))
+    rings, orders = [[0, 1, 2, 3], [1, 0, 5, 4], [6, 7, 8, 9]], [(2, 0, 1), (2, 1, 1), (1, 0, 1)]
+    moved = drawn_apart(y, rings, orders, d)
+    assert (moved - y)[6:8] == pytest.approx(np.array([[0.0, WEDGE * d, 0.0]] * 2))
+    assert np.delete(moved, [6, 7], axis=0) == pytest.approx(np.delete(y, [6, 7], axis=0))
+
+
+def test_four_panels_without_inner_points_stand_in_wedges(tmp_path: Path) -> None:
     a = 20.0
     form = {
         "file_spec": 1.2,
@@ -167,7 +224,20 @@ def test_a_sheet_that_is_folded_twice_across_is_refused(tmp_path: Path) -> None:
         "edges_assignment": ["M", "V", "M", "M"],
         "faceOrders": [[1, 0, 1], [2, 1, -1], [3, 2, 1], [2, 0, 1], [3, 0, 1], [3, 1, -1]],
     }
+    mesh = read_fold(written(tmp_path, form), untangle=0.1)
+    assert not intersecting(mesh.points, mesh.triangles, all_pairs(8), 1e-9).any()
+
+
+def test_layers_that_are_too_thick_for_nested_creases_name_a_face() -> None:
     with pytest.raises(
-        FileFormatError, match=r"do not fit between faces \d and \d.*draw nested creases apart"
+        FileFormatError, match=r"layers 1\.5 mm apart do not fit: creases inside one another.*face \d+"
     ):
-        read_fold(written(tmp_path, form), untangle=0.3)
+        read_fold(MAP.with_suffix(".fold"), untangle=1.5)
+
+
+def test_layers_nearer_than_contact_allows_are_told_apart_from_ones_that_meet(tmp_path: Path) -> None:
+    written(tmp_path, pleats(3))
+    file = tmp_path / "map.toml"
+    file.write_text(f'contact = "thickness"\n[pattern]\nfile = "form.fold"\nuntangle = 0.1\n{SHEET}')
+    with pytest.raises(bh.ModelError, match=r"parts of the first state are nearer than 0\.2955 mm \(nodes "):
+        bh.trace(load_scene(file).model)

@@ -8,11 +8,22 @@ import pytest
 pytest.importorskip("xarray")
 from dataclasses import replace
 
+from bh.applications.inverse.converged import Converged
 from bh.applications.inverse.models import model
 from bh.applications.inverse.pieces import VARIED
 from bh.applications.inverse.problems import Design
 from bh.applications.inverse.simulate import simulate
-from bh.applications.inverse.tolerances import Spreads, Tolerance, sampled, tolerance
+from bh.applications.inverse.tolerances import (
+    Region,
+    Spreads,
+    Tolerance,
+    made,
+    predicted,
+    region,
+    sampled,
+    tolerance,
+)
+from bh.applications.inverse.variants import STEPS
 
 DESIGN = Design(np.array([0.009]), np.array([105.0]), np.array([True]))
 EDGE, ROWS = 5.0, 1
@@ -29,6 +40,40 @@ def test_the_ellipsoid_is_that_of_its_moves() -> None:
     size, directions = Tolerance(moves, {}).axes(0.95)
     np.testing.assert_allclose(size, np.array([0.4, 0.3, 0.0]) * 2.795483, atol=1e-6)
     np.testing.assert_allclose(np.abs(directions[:, 0]), [0.0, 1.0, 0.0], atol=1e-12)
+
+
+def test_small_errors_have_the_ellipsoid_of_first_order() -> None:
+    """A thousandth of the default spreads, so that nothing is bent; 4,000 strips tell a semi-axis to some 3 %."""
+    spreads = Spreads(*(0.001 * value for value in vars(Spreads()).values()))
+    first = predicted(model(), DESIGN.k0, DESIGN.length, DESIGN.pinched, spreads).one().axes()[0]
+    np.testing.assert_allclose(region(model(), DESIGN, spreads).axes, first, rtol=0.06)
+
+
+def test_a_region_holds_its_share_where_ends_lie_on_an_arc() -> None:
+    """Ends on a circle of 100 mm, 12 mm to and fro: the ellipsoid is as thick as the arc is bent."""
+    turn = np.random.default_rng(3).normal(scale=0.12, size=4000)
+    apart = 100.0 * np.column_stack((np.sin(turn), np.cos(turn) - 1.0, np.zeros(4000)))
+    where = Region.of(apart, 0.9)
+    assert where.holds(apart).mean() == pytest.approx(0.9, abs=1e-3)
+    assert where.axes[0] > 20.0
+    assert 1.0 < where.axes[1] < 5.0
+    assert -1.0 < where.middle[1] < -0.5  # half the square of the turn
+
+
+def test_a_strip_with_errors_is_the_chain_with_errors() -> None:
+    """All that can be off at once, on the mesh of the strip: the chain of pieces moves as the whole strip does."""
+    found = model()
+    assert isinstance(found, Converged)
+    chains = found.on_mesh(0)
+    setting = replace(found.setting, edge=2.5, rows=2)
+    design, off = made(DESIGN, setting, Spreads(), np.random.default_rng(2))
+    moved = simulate(*design.lists(), off).t - simulate(*DESIGN.lists(), setting).t
+    amounts = {name: np.array([getattr(off, name) - getattr(setting, name)]) for name in STEPS}
+    ends = [
+        chains.made(amount).forward(cut.k0[None], cut.length[None], cut.pinched[None], check=False)[0][0, -1]
+        for cut, amount in ((design, amounts), (DESIGN, {}))
+    ]
+    np.testing.assert_allclose(ends[0] - ends[1], moved, atol=0.05 * float(np.linalg.norm(moved)))
 
 
 def test_moves_are_those_of_strips(found: Tolerance) -> None:

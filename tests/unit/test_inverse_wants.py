@@ -12,6 +12,7 @@ pytest.importorskip("xarray")
 from xarray import Dataset
 
 from bh.applications.inverse import models, surrogate
+from bh.applications.inverse.boxes import ROOM, depths
 from bh.applications.inverse.converged import Converged
 from bh.applications.inverse.descent import descend
 from bh.applications.inverse.levels import lagrange
@@ -177,6 +178,8 @@ def test_directions_as_residuals() -> None:
         ({"stops": [(1.0, (1.0, 2.0, 3.0))]}, "0 < part < 1"),
         ({"keep_out": [[0.0, 0.0, 0.0, 1.0, 1.0, 0.0]]}, "no room"),
         ({"keep_out": [[0.0, 1.0]]}, "six numbers"),
+        ({"keep_out": [[-5.0, -5.0, -5.0, 5.0, 5.0, 5.0]]}, "the start of the crease .* lies in a box"),
+        ({"keep_out": [[90.0, 40.0, -5.0, 110.0, 60.0, 5.0]]}, r"the target \(100, 50, 0\) lies in a box"),
     ],
 )
 def test_bad_wants(more: dict[str, object], told: str) -> None:
@@ -188,10 +191,52 @@ def test_boxes_are_kept_out_of() -> None:
     """A box on the strip, also between its nodes, and one beside it."""
     end = converged().forward(K0, LENGTH, ON)[0][-1]
     around = np.array([end - 4.0, end + 4.0])
-    assert not Wants.of(end, keep_out=[around]).free(DESIGN, converged())
+    assert not Wants.of((0.0, 0.0, 90.0), keep_out=[around]).free(DESIGN, converged())
     assert Wants.of(end, keep_out=[around + 40.0]).free(DESIGN, converged())
     before = converged().unpinched(K0, LENGTH)[0][-1]  # and where the end is before the pinch
     assert not Wants.of(end, keep_out=[[before - 4.0, before + 4.0]]).free(DESIGN, converged())
+
+
+def test_depth_in_a_box() -> None:
+    """A box that the crease of a straight strip passes 2 mm beside its nearest side; a strip that is not there."""
+    k0, length, on = np.zeros((1, 2)), np.full((1, 2), 100.0), np.zeros((1, 2), dtype=bool)
+    box = np.array([[[80.0, -30.0, -1.0], [80.5, -2.0, 1.0]]])
+    beside = depths(converged(), box, k0, length, on)
+    assert beside.shape == (1, 2)
+    assert not beside.any()  # the edges are 3.5 mm lower and 3.5 mm to the side
+    box[:, 1, 1] = 2.0
+    inside = depths(converged(), box, k0, length, on)[0]
+    # the crease does not quite keep to the axis: one point of it is in there
+    assert inside[0] == inside[1] == pytest.approx(0.25 + ROOM, abs=0.26)
+
+
+def test_strips_are_moved_out_of_boxes() -> None:
+    """A box of 20 mm round a point of the strip: the design goes round it and ends at the same place."""
+    k0, length, on = np.array([0.006, -0.007, 0.003]), np.array([131.3, 120.0, 110.0]), np.array([[True] * 3])
+    points = converged().forward(k0, length, on[0])[0]
+    box = np.array([[points[1] - 10.0, points[1] + 10.0]])
+    wants = Wants.of(points[-1], keep_out=box)
+    problem = ReachAll(converged(), 3, target=wants.point, wants=wants, shift=np.zeros(1))
+    before = problem.variables(Design(k0, length, on[0]))[None]
+    assert not wants.free(problem.design(before[0], on[0]), converged())
+    after = problem.polished(before, on)
+    assert wants.free(problem.design(after[0], on[0]), converged())
+    assert problem.off(problem.bare(after, on))[0][0] < 0.01
+
+
+def test_the_nearest_designs_are_allowed_and_the_nearest() -> None:
+    """As if all had been looked at, also where fewer are allowed than are asked for."""
+    book = Library(converged(), 3, size=600)
+    target = np.array([50.0, 60.0, 0.0])
+    x, on, ends = book.designs
+    fine = book.problem(target).violation(x, on) <= 0.0
+    assert not fine.all()
+    order = np.argsort(np.linalg.norm(ends - target, axis=1) + np.where(fine, 0.0, math.inf))
+    for count in (7, 600):
+        found, switches = book.nearest(target, count)
+        assert len(found) == min(count, fine.sum())
+        np.testing.assert_array_equal(found, x[order[: len(found)]])
+        np.testing.assert_array_equal(switches, on[order[: len(found)]])
 
 
 def test_a_design_is_found_again() -> None:
@@ -249,8 +294,8 @@ def test_a_zone_is_no_longer_than_its_segment() -> None:
         (Wants.of((0.0, 0.0, 50.0)), r"the nearest ends \d+(\.\d+)? mm away"),
         (Wants.of((100.0, 60.0, -3.0), tangent=(-1.0, 0.0, 0.0)), r"mm away, \d+(\.\d+)? degrees off"),
         (
-            Wants.of((100.0, 60.0, -3.0), keep_out=[[-5.0, -5.0, -5.0, 5.0, 5.0, 5.0]]),
-            "stays out of the boxes",
+            Wants.of((100.0, 60.0, -3.0), keep_out=[[2.0, -30.0, -30.0, 20.0, 30.0, 30.0]]),
+            "no strip that was looked at stays out of them",
         ),
     ],
 )

@@ -17,6 +17,8 @@ from bh.formulations.registry import formulation
 from bh.live import Controls, Grip, Session
 from bh.live.controls import CLOSED, Way
 from bh.loading.builder import load_steps
+from bh.solvers.load_control import LoadControl
+from bh.solvers.newton import Newton
 
 CARD = bh.Sheet(E=4000.0, nu=0.3, t=0.2)
 angles = st.floats(-3.0, 3.0).map(lambda a: round(a, 6))
@@ -137,6 +139,48 @@ def test_what_has_faded_out_does_not_come_back() -> None:
         assert np.abs(frame.state.reactions.sum(axis=0)).max() < 1e-6
 
 
+def test_a_pinch_presses_two_nodes_together_and_nothing_else_acts() -> None:
+    """Both jaws press alike; the force is the slope of the energy over the gap; let go, the sheet is as before."""
+    session = Session(pleats())
+    session.fold("all", 0.8)
+    before = session.rest()
+    a, b = (
+        int(np.argmin(np.linalg.norm(session.mesh.points - at, axis=1))) for at in ([45, 0, 0], [90, 0, 0])
+    )
+    wide = float(np.linalg.norm(before.points[a] - before.points[b]))
+    session.pinch(a, b)
+    assert session.rest().pinches()[session.wanted.jaws[0]] == pytest.approx(0.0, abs=1e-9)
+    found = []
+    for part in (0.90, 0.89, 0.88):
+        session.pinch(a, b, part * wide)
+        frame = session.rest()
+        jaws = frame.wanted.jaws[0]
+        one, two = (np.array(frame.forces[node]) for node in (a, b))
+        assert np.linalg.norm(one + two) < 0.011 * np.linalg.norm(one)
+        apart = float(np.linalg.norm(frame.points[a] - frame.points[b]))
+        found.append((apart, frame.pinches()[jaws], frame.state.energy.total))
+    (wider, _, low), (_, force, _), (nearer, _, high) = found
+    assert force > 0.0
+    assert force == pytest.approx((high - low) / (wider - nearer), rel=0.02)
+    np.testing.assert_allclose(frame.points, bh.trace(session.scene())[-1].points, atol=1e-6)
+    assert session.undo()
+    assert session.rest().wanted.jaws
+    session.let_go(a)
+    assert not session.wanted.grips
+    np.testing.assert_allclose(session.rest().points, before.points, atol=1e-5)
+
+
+def test_who_is_pulled_is_pinched_no_more() -> None:
+    session = Session(pleats())
+    session.pinch(0, 5)
+    session.pinch(5, 9)
+    assert [(jaws.a, jaws.b) for jaws in session.wanted.jaws] == [(5, 9)]
+    assert set(session.wanted.grips) == {5, 9}
+    session.pull(9, (0.0, 0.0, 0.0))
+    assert not session.wanted.jaws
+    assert set(session.wanted.grips) == {9}
+
+
 def test_it_works_in_pieces_and_every_piece_is_an_equilibrium() -> None:
     """Without time an update does nothing; little by little it arrives, and each frame is a balanced state."""
     session = Session(pleats())
@@ -198,6 +242,20 @@ def test_a_snap_is_told() -> None:
     assert frame.points[node, 2] < 0.0  # it followed to the other side
 
 
+def test_where_a_branch_ends_it_moves_downhill_to_rest() -> None:
+    """Newton's method is taken away: the motion alone arrives, at the shape of a run from flat, and tells the snap."""
+    model = pleats()
+    for crease in model.mesh.creases:
+        model = model.crease(crease, Lstar=10.0)
+    session = Session(model, LoadControl(newton=Newton(full=1, globalised=1)))
+    session.fold("all", 0.6)
+    frame = session.rest()
+    assert frame.at_rest
+    assert frame.snapped
+    assert session.imbalance() < 1e-6
+    np.testing.assert_allclose(frame.points, bh.trace(session.scene())[-1].points, atol=1e-4)
+
+
 def test_what_cannot_be_asked_is_named() -> None:
     session = Session(pleats())
     asked: tuple[tuple[Callable[[], None], str], ...] = (
@@ -205,6 +263,9 @@ def test_what_cannot_be_asked_is_named() -> None:
         (lambda: session.fold("all", math.nan), "cannot be"),
         (lambda: session.pull(10_000, (0.0, 0.0, 0.0)), "no node 10000"),
         (lambda: session.pull(0, (0.0, math.inf, 0.0)), "three numbers"),
+        (lambda: session.pinch(0, 10_000), "no node 10000"),
+        (lambda: session.pinch(3, 3), "lie at one point"),
+        (lambda: session.pinch(0, 1, -1.0), "gap of -1"),
     )
     for ask, words in asked:
         with pytest.raises(ModelError, match=words):

@@ -11,11 +11,12 @@ import pytest
 
 import bh
 import meshes
+from bh.errors import InputError
 from reports.records import Case, CaseInfo, Check
 from reports.sheet_map import sheet_map
 from verification.framework.checks import CaseResult
 from verification.studies.solver import map as case
-from verification.studies.solver.map import MEMBERS, QUANTITIES, OutOfTime, high_stress, within_time
+from verification.studies.solver.map import MEMBERS, QUANTITIES, high_stress, within_time
 from verification.studies.solver.map_sheets import KINDS, UNMEASURED, sample
 
 
@@ -92,7 +93,6 @@ def test_a_sheet_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(case, "examine", endless)
     monkeypatch.setattr(case, "LIMIT_S", 0.05)
     assert within_time("twisted", 0)["why"] == "more than 0.05 s of processor time"
-    assert not issubclass(OutOfTime, Exception)  # nothing on the way down takes it for an error of its own
 
 
 def test_the_stress_that_is_compared_is_what_five_percent_of_the_area_exceed() -> None:
@@ -103,3 +103,13 @@ def test_the_stress_that_is_compared_is_what_five_percent_of_the_area_exceed() -
     strain = 0.001 * (1.0 + 0.0005)  # Green's
     assert high_stress(bh.trace(model)[-1]) == pytest.approx(1000.0 * strain, rel=1e-6)
     assert math.isnan(high_stress(bh.trace(replace(model, formulation="bars-and-hinges"))[-1]))
+
+
+def test_kinds_may_be_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BH_MAP", "network, closed ring")
+    assert case.wanted(("twisted",)) == ["network", "closed ring"]
+    monkeypatch.setenv("BH_MAP", "")
+    assert case.wanted(("twisted",)) == ["twisted"]
+    monkeypatch.setenv("BH_MAP", "networks")
+    with pytest.raises(InputError, match="there is no kind 'networks'; give some of narrow ring"):
+        case.wanted(("twisted",))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bh.solvers.creeping import slow
 from bh.solvers.factor import Descent
 from bh.solvers.linear import linear_response
 from bh.solvers.load_control import LoadControl, jump
@@ -23,7 +24,7 @@ from bh.solvers.modes import (
     softness,
     without,
 )
-from bh.solvers.newton import Newton, Solution, line_search, slow
+from bh.solvers.newton import Newton, Solution, line_search
 from bh.solvers.points import Increment, Point, extrapolate, point
 from bh.solvers.saddle import ConstraintRows, MultiplierMatrix
 from bh.solvers.stability import leave_saddle

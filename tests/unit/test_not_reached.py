@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 import warnings
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -127,6 +129,29 @@ def test_a_stopped_run_asks_for_resume_or_force(here: Path, capsys: pytest.Captu
         in capsys.readouterr().err
     )
     assert main([*run, "--resume"]) == 0
+    assert main(run) == 0  # it is whole now
+    assert capsys.readouterr().out == ""
+
+
+def test_resume_says_from_which_state_it_goes_on(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = ["run", "a.toml", "-o", "out", "--no-estimate"]
+    assert main([*run, "-q"]) == 0
+    states = sum(record.step == 0 for record in bh.read("out").path.records)
+    (here / "a.toml").write_text(text(second=0.02))
+    assert main([*run, "--resume"]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first == f"a: goes on from step 1, lambda 1 ({states} states are kept; step 2 is not what it was)"
+    assert main([*run, "--resume"]) == 0
+    assert "goes on" not in capsys.readouterr().out
+    with closing(sqlite3.connect(here / "out" / "path.bh")) as db:
+        db.execute("DELETE FROM steps WHERE step = 1")  # as a kill behind the last state leaves it
+        lam, kept = db.execute(
+            "SELECT lambda, (SELECT count(*) FROM states) FROM states ORDER BY id DESC"
+        ).fetchone()
+        db.commit()
+    assert main([*run, "--resume"]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first == f"a: goes on from step 2, lambda {lam:.4g} ({kept} states are kept)"
 
 
 def test_resume_keeps_the_steps_that_still_hold(here: Path) -> None:

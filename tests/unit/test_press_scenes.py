@@ -117,4 +117,4 @@ def test_what_cannot_be_is_told_in_one_line(step: str, message: str) -> None:
 def test_the_schema_has_both() -> None:
     defined = schema()["$defs"]
     assert isinstance(defined, dict)
-    assert {"PressTable", "TetherTable"} <= set(defined)
+    assert {"PressTable", "MouldTable", "TetherTable"} <= set(defined)

@@ -18,7 +18,7 @@ import meshes
 from bh.plotting import interactive
 from meshes.errors import InputError
 from reports.build import build, one_page
-from reports.changes import changes
+from reports.changes import changes, since_kept
 from reports.claims import claims
 from reports.pdf import browser, print_report
 from reports.records import Case, CaseInfo, Check, Frames, Results, read, schema
@@ -187,6 +187,29 @@ def test_no_last_results_and_broken_ones(tmp_path: Path) -> None:
     assert "Since the last results" not in one_page(tmp_path)
     (tmp_path / "previous.json").write_text("{")
     assert "cannot be compared" in one_page(tmp_path)
+
+
+def test_changes_against_the_records_that_are_kept(tmp_path: Path) -> None:
+    """Of the cases that were run since, and no others; a case whose record is shown itself has not changed."""
+    now = results(tmp_path, failing=0)
+    name = now["cases"][0]["name"]
+    kept = json.loads(json.dumps(now))
+    records = tmp_path / "records"
+    records.mkdir()
+    (records / f"{name}.json").write_text(json.dumps(kept))
+    assert since_kept(read(tmp_path / "checks.json"), records) is None
+    mine = [number for number, check in enumerate(now["checks"], 1) if check["case"] == name]
+    kept["cases"] = [{**info, "date": "2026-01-01T00:00:00+00:00"} for info in kept["cases"]]
+    kept["cases"] = [info for info in kept["cases"] if info["name"] == name]
+    held = next(number for number in mine if now["checks"][number - 1]["passed"])
+    kept["checks"][held - 1] |= {"passed": False, "error": 0.5, "value": 1.5}
+    (records / f"{name}.json").write_text(json.dumps(kept))
+    found = since_kept(read(tmp_path / "checks.json"), records)
+    assert found is not None
+    assert found[1] == [name]
+    assert [number for number, _, _ in found[0].mended] == [held]
+    assert found[0].new == found[0].gone == 0
+    assert found[0].same == len(mine) - 1
 
 
 def test_a_run_keeps_the_results_that_it_replaces(tmp_path: Path) -> None:

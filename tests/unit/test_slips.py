@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 class Pressed(VonMisesTruss):
     """A truss that something presses on, which stands in nobody's way."""
 
-    hindered, presses = True, True
+    hindered, presses, looking = True, True, 0.0
 
     def free_part(self, q: Array, dq: Array, lam: float) -> float:
         return 1.0

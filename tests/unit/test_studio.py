@@ -11,6 +11,7 @@ import struct
 import tomllib
 import zipfile
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from bh.errors import InputError
 from bh.scene.load import load_scene
 from bh.studio import server
 from bh.studio.desk import Desk
-from bh.studio.exports import FORMATS
+from bh.studio.exports import FORMATS, scene_text
 from bh.studio.messages import read
 from bh.studio.server import Studio
 from bh.studio.sheets import LIBRARY, LONGEST, of_file, of_library, of_model
@@ -124,7 +125,19 @@ def test_every_format_is_written(desk: Desk, what: str) -> None:
         ({"do": "fold", "crease": "crease", "angle": 1.0, "more": 1}, "more"),
         ({"do": "pull", "node": 10**6, "to": [0, 0, 0]}, "no node"),
         ({"do": "pull", "node": 0, "to": [0, 0]}, "cannot be asked"),
+        ({"do": "pinch", "a": 0, "b": 10**6}, "no node"),
+        ({"do": "pinch", "a": 7, "b": 7}, "at one point"),
+        ({"do": "pinch", "a": 0, "b": 7, "gap": -1}, "cannot be asked"),
         ({"do": "pattern", "name": "x"}, "no pattern 'x'"),
+        ({"do": "pattern", "name": "arc", "values": {"kind": 1.0}}, "no 'kind' to choose"),
+        ({"do": "pattern", "name": "arc", "values": {"radius": [1.0, 2.0]}}, "takes one number"),
+        ({"do": "pattern", "name": "pleats", "values": {"radius": [60.0]}}, "takes 3 numbers"),
+        ({"do": "pattern", "name": "arc", "values": {"radius": -1.0}}, "radius"),
+        ({"do": "pattern", "name": "arc", "values": {"width": 1e9}}, "width"),
+        ({"do": "spring", "crease": "no such", "Lstar": 1.0}, "no crease 'no such'"),
+        ({"do": "spring", "crease": "all", "Lstar": 0.0}, "cannot be asked"),
+        ({"do": "film", "pictures": ["aGVsbG8="]}, "cannot be read"),
+        ({"do": "film", "pictures": []}, "cannot be asked"),
         ({"do": "material", "name": "cheese"}, "no material 'cheese'"),
         ({"do": "material", "t": 0}, "cannot be asked"),
         ({"do": "hold", "node": 10**6, "on": True}, "no node"),
@@ -187,6 +200,28 @@ def test_names_of_files_mean_nothing_in_what_comes_out(name: str) -> None:
 def test_a_file_that_is_too_long_is_refused_before_it_is_read() -> None:
     with pytest.raises(InputError, match="longer than"):
         of_file("x.svg", b" " * (LONGEST + 1))
+
+
+def test_where_bars_cannot_go_on_their_faces_may_bend(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same faces by the other formulation, at the same controls; the window is told, and the scene says so."""
+    desk = Desk(of_file("fan.svg", (DATA / "fan.svg").read_bytes()))
+    assert desk.sheet.model.formulation == "bars-and-hinges"
+    take(desk, do="percent", value=30.0)
+    stuck = replace(desk.frame, note="iteration limit", wanted=desk.session.wanted)
+    with monkeypatch.context() as patch:
+        patch.setattr(type(desk.session), "update", lambda *_: stuck)
+        patch.setattr(desk, "put", lambda *given: put.append(given))
+        put: list[tuple[Any, ...]] = []
+        desk.work()
+    Desk.put(desk, *put[0])
+    sheet, said = desk.news()
+    assert sheet["kind"] == "sheet"
+    assert "its faces may bend" in str(said["text"])
+    assert desk.news() == []
+    assert settled(desk)["rest"]
+    assert desk.sheet.model.formulation == "consistent"
+    assert desk.sheet.model.sheet.nu > 0.0
+    assert 'formulation = "consistent"' in scene_text(desk.sheet, desk.session)
 
 
 def test_material_and_holds_change_under_the_hand(desk: Desk) -> None:

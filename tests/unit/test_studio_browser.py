@@ -14,7 +14,9 @@ import pytest
 
 import bh
 from bh.scene.load import load_scene
+from bh.studio.opening import Opened
 from bh.studio.server import Studio
+from bh.studio.sheets import of_library
 from tests.unit.browsers import needs_browser
 
 pytestmark = needs_browser
@@ -135,6 +137,91 @@ def test_fold_pull_undo_export(window: Visit, tmp_path: Path) -> None:
     ] == []
 
 
+def test_two_points_are_pinched_by_a_stroke_a_jaw_and_a_slider(window: Visit) -> None:
+    """From one point to another jaws are set; dragged towards each other they press, and both by the same force."""
+    page = window.page
+    page.locator("#percent").fill("35")
+    window.rests("Object.values(head.asked)[0] > 1")
+    page.locator("#hand-pinch").check()
+    (x, y), (u, v) = (page.evaluate(f"studio.place({node})") for node in (12, 165))
+    page.mouse.move(x + 0.04 * (u - x), y + 0.04 * (v - y))
+    page.mouse.down()
+    page.mouse.move(x + 0.96 * (u - x), y + 0.96 * (v - y), steps=3)
+    page.mouse.up()
+    window.rests("head.pinches.length === 1")
+    pinch = page.evaluate("studio.head.pinches[0]")
+    assert pinch["force"] == pytest.approx(0.0, abs=1e-9)
+    middle, along = np.array(pinch["middle"]), np.array(pinch["along"])
+    (x, y), (u, v) = (
+        page.evaluate(f"studio.spot({at.tolist()})") for at in (middle + 0.5 * pinch["gap"] * along, middle)
+    )
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 0.2 * (u - x), y + 0.2 * (v - y), steps=3)
+    page.mouse.up()
+    window.rests("head.pinches[0].force > 0.1")
+    closed = page.evaluate("studio.head.pinches[0]")
+    assert closed["gap"] < 0.95 * pinch["gap"]
+    one, two = (np.array(force) for force in page.evaluate("Object.values(studio.head.forces)"))
+    assert np.linalg.norm(one + two) < 0.02 * np.linalg.norm(one)
+    text = page.locator("#force").inner_text()
+    assert text.startswith("pinch ")
+    assert text.endswith("mm apart")
+    page.locator("#gap").focus()
+    page.keyboard.press("ArrowLeft")
+    window.rests(f"head.pinches[0].gap < {closed['gap']}")
+    page.locator("#let-go").click()
+    window.rests("head.pinches.length === 0 && Object.keys(head.forces).length === 0")
+    assert window.told == []
+
+
+def test_a_recording_is_played_and_saved_as_a_film_and_a_picture(window: Visit, tmp_path: Path) -> None:
+    page, image = window.page, pytest.importorskip("PIL.Image")
+    page.locator("#record").click()
+    for value in (10, 20, 30):
+        page.locator("#percent").fill(str(value))
+        window.rests(f"Math.abs(Object.values(head.asked)[0] - {0.01 * value} * Math.PI) < 0.01")
+    page.locator("#record").click()
+    page.locator("#percent").fill("5")
+    window.rests("Object.values(head.asked)[0] < 0.2")
+    for what, frames in (("film", 3), ("picture", 1)):
+        with page.expect_download() as waiting:
+            page.locator("#export").select_option(what)
+        file = tmp_path / waiting.value.suggested_filename
+        waiting.value.save_as(file)
+        with image.open(file) as found:
+            assert getattr(found, "n_frames", 1) >= frames
+            colours = found.convert("RGB").getcolors(10**6)
+            assert len(colours) > 50  # the sheet is on it
+    window.rests("Object.values(head.asked)[0] > 0.9")
+    assert window.told == []
+
+
+def test_numbers_of_a_pattern_and_springs_of_creases(window: Visit) -> None:
+    page = window.page
+    page.locator("#values input[data-key=width]").fill("35")
+    page.locator("#values input[data-key=width]").press("Enter")
+    page.wait_for_function("studio.sheet.values.width === 35")
+    page.locator("#percent").fill("30")
+    page.locator("#each summary").click()
+    page.locator("#Lstar").fill("10")
+    page.locator("#spring").click()
+    page.wait_for_function("studio.sheet.springs.crease === 10")
+    window.rests("head.folds.crease > 0.5 && head.folds.crease < 0.999 * head.asked.crease")
+
+
+def test_who_has_no_pointer_pulls_and_pinches_by_numbers(window: Visit) -> None:
+    page = window.page
+    page.get_by_text("Pull or pinch by numbers").first.click()
+    page.locator("#node-a").fill("12")
+    page.locator("#take").press("Enter")
+    page.locator("#lift").press("ArrowRight")
+    window.rests("Object.keys(head.forces).length === 1 && Math.hypot(...head.forces[12]) > 0")
+    page.locator("#node-b").fill("165")
+    page.locator("#take").press("Enter")
+    window.rests("head.pinches.length === 1 && Object.keys(head.forces).length === 2")
+
+
 def test_what_cannot_be_opened_is_said_in_the_window(window: Visit, tmp_path: Path) -> None:
     bad = tmp_path / "bad.svg"
     bad.write_text("no drawing at all")
@@ -183,6 +270,18 @@ def test_at_rest_it_is_refined_and_a_hand_brings_the_coarse_mesh_back(window: Vi
     assert not page.evaluate("studio.refined")
     page.wait_for_function("studio.refined && Object.values(studio.head.asked)[0] > 1.0", timeout=60_000)
     assert window.told == []
+
+
+def test_the_frame_of_a_notebook_is_the_same_window(chromium: Any) -> None:
+    """In a page of another origin, as Jupyter's is: it folds there."""
+    opened = Opened(of_library("strip"))
+    page = chromium.new_context(bypass_csp=True).new_page()
+    page.set_content(f"<h1>a notebook</h1>{opened._repr_html_()}")
+    frame = page.frame_locator("iframe")
+    frame.locator("#percent").fill("30", timeout=PATIENCE)
+    frame.locator("#percent-out", has_text="30.0 %").wait_for(timeout=PATIENCE)
+    page.close()
+    opened.close()
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(360, "dark"), (1400, "light"), (2560, "dark")])

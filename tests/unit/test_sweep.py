@@ -326,6 +326,35 @@ def test_scene(file: Path, tmp_path: Path) -> None:
     assert data["angle"].attrs["units"] == "rad"
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (
+            "pattern.width",
+            "pattern.widht",
+            "appendix_b_a.toml: unknown key pattern.widht = 10.0 (did you mean 'width'?)",
+        ),
+        (
+            "pattern.width",
+            "patern.width",
+            "appendix_b_a.toml: unknown key patern = {...} (did you mean 'pattern'?)",
+        ),
+        ("pattern.width", "steps[7].fold.to", "parameter 'width': the scene has no 'steps[7].fold.to'"),
+        ("[10.0, 120.0]", '["2furlong"]', 'appendix_b_a.toml: pattern.width = "2furlong" is no length'),
+        ("corner:inner-end", "corner:nowhere", "the sheet has no place 'corner:nowhere'"),
+        ("[measure]", "[measures]", "unknown key measures = {...} (did you mean 'measure'?)"),
+    ],
+)
+def test_a_wrong_key_names_the_file(
+    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, says: str
+) -> None:
+    file.write_text(file.read_text().replace(old, new))
+    assert main(["sweep", str(file), "-o", str(tmp_path / "out.nc"), "-w", "0"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"bh: {file}: {says}")
+    assert error.count("\n") == 1
+
+
 def test_command(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     place = tmp_path / "out.nc"
     assert main(["sweep", str(file), "-o", str(place), "-w", "0"]) == 1

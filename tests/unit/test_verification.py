@@ -46,6 +46,8 @@ SLOW = {
     "defaults",
     "drawings",
     "landing",
+    "tolerances",
+    "bend_twist",
     "map",
     "published",
     "fig3_9",

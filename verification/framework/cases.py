@@ -61,6 +61,7 @@ STUDIES = (
     Study("fig5_3", "5", seconds=60),
     Study("appendix_a", "A", seconds=4),
     Study("pinch_shell", "5", seconds=60),
+    Study("bend_twist", "5", long=True),
     Study("scan", "3", seconds=120),
     Study("hard_cases", "solver", seconds=140),
     Study("appendix_b_shell", "B", part_of="appendix_b", seconds=250),
@@ -73,6 +74,7 @@ STUDIES = (
     Study("actuated", "solver", seconds=8),
     Study("bifurcations", "solver", seconds=150),
     Study("published", "solver", seconds=250),
+    Study("cones", "solver", long=True),
     Study("peers", "solver", seconds=15),
     Study("tables4", "4", seconds=1),
     Study("speed_error", "solver", long=True),
@@ -80,6 +82,7 @@ STUDIES = (
     Study("defaults", "solver", long=True),
     Study("honesty", "solver", long=True),
     Study("campaign", "solver", long=True),
+    Study("agreement", "solver", long=True),
     Study("attack", "solver", long=True),
     Study("branches", "solver", long=True),
     Study("contact", "solver", long=True),
@@ -88,11 +91,13 @@ STUDIES = (
     Study("top_down", "4"),
     Study("bottom_up", "4", seconds=1),
     Study("three_point", "4", seconds=550),
+    Study("bending_fit", "4", long=True),
     Study("forward", "6"),
     Study("problem_a", "6", seconds=60),
     Study("problem_b", "6"),
     Study("problem_c", "6", long=True),
     Study("landing", "6", long=True),
+    Study("tolerances", "6", long=True),
 )
 BY_NAME = {study.name: study for study in STUDIES}
 ALL_CASES = tuple(BY_NAME)

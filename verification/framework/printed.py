@@ -7,6 +7,7 @@ A figure of a record is a link to it whose title says which:
 
 The title is a quantity and then, between bars, parameters of the record (`key=value`), what is read from it (`read
 error`; the value unless said), a factor (`times 100`), and of several records `largest`, `least`, `median` or `number`.
+In a table a bar ends the cell, in titles too: there it is written with a backslash before it.
 The figure has to be the record's, rounded to the digits that are printed.
 """
 
@@ -96,7 +97,8 @@ def printed(page: Path) -> Iterator[Printed]:
     """The figures of a page that lead to records, from above."""
     text = page.read_text(encoding="utf-8")
     for found in LINK.finditer(text):
-        yield Printed(page, text.count("\n", 0, found.start()) + 1, *found.groups())
+        words, link, title = found.groups()
+        yield Printed(page, text.count("\n", 0, found.start()) + 1, words, link, title.replace("\\|", "|"))
 
 
 def _has(params: dict[str, Any], wanted: dict[str, str]) -> bool:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
@@ -15,6 +17,35 @@ from verification.framework.store import Store
 
 class OutOfTimeError(Exception):
     """A scene has had its share."""
+
+
+class _Interrupt(BaseException):
+    """Raised by the signal: no handler of errors on the way takes it for one of its own."""
+
+
+@contextmanager
+def processor_limit(seconds: float) -> Iterator[None]:
+    """Give what is within up after so many seconds of processor time, wherever it is then.
+
+    Args:
+        seconds: of processor time.
+
+    Raises:
+        OutOfTimeError: they are over.
+    """
+
+    def stop(_signal: int, _frame: object) -> None:
+        raise _Interrupt
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    except _Interrupt:
+        raise OutOfTimeError from None
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 class Clock:

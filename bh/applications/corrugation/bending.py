@@ -44,9 +44,12 @@ class Rig:
         tape: 0 is a sheet that lies free, without friction. Else valley creases over the supports are first
             pulled down onto them and stay there, held along x and y by this stiffness, N/mm in all
             (double-sided tape, 4.5.1).
+        pulled: tape holds valleys down; else it holds them sideways only, and the sheet may lift off.
         gap: of the contact, mm (`bh.model.actuations.Indenter`).
         stiffness: of the contact (`bh.model.actuations.Indenter`).
         level: the bar stays level; else it lies on two mountains where the test begins, and keeps that slope.
+        grip: mountain creases under the bar are held along x and y where the bar meets them, by this stiffness, N/mm in
+            all: a bar that they stick to. 0 is a bar without friction; what friction does lies in between.
         largest: displacement between two states, mm.
         offset: of the sheet's middle from the bar, along the span, mm.
     """
@@ -60,6 +63,8 @@ class Rig:
     level: bool = False
     largest: float = 0.5
     offset: float = 0.0
+    grip: float = 0.0
+    pulled: bool = True
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -71,6 +76,8 @@ class Rig:
             raise ModelError(f"a bar of {self.bar:g} mm does not fit between supports {self.span:g} mm apart")
         if not (math.isfinite(self.tape) and self.tape >= 0.0):
             raise ModelError(f"tape = {self.tape} cannot be; give a stiffness in N/mm, or 0")
+        if not (math.isfinite(self.grip) and self.grip >= 0.0):
+            raise ModelError(f"grip = {self.grip} cannot be; give a stiffness in N/mm, or 0")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -150,20 +157,28 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
         if not taped:
             raise ModelError("no valley crease lies over the supports, where tape could hold it")
         items.append(Tether(taped, (rig.tape, rig.tape, 0.0)))
+    if rig.tape > 0.0 and rig.pulled:
         # flat sheets lie in z = 0, as the supports do
         down = start.model.step(*items, Displace(taped, "z", 0.0))
-        start = trace(down, after=start, strategy=LoadControl(work_mismatch=math.inf), warn=False)
+        pulled = LoadControl(work_mismatch=math.inf)
+        start = trace(down, after=start, strategy=pulled, warn=False, neighbours=False)
         if not start.reached:
             raise ModelError(f"the corrugation cannot be taped down ({start.outcome}: {start.reason})")
         points = start[-1].points
     slope, height = lid(folded, points, along, across, 0.5 * rig.bar)
     if rig.level:
         slope, height = 0.0, float(_under(folded, points, across, 0.5 * rig.bar)[:, 2].max())
+    if rig.grip > 0.0:
+        mountains = crease_nodes(folded.mesh, "mountain")
+        held = mountains[np.abs(points[mountains] @ across) <= 0.5 * rig.bar].tolist()
+        if held:
+            items.append(Tether(held, (rig.grip, rig.grip, 0.0)))
     items.append(bar("bar", 0.0, height + depth, rig.bar, rig.travel, math.atan(slope)))
     # as on a test stand: where the sheet snaps it goes to the next stable state, and the bar goes on
     first, largest = min(0.1, 0.2 * rig.largest) / rig.travel, rig.largest / rig.travel
     snapping = LoadControl(first=first, largest=largest, work_mismatch=math.inf, smallest=1e-4)
-    path = trace(start.model.step(*items), after=start, strategy=snapping, warn=False)
+    # other stable states beside the last one are of no use: the curve is of those that a test stand passes
+    path = trace(start.model.step(*items), after=start, strategy=snapping, warn=False, neighbours=False)
     return _evaluate(path, azimuth, rig)
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bh.applications.inverse.levels import Limit, Series, lagrange
+from bh.applications.inverse.levels import Function, Limit, Sampled, Series, lagrange
 from bh.applications.inverse.motions import ALONG, exponential, logarithm
 from bh.applications.inverse.piece_data import PieceData
 from bh.applications.inverse.pieces import LARGEST, LEVELS, PIECES
@@ -48,7 +48,7 @@ class Converged:
 
     def __init__(
         self,
-        series: Mapping[str, Series],
+        series: Mapping[str, Function],
         setting: Setting,
         limits: Mapping[str, Limit] | None = None,
         same: Converged | None = None,
@@ -321,6 +321,46 @@ class Converged:
             return Converged(data.series(name, sign), variants(self.setting)[name, sign])
 
         return {name: (one(name, -1), one(name, 1)) for name in STEPS}
+
+    def made(self, off: Mapping[str, Array]) -> Converged:
+        """The same strips, each of S samples made a little differently: of its designs (S, n).
+
+        Args:
+            off: (S,) how far the fields of the setting named are off, in their units.
+
+        Raises:
+            DesignError: the data set of the variants is of another setting.
+        """
+        slopes = {name: self._slopes[name] for name in off}
+        amounts = tuple(off.values())
+        series = {
+            name: Sampled(base, tuple(slope[name] for slope in slopes.values()), amounts)
+            for name, base in self._series.items()
+        }
+        return Converged(series, self.setting)
+
+    def on_mesh(self, number: int) -> Converged:
+        """The same strips on one level of meshes: what whole strips that are simulated on it are compared with.
+
+        Args:
+            number: of the level, from 0 (`pieces.LEVELS`).
+
+        Raises:
+            DesignError: the data set of the variants is of another setting.
+        """
+        return Converged(self._variants().pieces.series(number), self.setting, varied=self._varied)
+
+    @cached_property
+    def _slopes(self) -> dict[str, dict[str, Series]]:
+        """What each function changes by with one unit of each thing, on the coarsest level of meshes."""
+        data = self._variants()
+        found: dict[str, dict[str, Series]] = {}
+        for thing, step in STEPS.items():
+            down, up = (data.series(thing, sign) for sign in (-1, 1))
+            found[thing] = {
+                name: (up[name] + down[name].times(-1.0)).times(0.5 / step) for name in self._series
+            }
+        return found
 
     def _variants(self) -> VariantData:
         if self._varied is None or not self.has_variants:

@@ -97,6 +97,14 @@ class Forward(Protocol):
         """
         ...
 
+    def made(self, off: Mapping[str, Array]) -> Forward:
+        """The model of strips of which each of S samples is made a little differently; for designs (S, n).
+
+        Args:
+            off: (S,) how far the fields of the setting named are off (`variants.STEPS`), in their units.
+        """
+        ...
+
     def about(self) -> Mapping[str, object]:
         """The setting as plain data."""
         ...

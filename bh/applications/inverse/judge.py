@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,7 +50,7 @@ def judge(
     setting: Setting,
     meshes: Sequence[tuple[float, int]] = MESHES,
 ) -> Verdict:
-    """Fold and pinch a strip by the shell.
+    """Fold and pinch a strip by the shell, on all its meshes at once, as its kernels let go of the interpreter.
 
     Args:
         k0: (n,) curvatures before folding, 1/mm.
@@ -61,9 +62,11 @@ def judge(
     Raises:
         DesignError: a path ended early.
     """
-    return Verdict(
-        tuple(
-            simulate(k0, length, pinched, replace(setting, edge=edge, rows=rows, formulation="shell"))
+    with ThreadPoolExecutor(len(meshes)) as pool:
+        strips = [
+            pool.submit(
+                simulate, k0, length, pinched, replace(setting, edge=edge, rows=rows, formulation="shell")
+            )
             for edge, rows in meshes
-        )
-    )
+        ]
+    return Verdict(tuple(strip.result() for strip in strips))

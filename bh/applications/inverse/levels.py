@@ -10,6 +10,7 @@ there, and the distance to the limit that the levels before the last would have 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -83,6 +84,36 @@ def _vander(x: Array, degree: int) -> Array:
 def _matrix(count: int) -> Array:
     """From values at Chebyshev points to coefficients."""
     return np.asarray(np.linalg.inv(chebyshev.chebvander(points(count), count - 1)), dtype=np.float64)
+
+
+class Function(Protocol):
+    """Vectors of motions as a function of one or two curvatures, such as a `Series`."""
+
+    def __call__(self, *x: Array) -> Array:
+        """(..., 6) values at one or two arguments (...) in [-1, 1]."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A function that is a little different for every sample: a sum of others, each times a number of the sample.
+
+    Attributes:
+        base: the function that all have in common.
+        others: what is added.
+        amounts: (S,) how many times each of them is.
+    """
+
+    base: Function
+    others: tuple[Function, ...]
+    amounts: tuple[Array, ...]
+
+    def __call__(self, *x: Array) -> Array:
+        """(S, ..., 6) values at one or two arguments (S, ...) in [-1, 1]."""
+        found = self.base(*x)
+        for other, amount in zip(self.others, self.amounts, strict=True):
+            found = found + amount.reshape(-1, *[1] * (found.ndim - 1)) * other(*x)
+        return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from bh.applications.inverse.descent import descend
+from bh.applications.inverse.boxes import depths
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.models import Name, model
 from bh.applications.inverse.problems import Design, ReachPoint
@@ -39,12 +39,13 @@ WIDER = (
 )
 STEADIED = 24  # of the candidates that move least, which are made to move less
 ALIKE = 1e-3  # curvature over its largest, and mm, by which designs differ that are not the same one
+BLOCK = 500  # designs whose ends are computed at a time, which stay in the cache: 2.4 times as fast as 50,000
 SAME = 0.1  # mm between chain and simulation, below which aiming again changes nothing
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """Random designs of n segments that their rules allow, and where they end. The seed makes them reproducible.
+    """Random designs of n segments and where they end. The seed makes them reproducible.
 
     Attributes:
         surrogate: the model.
@@ -62,14 +63,13 @@ class Library:
 
     @cached_property
     def designs(self) -> tuple[Array, Bools, Array]:
-        """(N, 2 n) variables of `ReachPoint`, (N, n) pinches and (N, 3) ends."""
+        """(size, 2 n) variables of `ReachPoint`, (size, n) pinches and (size, 3) ends, forbidden ones among them."""
         rng = np.random.default_rng([self.seed, self.n])
         problem = self.problem(np.zeros(3))
         x = problem.lower + (problem.upper - problem.lower) * rng.random((self.size, 2 * self.n))
         on = rng.random((self.size, self.n)) < 0.5
-        fine = problem.violation(x, on) <= 0.0
-        x, on = x[fine], on[fine]
-        return x, on, problem.end(x, on)
+        blocks = [slice(i, i + BLOCK) for i in range(0, self.size, BLOCK)]
+        return x, on, np.concatenate([problem.end(x[block], on[block]) for block in blocks])
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -81,7 +81,7 @@ class Library:
         return ReachPoint(self.surrogate, self.n, self.rules, target)
 
     def nearest(self, target: Array, count: int) -> tuple[Array, Bools]:
-        """Candidates in the order of their distance from a point.
+        """Candidates that the rules allow in the order of their distance from a point.
 
         Args:
             target: (3,), mm.
@@ -91,8 +91,13 @@ class Library:
             variables (c, 2 n) and pinches (c, n) of the candidates.
         """
         x, on, _ = self.designs
-        near = np.atleast_1d(self.tree.query(target, k=min(count, len(x)))[1])
-        return x[near], on[near]
+        problem, asked = self.problem(target), count
+        while True:  # most designs are allowed, so only those that are near are looked at
+            asked = min(2 * asked, len(x))
+            near = np.atleast_1d(self.tree.query(target, k=asked)[1])
+            near = near[problem.violation(x[near], on[near]) <= 0.0]
+            if len(near) >= count or asked == len(x):
+                return x[near[:count]], on[near[:count]]
 
 
 @cache
@@ -259,7 +264,7 @@ class Reach:
         if not simple:
             first = np.argsort(np.linalg.norm(problem.residuals(x, on), axis=1), kind="stable")[:count]
             x, on = x[first], on[first]
-        x = descend(problem, x, on)
+        x = problem.polished(x, on)
         x, on = self._good(problem, x, on, sifted)
         if self.prefer == "robust":
             first = np.argsort(self._moves(problem, x, on), kind="stable")[:STEADIED]
@@ -276,8 +281,6 @@ class Reach:
                 continue
             if wants.free(problem.design(x[i], on[i]), book.surrogate):
                 found.append((x[i], on[i]))
-            else:
-                sifted.boxed += 1
         return found
 
     def _good(self, problem: ReachAll, x: Array, on: Bools, sifted: Sifted) -> tuple[Array, Bools]:
@@ -286,7 +289,8 @@ class Reach:
             return x, on
         missed, turned = problem.off(problem.bare(x, on))
         legal = problem.violation(x, on) <= 0.0
-        sifted.add(missed, turned, legal)
+        inside = depths(problem.surrogate, problem.wants.keep_out, *problem.split(x), on)
+        sifted.add(missed, turned, legal, np.asarray((inside <= 0.0).all(axis=1)))
         bars = problem.surrogate.bars(*problem.split(x), on)[0]
         good = legal & (missed <= self.tolerance) & (turned <= self.angle) & (bars <= self.tolerance)
         return x[good], on[good]
@@ -328,8 +332,10 @@ class Reach:
             if np.linalg.norm(there - bare) < SAME:  # the chain was right: its nearest design is this one
                 break
             problem = problem.shifted(there, x, on)
-            x = descend(problem, x[None], on[None])[0]
-            if problem.violation(x, on) > 0.0:
+            x = problem.polished(x[None], on[None])[0]
+            if problem.violation(x, on) > 0.0 or not problem.wants.free(
+                problem.design(x, on), problem.surrogate
+            ):
                 break
         return best if best is not None and self._badness(best) <= 1.0 else None
 

@@ -19,26 +19,25 @@ class Sifted:
     """Why candidates were turned down, for the one line that says so.
 
     Attributes:
-        nearest: of all that obey the rules, mm.
+        nearest: of all that obey the rules and stay out of the boxes, mm.
         turned: angle of the nearest one, rad.
         illegal: distance of the nearest one that breaks a rule, mm.
-        boxed: designs that do what is asked for but for the boxes.
     """
 
     nearest: float = math.inf
     turned: float = 0.0
     illegal: float = math.inf
-    boxed: int = 0
 
-    def add(self, missed: Array, turned: Array, legal: Bools) -> None:
+    def add(self, missed: Array, turned: Array, legal: Bools, clear: Bools) -> None:
         """Take polished candidates into account.
 
         Args:
             missed: (N,) distances, mm.
             turned: (N,) angles, rad.
             legal: (N,) whether they obey the rules.
+            clear: (N,) whether they stay out of the boxes.
         """
-        cost = np.where(legal, missed + LEVER * turned, math.inf)
+        cost = np.where(legal & clear, missed + LEVER * turned, math.inf)
         i = int(np.argmin(cost))
         if cost[i] < self.nearest + LEVER * self.turned:
             self.nearest, self.turned = float(missed[i]), float(turned[i])
@@ -58,8 +57,10 @@ class Sifted:
         what = f"no crease of up to {most} segments was found that ends within {tolerance:g} mm of {where}"
         if wants.directed:
             what += f" and {math.degrees(angle):g} degrees of its direction"
-        if self.boxed:
-            return f"{what} and stays out of the boxes; {self.boxed} that end there do not: make the boxes smaller"
+        if len(wants.keep_out):
+            what += " and stays out of the boxes"
+            if not math.isfinite(self.nearest):
+                return f"{what}; no strip that was looked at stays out of them: make the boxes smaller"
         near = f"the nearest ends {self.nearest:.3g} mm away"
         if wants.directed:
             near += f", {math.degrees(self.turned):.2g} degrees off"

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline, NdBSpline, RectBivariateSpline
 
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.segments import DesignError, Domain, folded, folded_transforms
@@ -51,6 +50,8 @@ class Surrogate:
         Raises:
             DesignError: the segments are no grid, or leave out parts of the domain.
         """
+        from scipy.interpolate import CubicSpline, NdBSpline, RectBivariateSpline
+
         self.setting, self.domain, self.has_variants = setting, Domain(fold=setting.fold), False
         k0, length, values = (np.asarray(x, dtype=float) for x in (k0, length, values))
         lengths = np.unique(length)
@@ -233,6 +234,19 @@ class Surrogate:
     def varied(self) -> Mapping[str, tuple[Forward, Forward]]:
         """None: this model does not know what strips do that are made a little differently."""
         return {}
+
+    def made(self, off: Mapping[str, Array]) -> Forward:
+        """Not known to this model: strips that are made a little differently.
+
+        Args:
+            off: how far the fields named are off.
+
+        Raises:
+            DesignError: always.
+        """
+        raise DesignError(
+            f"the source's model does not know strips with another {', '.join(off)}; use model = 'converged'"
+        )
 
     def bars(self, k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array]:
         """Zero: one mesh has no error bars, see `Forward.bars`.

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bh.applications.inverse.boxes import depths
 from bh.applications.inverse.descent import descend
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.problems import Design, ReachPoint
@@ -103,6 +104,16 @@ class Wants:
         if not np.isfinite(boxes).all() or (boxes[:, 0] >= boxes[:, 1]).any():
             raise DesignError("a box of keep_out has no room; give two opposite corners")
         met = tuple(Stop(float(part), _vector(p, "a stop")) for part, p in stops)
+        places = [
+            ("the start of the crease", np.zeros(3)),
+            ("the target", at),
+            *(("a stop", s.point) for s in met),
+        ]
+        for name, place in places:
+            if ((boxes[:, 0] < place) & (place < boxes[:, 1])).all(axis=1).any():
+                raise DesignError(
+                    f"{name} ({place[0]:g}, {place[1]:g}, {place[2]:g}) lies in a box of keep_out; move the box"
+                )
         return cls(at, along, ridge, met, boxes)
 
     @property
@@ -222,7 +233,20 @@ class ReachAll(ReachPoint):
         Returns:
             (N, 2 n) variables.
         """
-        return descend(self, descend(_Steady(self), x, on), on)
+        return self.polished(descend(_Steady(self), x, on), on)
+
+    def polished(self, x: Array, on: Bools) -> Array:
+        """Designs next to candidates that do what is asked for, moved out of the boxes where there are some.
+
+        Args:
+            x: (N, 2 n) variables.
+            on: (N, n) pinches.
+
+        Returns:
+            (N, 2 n) variables.
+        """
+        x = descend(self, x, on)
+        return descend(_Outside(self), x, on) if len(self.wants.keep_out) and len(x) else x
 
     def off(self, residuals: Array) -> tuple[Array, Array]:
         """(...) largest distance from a point that is asked for, mm, and (...) angle from the direction, rad.
@@ -283,3 +307,23 @@ class _Steady:
         return np.concatenate(
             (self.problem.residuals(x, on), *(STEADY * move for move in moves.values())), axis=-1
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Outside:
+    """Residuals of a problem, and beside them how deep the strip is in each box, folded and pinched."""
+
+    problem: ReachAll
+
+    @property
+    def lower(self) -> Array:
+        return self.problem.lower
+
+    @property
+    def upper(self) -> Array:
+        return self.problem.upper
+
+    def residuals(self, x: Array, on: Bools) -> Array:
+        problem = self.problem
+        inside = depths(problem.surrogate, problem.wants.keep_out, *problem.split(x), on)
+        return np.concatenate((problem.residuals(x, on), inside), axis=-1)

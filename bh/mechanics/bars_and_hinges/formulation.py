@@ -80,7 +80,7 @@ class BarsAndHinges:
         Raises:
             ModelError: bars measure Green's strain, of which there are none, or panels are in contact.
         """
-        if system.barrier is not None:
+        if system.contact_blocks is not None:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
         refuse_curves(system.curves)
         refuse_outside(system.load_step)
@@ -103,7 +103,7 @@ class BarsAndHinges:
         e, mesh = system.elements, system.mesh
         x = system.near(q, lam)
         _, _, f, forces, turn = system.internal_forces(x, q, lam)
-        contact = system.press_on(x, lam, f)
+        contact, rubbed = system.press_on(x, lam, f)
         phi = dihedral_angles(x, e.hinges)
         s_bar, s_hinge = forces[: len(e.bars)], forces[len(e.bars) :]
         stretch = 0.5 * s_bar**2 / np.maximum(e.bar_stiffness, 1e-300)
@@ -130,10 +130,10 @@ class BarsAndHinges:
             mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(
                 float(stretch.sum()), float(by_hinge[bend].sum()), float(by_hinge[spring].sum()), float(by_lock),
-                contact, dissipated, 0.0 if system.outside is None else system.outside.spring_energy(x),
+                contact, dissipated, 0.0 if system.outside is None else system.outside.spring_energy(x), rubbed,
             ),
             dihedral_angles=angles, energy_density=density, reactions=reactions,
             crease_moments=moments, stable=stable,
-            contact_forces={} if system.outside is None else system.outside.contact_forces(x, lam),
-            crease_history=system.history_at(q, lam) if system.remembers else None,
+            contact_forces=system.contact_forces(x, lam),
+            crease_history=system.crease_history_at(q, lam) if system.yields else None,
         )  # fmt: skip

@@ -105,6 +105,7 @@ class BarsAndHingesSystem(SupportedSheet):
         self.size = self.primal + self.elements.prescribed
         self._bar_scale = model.sheet.E * model.sheet.t
         self._moments_start = moments
+        self._let_go(start, self.start())
 
     # ------------------------------------------------------------------------------- unknowns and positions
 
@@ -136,12 +137,10 @@ class BarsAndHingesSystem(SupportedSheet):
         load = (1.0 - lam) * self.force.start + lam * self.force.end
         energy -= float(np.vdot(load, x - self.displacements.home))
         f -= load
-        if self.outside is not None:
-            energy += self.outside.forces(x, lam, f)
-        if self.barrier is not None:
-            energy += self.barrier.forces(x, f)
+        energy += self.press(x, lam, f)
         residual = np.empty(self.size)
         residual[: self.primal] = self.displacements.components(f)
+        energy += self.tethers.push(q, lam, residual)
         gap = penalty = 0.0
         if self.elements.prescribed:
             missed = turn[-self.elements.prescribed :]
@@ -236,7 +235,7 @@ class BarsAndHingesSystem(SupportedSheet):
             return self.elements.hinge_stiffness
         return self._straight(x, lam, self.elements.couple.start).stiffness
 
-    def history_at(self, q: Array, lam: float) -> Array:
+    def crease_history_at(self, q: Array, lam: float) -> Array:
         """(m, 2) what creases remember where this state is accepted; see `bh.solvers.system.Remembering`.
 
         Args:
@@ -264,7 +263,7 @@ class BarsAndHingesSystem(SupportedSheet):
         e = self.elements
         bars = len(e.bars)
         x = self.near(q, lam)
-        touching = self._touching(x)
+        touching = self._touching(x, lam)
         pattern = self._pattern
         data = np.zeros(pattern.size)
         linear = Linearised(np.empty((bars, 3)), np.empty((len(e.hinges), 12)), np.empty(len(e.hinges)))
@@ -277,9 +276,10 @@ class BarsAndHingesSystem(SupportedSheet):
         if self.outside is not None:
             slots = pattern.slots[-1 if touching is None else -2]
             self.outside.tangent(x, lam, self.constraints.frame_of, self.constraints.frames, slots, data)
-        if touching is not None:
+        if touching is not None and self.contact_blocks is not None:
             axes = (self.constraints.frame_of, self.constraints.frames)
             self.contact_blocks.add(*touching, *axes, pattern.slots[-1], data)
+        self.tethers.stiffen(lam, data, pattern)
         if self.constraints.rigid_body:
             Z = self.displacements.rigid(x)
             ground = self._ground(Z, data)
@@ -319,10 +319,11 @@ class BarsAndHingesSystem(SupportedSheet):
             out += self.tangent_times(x, moving, forces, lam)
         if self.outside is not None:
             self.outside.force_rates(x, moving, lam, 1.0, out)
-        if self.barrier is not None:
-            out += self.barrier.times(x, moving)
+        if self.contact_blocks is not None:
+            out += self.touch_rates(x, moving, lam, 1.0)
         rate = np.empty(self.size)
         rate[: self.primal] = self.displacements.components(out)
+        self.tethers.rates(q, lam, rate)
         if e.prescribed:
             turn = np.einsum("hpc,hpc->h", g.reshape(-1, 4, 3), moving[e.hinges]) - e.rest.rate
             rate[self.primal :] = turn[-e.prescribed :]
@@ -339,11 +340,12 @@ class BarsAndHingesSystem(SupportedSheet):
         moment = stiffness * turn + couple  # without the lock, which knows no rest angle
         total = float(e.couple.rate @ turn - moment @ e.rest.rate)
         total -= float(np.vdot(self.force.rate, x - self.displacements.home))
+        total += self.tethers.power(q, lam)
         if self.outside is not None:
             total += self.outside.power(x, lam)
-            self.outside.forces(x, lam, f)
-        if self.barrier is not None:
-            self.barrier.forces(x, f)
+        if self.contact_blocks is not None:
+            total += self.touch_power(x, lam)
+        self.press(x, lam, f)
         return total + float(np.vdot(f - self.force.at(lam), self.displacements.prescribed_motion))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
@@ -352,16 +354,19 @@ class BarsAndHingesSystem(SupportedSheet):
         x = self.near(q, lam)
         stiffness = self.hinge_stiffness(x, lam)
         total = float(stiffness @ e.rest.rate**2) - 2.0 * float(e.couple.rate @ e.rest.rate)
+        total += self.tethers.second(q, lam)
         moving = self.displacements.prescribed_motion
         if moving.any():
             _, _, _, forces, _ = self.internal_forces(x, q, lam)
             out = self.tangent_times(x, moving, forces, lam)
             g = dihedral_gradients(x, e.hinges).reshape(-1, 4, 3)
             turn = np.einsum("hpc,hpc->h", g, moving[e.hinges])
-            if self.barrier is not None:
-                out += self.barrier.times(x, moving)
+            if self.contact_blocks is not None:
+                out += self.touch_rates(x, moving, lam, 1.0)
             total += float(np.vdot(out, moving)) - 2.0 * float(np.vdot(self.force.rate, moving))
             total += 2.0 * float((e.couple.rate - stiffness * e.rest.rate) @ turn)
+        if self.contact_blocks is not None:
+            total += self.touch_stiffness(x, moving, lam)
         if self.outside is None:
             return total
         rates = np.zeros_like(x)
@@ -394,7 +399,7 @@ class BarsAndHingesSystem(SupportedSheet):
             groups += (self.mesh.triangles[self.displacements.ground_triangle][None, :],)
         if self.outside is not None:
             groups += (self.mesh.triangles,)
-        if self.barrier is not None:
+        if self.contact_blocks is not None:
             groups += (self.contact_blocks.pairs,)
         number, groups = self.displacements.pattern_nodes(groups)
         return build_pattern(number, groups, self.reference)

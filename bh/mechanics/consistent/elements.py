@@ -66,7 +66,8 @@ class ConsistentElements:
         rotations: how many there are.
         growth: what is at rest where, of a sheet that is not at rest as it is drawn.
         coupling: of laminates; triangles are then patches of their own.
-        let_go: (rotations,) couples on edges, and of clamps that are let go of, on the rotations of those edges, N mm.
+        turning: (rotations,) couples on edges, on the rotations of those edges, N mm.
+        let_go: (rotations,) couples of clamps that are let go of, where the step begins, N mm.
     """
 
     members: Ints
@@ -93,7 +94,8 @@ class ConsistentElements:
     prescribed: Ramp
     lock: Array
     rotations: int
-    let_go: Ramp
+    turning: Ramp
+    let_go: Array
     growth: Growth | None = None
     coupling: Coupling | None = None
 
@@ -143,7 +145,7 @@ def consistent_elements(
         from bh.mechanics.consistent.half import half_patches
 
         joined = half_patches(joined, spring, plane)
-    rotation, turns, rotations, let_go = _number_rotations(mesh, joined, spring, plane, held)
+    rotation, turns, rotations, turning, let_go = _number_rotations(mesh, joined, spring, plane, held)
     part_area = areas if part is None else part * areas
     membrane = measure(mesh, creased(mesh, law) | model.sections.borders(mesh))
     bending_law = laws.of_triangles(joined.members[:, 0], angle[joined.members[:, 0]])
@@ -173,7 +175,7 @@ def consistent_elements(
         spring_stiffness=k_fold, spring_rest=spring_rest,
         couple=couple,
         prescribed=Ramp(*(np.where(law == PRESCRIBED, at, np.nan) for at in (prescribed.start, prescribed.end))),
-        lock=lock_stiffness(model, load_step), rotations=rotations, let_go=let_go, growth=growth,
+        lock=lock_stiffness(model, load_step), rotations=rotations, turning=turning, let_go=let_go, growth=growth,
         coupling=_coupling(model, laws, stretching, maps, angle, growth, plane),
     )  # fmt: skip
     return whole if plane is None else _half(whole, plane)
@@ -275,7 +277,7 @@ def triangle_ranks(mesh: SheetMesh) -> Array:
 
 def _number_rotations(
     mesh: SheetMesh, joined: Patches, spring: Bools, plane: Mirror | None, held: Clamps
-) -> tuple[Ints, Ints, int, Ramp]:
+) -> tuple[Ints, Ints, int, Ramp, Array]:
     """Rotation of every angle (c, a) or -1, of both sides of every hinge (m, 2), their number, and couples, N mm.
 
     There is one for each hinge between two patches, and two for each spring crease, and one for each free edge that
@@ -297,13 +299,14 @@ def _number_rotations(
     rotation = np.where(has, both[joined.hinge, side], -1)
     edge = mesh.topology.triangle_edges.ravel()[joined.half_edge]
     couple, load = held.couple[edge], Ramp(held.load.start[edge], held.load.end[edge])
-    let_go = (joined.kind == TURN) & (joined.hinge < 0) & ((couple != 0.0) | held.loaded[edge])
-    free = ((joined.hinge < 0) & (joined.kind == OWN)) | let_go
+    turned = (joined.kind == TURN) & (joined.hinge < 0) & ((couple != 0.0) | held.loaded[edge])
+    free = ((joined.hinge < 0) & (joined.kind == OWN)) | turned
     rotation[free] = count.sum() + np.arange(free.sum())
     rotations = int(count.sum() + free.sum())
-    start, end = np.zeros(rotations), np.zeros(rotations)
-    start[rotation[let_go]], end[rotation[let_go]] = (couple + load.start)[let_go], load.end[let_go]
-    return rotation, both, rotations, Ramp(start, end)
+    start, end, let_go = np.zeros((3, rotations))
+    for out, value in ((start, load.start), (end, load.end), (let_go, couple)):
+        out[rotation[turned]] = value[turned]
+    return rotation, both, rotations, Ramp(start, end), let_go
 
 
 def _quads(mesh: SheetMesh, joined: Patches, outward: Array) -> tuple[Ints, Array]:

@@ -79,7 +79,7 @@ class Consistent:
         Raises:
             ModelError: the material is not linear, panels are in contact, the sheet expands or couples.
         """
-        if system.barrier is not None:
+        if system.contact_blocks is not None:
             raise ModelError("sensitivities are those of a sheet without contact; set contact = False")
         if not (system.elements.stretching.constant and system.elements.bending.constant):
             raise ModelError("sensitivities are those of linear materials; this one has moduli that change")
@@ -114,7 +114,7 @@ class Consistent:
         x = system.near(q, lam)
         now = system.internal(x, q[system.moving :], lam)
         _, M, S, L = system.split(now.forces)
-        contact = system.press_on(x, lam, now.f)
+        contact, rubbed = system.press_on(x, lam, now.f)
         stretching, bending = (
             system.stretching_by_triangle(x, lam),
             system.bending_by_triangle(now.theta, x, lam),
@@ -144,7 +144,7 @@ class Consistent:
             mesh=mesh, step=step, lam=lam, points=system.positions(q, lam),
             energy=Energy(
                 float(stretching.sum()), float(bending.sum()), float(folding.sum()), now.lock, contact, dissipated,
-                0.0 if system.outside is None else system.outside.spring_energy(x),
+                0.0 if system.outside is None else system.outside.spring_energy(x), rubbed,
             ),
             dihedral_angles=angles,
             energy_density={
@@ -158,8 +158,8 @@ class Consistent:
                 resultants, model.sections, mesh, e, self.material, x, now.theta, lam,
                 None if system.load_step.changed is None else system.load_step.changed.at(lam),
             ),
-            contact_forces={} if system.outside is None else system.outside.contact_forces(x, lam),
-            crease_history=system.history_at(q, lam) if system.remembers else None,
+            contact_forces=system.contact_forces(x, lam),
+            crease_history=system.crease_history_at(q, lam) if system.yields else None,
         )  # fmt: skip
 
 

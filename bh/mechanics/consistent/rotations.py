@@ -52,12 +52,13 @@ class TurningEdges(SupportedSheet):
         """
         raise NotImplementedError
 
-    def rotations_at(self, x: Array, lam: float) -> Array:
+    def rotations_at(self, x: Array, lam: float, couples: Array | None = None) -> Array:
         """(rotations,) of least energy at positions x (n, 3).
 
         Args:
             x: (nodes, 3) positions, mm.
             lam: load parameter of the step, 0 to 1.
+            couples: (rotations,) that act besides, N mm; None for none.
 
         Returns:
             in rad.
@@ -67,14 +68,17 @@ class TurningEdges(SupportedSheet):
         """
         alpha = np.zeros(self.size - self.moving)
         now = self.internal(x, alpha, lam)
+        more = np.zeros_like(alpha) if couples is None else couples
         if self.elements.bending.constant and self.curves is None:
-            return np.asarray(-self._rotation_factor.solve(now.r)) if now.r.any() else now.r
+            r = now.r + more
+            return np.asarray(-self._rotation_factor.solve(r)) if r.any() else r
         for _ in range(ITERATIONS):
-            if np.abs(now.r).max(initial=0.0) <= 1e-12 * self._stiffest[1]:
+            r = now.r + more
+            if np.abs(r).max(initial=0.0) <= 1e-12 * self._stiffest[1]:
                 return alpha
             B = self.elements.bending.stiffness(now.theta)
             stiffness = self.spring_stiffness(now.turns)
-            alpha = alpha - sp.linalg.splu(self.rotation_stiffness(B, stiffness)).solve(now.r)
+            alpha = alpha - sp.linalg.splu(self.rotation_stiffness(B, stiffness)).solve(r)
             now = self.internal(x, alpha, lam)
         raise ModelError(
             "no rotations of least energy at these positions: the law of bending, or of a crease, is not convex there"
@@ -151,7 +155,7 @@ class TurningEdges(SupportedSheet):
         k = self.elements.spring_stiffness
         return k if self.curves is None else self.spring_stiffness(self.turns(x, q[self.moving :], lam))
 
-    def history_at(self, q: Array, lam: float) -> Array:
+    def crease_history_at(self, q: Array, lam: float) -> Array:
         """(m, 2) what creases remember where this state is accepted; see `bh.solvers.system.Remembering`.
 
         Args:

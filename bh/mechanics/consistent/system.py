@@ -95,6 +95,7 @@ class ConsistentSystem(TurningEdges):
             start_points
         )  # of a kind with all other positions: kernels compile once
         self._frame_of = np.append(self.constraints.frame_of, -1)
+        self._let_go(start, self.start(), -self.elements.let_go)
 
     # ------------------------------------------------------------------------------- unknowns and positions
 
@@ -106,9 +107,11 @@ class ConsistentSystem(TurningEdges):
 
     def start(self) -> Array:
         """Unknowns of the state that the step begins with; the rotations are those of least energy there."""
+        if self.tethers:
+            return self.tethers.begin.copy()
         q = np.zeros(self.size)
         q[: self.moving] = self.displacements.start()
-        q[self.moving :] = self.rotations_at(self._start_points, 0.0)
+        q[self.moving :] = self.rotations_at(self._start_points, 0.0, self.elements.let_go)
         return q
 
     def unknowns_at(self, x: Array, lam: float) -> Array:
@@ -145,7 +148,7 @@ class ConsistentSystem(TurningEdges):
             lam: load parameter of the step, 0 to 1.
         """
         e = self.elements
-        f, r = np.zeros_like(x), e.let_go.at(lam)
+        f, r = np.zeros_like(x), e.turning.at(lam)
         forces, theta = np.empty(sum(self._counts)), np.empty(e.rotation.shape)
         turns = np.empty(len(e.springs))
         N, M, S, L = self.split(forces)
@@ -210,9 +213,7 @@ class ConsistentSystem(TurningEdges):
         x = self.near(q, lam)
         now = self.internal(x, q[self.moving :], lam)
         load = self.force.at(lam)
-        touched = 0.0 if self.outside is None else self.outside.forces(x, lam, now.f)
-        if self.barrier is not None:
-            touched += self.barrier.forces(x, now.f)
+        touched = self.press(x, lam, now.f)
         energy = (
             now.stretching
             + now.bending
@@ -220,9 +221,10 @@ class ConsistentSystem(TurningEdges):
             + now.lock
             + touched
             - float(np.vdot(load, x - self.displacements.home))
-            + float(self.elements.let_go.at(lam) @ q[self.moving :])
+            + float(self.elements.turning.at(lam) @ q[self.moving :])
         )
         residual = np.concatenate((self.displacements.components(now.f - load), now.r))
+        energy += self.tethers.push(q, lam, residual)
         scale = self._outer_scale(load, x, lam)
         imbalance = self._imbalance(residual, now.size, scale, x) if energy < np.inf else np.inf
         return Evaluation(energy, residual, imbalance, now.forces)
@@ -249,7 +251,7 @@ class ConsistentSystem(TurningEdges):
         """The tangent at q (size,) with `forces` in its geometric part; see `bh.solvers.system.System`."""
         e, joined = self.elements, self.elements.patches
         x = self.near(q, lam)
-        touching = self._touching(x)
+        touching = self._touching(x, lam)
         pattern = self._pattern
         N, M, S, L = self.split(forces)
         data = np.zeros(pattern.size)
@@ -270,11 +272,12 @@ class ConsistentSystem(TurningEdges):
         )
         if self.outside is not None:
             self.outside.tangent(x, lam, *axes, pattern.slots[0], data)
-        if touching is not None:
+        if touching is not None and self.contact_blocks is not None:
             last = -1 if e.coupling is None else -2
             self.contact_blocks.add(*touching, *axes, pattern.slots[last], data)
         if closing or L.any():
             closings.lock_tangent(x, self.hinges, e.lock, L, *axes, pattern.slots[3], data)
+        self.tethers.stiffen(lam, data, pattern)
         matrix: Matrix = pattern.matrix(data)
         if self.constraints.rigid_body:
             matrix = self._free_body(x, data)
@@ -303,7 +306,7 @@ class ConsistentSystem(TurningEdges):
     @cached_property
     def _pattern(self) -> Pattern:
         ground = self.displacements.ground_triangle if self.constraints.rigid_body else None
-        pairs = None if self.barrier is None else self.contact_blocks.pairs
+        pairs = None if self.contact_blocks is None else self.contact_blocks.pairs
         return rotation_pattern(self.mesh, self.elements, self.displacements, ground, pairs)
 
     def _predicted_forces(self, x: Array, slopes: Slopes, closing: bool, forces: Array, dq: Array) -> Array:
@@ -377,7 +380,7 @@ class ConsistentSystem(TurningEdges):
         v = self.displacements.prescribed_motion
         at = Slopes(e.bending.stiffness(now.theta), self.spring_stiffness(now.turns))
         rates, turns = self.force_rates(x, v, np.zeros(e.rotations), at, closing=False, controlled=True)
-        f, r = np.zeros_like(x), e.let_go.rate
+        f, r = np.zeros_like(x), e.turning.rate
         (N, M, S, L), (dN, dM, dS, _) = self.split(now.forces), self.split(rates)
         e.stretching.force_rates(x, v, N, dN, f)
         kernels.bending_force_rates(x, v, e.patches.kind, e.quad, e.ghost, e.rotation, M, dM, f, r)
@@ -386,8 +389,8 @@ class ConsistentSystem(TurningEdges):
             closings.lock_force_rates(x, v, self.hinges, e.lock, L, f)
         if self.outside is not None:
             self.outside.force_rates(x, v, lam, 1.0, f)
-        if self.barrier is not None:
-            f += self.barrier.times(x, v)
+        if self.contact_blocks is not None:
+            f += self.touch_rates(x, v, lam, 1.0)
         second = float(np.vdot(v, f)) - self._rest_work(dM, dS) + float(e.couple.rate @ turns)
         if e.growth is not None:
             second += e.growth.second(e.stretching.gamma_rates(x, v))
@@ -405,7 +408,8 @@ class ConsistentSystem(TurningEdges):
     def control_rate(self, q: Array, lam: float) -> Array:
         """(size,) d residual / d lambda at fixed q: N for displacements, N mm / rad for rotations."""
         f, r, _ = self._gradient_rates(q, lam)
-        return np.concatenate((self.displacements.components(f - self.force.rate), r))
+        rate = np.concatenate((self.displacements.components(f - self.force.rate), r))
+        return self.tethers.rates(q, lam, rate)
 
     def power(self, q: Array, lam: float) -> float:
         """Rate of work of the actuation, d energy / d lambda at fixed q (size,), N mm."""
@@ -413,22 +417,26 @@ class ConsistentSystem(TurningEdges):
         now = self.internal(x, q[self.moving :], lam)
         _, M, S, _ = self.split(now.forces)
         total = float(self.elements.couple.rate @ now.turns) - self._rest_work(M, S)
-        total -= float(np.vdot(self.force.rate, x - self.displacements.home))
-        total += float(self.elements.let_go.rate @ q[self.moving :])
+        total += self.tethers.power(q, lam) - float(np.vdot(self.force.rate, x - self.displacements.home))
+        total += float(self.elements.turning.rate @ q[self.moving :])
         if self.elements.growth is not None:
             total += self.elements.growth.power(self.elements.stretching.gamma(x), lam)
         if self.elements.coupling is not None:
             total += float(np.vdot(self.elements.coupling.moments.rate, now.theta))
         if self.outside is not None:
             total += self.outside.power(x, lam)
-            self.outside.forces(x, lam, now.f)
-        if self.barrier is not None:
-            self.barrier.forces(x, now.f)
+        if self.contact_blocks is not None:
+            total += self.touch_power(x, lam)
+        self.press(x, lam, now.f)
         unbalanced = self.displacements.to_local(now.f - self.force.at(lam))
         return total + float(np.vdot(unbalanced, self.displacements.prescribed_rate))
 
     def control_stiffness(self, q: Array, lam: float) -> float:
         """Second derivative of the energy by lambda at fixed q (size,), N mm."""
         v = self.displacements.prescribed_motion
-        more = 0.0 if self.outside is None else self.outside.control_stiffness(self.near(q, lam), v, lam)
+        x = self.near(q, lam)
+        more = 0.0 if self.outside is None else self.outside.control_stiffness(x, v, lam)
+        more += self.tethers.second(q, lam)
+        if self.contact_blocks is not None:
+            more += self.touch_stiffness(x, v, lam)
         return self._gradient_rates(q, lam)[2] - 2.0 * float(np.vdot(self.force.rate, v)) + more

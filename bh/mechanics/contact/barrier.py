@@ -17,14 +17,12 @@ from contextlib import contextmanager
 
 import ipctk
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
+from bh.mechanics.contact.blocks import in_pairs, no_blocks, partners
 from bh.mechanics.contact.detection import Detection
-from bh.mechanics.shared.assembly import add_lower, rotate
-from bh.mechanics.shared.kinematics import OPTIONS
-from bh.mechanics.shared.sparsity import Slots
+from bh.mechanics.contact.friction import Rubbing
 from bh.model.model import Model, drawn_flat
 from meshes import SheetMesh
 from meshes.topology import Ints
@@ -39,11 +37,16 @@ LOCAL = (
 )
 SLACK = 0.05  # of an edge that nodes move by while pairs are kept
 NAMED = 3  # pairs in a message
+# s of one core of 2.5 GHz: a search a triangle, detection and a look at the distance of a pair, and what a pair that
+# presses takes for its part of gradient and Hessian
+SEARCHED, DETECTED, PRESSED = 1.2e-6, 4e-7, 2e-6
 ipctk.set_num_threads(1)  # sums in one order, so that the same input gives the same numbers
 
 
 class SheetBarrier:
     """The barrier of a sheet; positions x are (n, 3), mm."""
+
+    KIND = 0  # of contacts, for what is remembered of them
 
     def __init__(self, mesh: SheetMesh, offset: float, reach: float, pressure: float) -> None:
         """Pairs that can meet.
@@ -54,20 +57,37 @@ class SheetBarrier:
             reach: how far beyond it the barrier acts, mm.
             pressure: kappa, N / mm^2.
         """
-        self.offset, self.reach = offset, reach
+        self.nodes = len(mesh.points)
         self.edges: Ints = mesh.topology.edges
         self.triangles = mesh.triangles
-        self._mesh = ipctk.CollisionMesh(
-            mesh.points, self.edges.astype(np.int32), mesh.triangles.astype(np.int32)
-        )
+        solid = ipctk.CollisionMesh(mesh.points, self.edges.astype(np.int32), mesh.triangles.astype(np.int32))
         if offset > 0.0:
             near = _neighbours(mesh, LOCAL * (offset + reach))
-            self._mesh.can_collide = ipctk.make_sparse_filter(dict.fromkeys(near, False), True)
+            solid.can_collide = ipctk.make_sparse_filter(dict.fromkeys(near, False), True)
+        self._begin(solid, mesh, offset, reach, pressure)
+
+    def _begin(
+        self, solid: ipctk.CollisionMesh, mesh: SheetMesh, offset: float, reach: float, pressure: float
+    ) -> None:
+        """What presses among the parts of a collision mesh, whose first nodes are those of the sheet."""
+        self.offset, self.reach, self._mesh = offset, reach, solid
+        self._partner = partners(mesh)
         self._potential = ipctk.BarrierPotential(reach, pressure, True)
         slack = max(reach, SLACK * float(np.median(mesh_edges(mesh))))
         self._detection = Detection(self._mesh, offset, offset + reach, slack)
         self._last: tuple[Array, ipctk.NormalCollisions] | None = None
         self._asleep = False
+        self._built = 0.0  # s for pairs that press
+
+    @property
+    def seconds(self) -> float:
+        """What it has taken so far, s of one core of 2.5 GHz, counted by its work: the same on every machine."""
+        found = self._detection
+        return found.searches * SEARCHED * len(self.triangles) + found.looks * DETECTED + self._built
+
+    def _intersects(self, x: Array) -> bool:
+        self._detection.searches += 1
+        return bool(ipctk.has_intersections(self._mesh, x))
 
     @contextmanager
     def asleep(self) -> Iterator[None]:
@@ -98,9 +118,27 @@ class SheetBarrier:
         self._detection.begin(places[-1])
         return len(places) - 1.0
 
+    def places(self, x: Array, lam: float) -> Array:  # noqa: ARG002 - moulds move
+        """Positions (n, 3) of all that can meet, as the other methods take them: here those of the sheet.
+
+        Args:
+            x: (nodes, 3) positions of the sheet, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        return x
+
+    def rates(self, v: Array, moving: float) -> Array:  # noqa: ARG002 - moulds move
+        """Velocities (n, 3) of all that can meet.
+
+        Args:
+            v: (nodes, 3) velocities of the sheet.
+            moving: rate of lambda.
+        """
+        return v
+
     def clear(self, x: Array) -> bool:
         """Is the sheet at positions x free of intersections, with layers farther apart than the offset?"""
-        if ipctk.has_intersections(self._mesh, x):
+        if self._intersects(x):
             return False
         return self.offset == 0.0 or self.distance(x) > self.offset
 
@@ -126,39 +164,26 @@ class SheetBarrier:
             return np.inf
         if self._asleep:
             return 0.0
-        if not self._detection.linked(x) and ipctk.has_intersections(self._mesh, x):
+        if not self._detection.linked(x) and self._intersects(x):
             return np.inf
         pairs = self._pairs(x)
         if len(pairs) == 0:
             return 0.0
         if self.offset > 0.0 and pairs.compute_minimum_distance(self._mesh, x) <= self.offset**2:
             return np.inf
-        f += self._potential.gradient(pairs, self._mesh, x).reshape(-1, 3)
+        f += self._potential.gradient(pairs, self._mesh, x).reshape(-1, 3)[: self.nodes]
         return float(self._potential(pairs, self._mesh, x))
 
     def blocks(self, x: Array) -> tuple[Ints, Array]:
-        """Hessian as pairs of nodes (p, 2), first one higher, and their matrices (p, 6, 6), N / mm, whose sum it is.
-
-        Nodes of several pairs have their own 3 x 3 block in one of them only.
-        """
+        """Hessian as pairs of nodes (p, 2), first one higher, and their matrices (p, 6, 6), N / mm, whose sum it is."""
         pairs = self._pairs(x)
         if len(pairs) == 0:
-            return np.zeros((0, 2), dtype=np.int64), np.zeros((0, 6, 6))
+            return no_blocks()
         H = self._potential.hessian(pairs, self._mesh, x).tobsr(blocksize=(3, 3))
         row = np.repeat(np.arange(len(x)), np.diff(H.indptr))
         column = H.indices.astype(np.int64)
-        below = row > column
-        nodes = np.column_stack((row[below], column[below]))
-        out = np.zeros((len(nodes), 6, 6))
-        out[:, :3, 3:] = H.data[below]
-        out[:, 3:, :3] = H.data[below].transpose(0, 2, 1)
-        own = row == column
-        home = {int(node): k for k, node in reversed(list(enumerate(nodes.ravel())))}
-        for node, block in zip(row[own].tolist(), H.data[own], strict=True):
-            k = home[node]
-            at = 3 * (k % 2)
-            out[k // 2, at : at + 3, at : at + 3] = block
-        return nodes, out
+        inside = (row < self.nodes) & (column < self.nodes)
+        return in_pairs(row[inside], column[inside], H.data[inside], self._partner)
 
     def pair_forces(self, x: Array) -> list[tuple[Ints, Array]]:
         """What each pair in contact does: its nodes (k,) and the forces (k, 3), N, that it puts on them; k is 2 to 4.
@@ -175,6 +200,40 @@ class SheetBarrier:
             gradient = np.asarray(self._potential.gradient(pairs[k], pairs[k].dof(x, edges, faces)))
             found.append((nodes, -gradient.reshape(-1, 3)[: len(nodes)]))
         return found
+
+    def rubbing(self, x: Array, mu: float) -> Rubbing:
+        """What presses at positions x, to rub with a coefficient mu; nothing is stuck.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            mu: coefficient of friction.
+        """
+        pairs = self._pairs(x)
+        if len(pairs) == 0:
+            return Rubbing.none()
+        slides = ipctk.TangentialCollisions()
+        slides.build(self._mesh, x, pairs, self._potential, 1.0)
+        keys, weights = np.full((len(slides), 5), -1, dtype=np.int64), np.zeros((len(slides), 4))
+        normals, force = np.zeros((len(slides), 3)), np.zeros(len(slides))
+        edges, faces = self._mesh.edges, self._mesh.faces
+        for k in range(len(slides)):
+            pair = slides[k]
+            nodes = [n for n in pair.vertex_ids(edges, faces) if n >= 0]
+            keys[k, 0], keys[k, 1 : 1 + len(nodes)] = self.KIND + len(nodes), nodes
+            weights[k, : len(nodes)] = pair.compute_coefficients(x, edges, faces)[: len(nodes)]
+            normals[k] = np.cross(*np.asarray(pair.tangent_basis).T)
+            force[k] = self.coefficient(nodes, mu) * pair.weight * pair.normal_force_magnitude
+            del pair  # of what `slides` holds; the library breaks down where it outlives that
+        return Rubbing(keys, weights, normals, force, np.zeros((len(slides), 3)))
+
+    def coefficient(self, nodes: Sequence[int], mu: float) -> float:  # noqa: ARG002 - moulds have their own
+        """Of friction between some nodes, where it is mu in general.
+
+        Args:
+            nodes: of a contact.
+            mu: coefficient of the model.
+        """
+        return mu
 
     def times(self, x: Array, v: Array) -> Array:
         """(n, 3) Hessian at x times v (n, 3).
@@ -240,6 +299,16 @@ class SheetBarrier:
                 return 1.0
         return part
 
+    def first_meetings(self, x: Array) -> str:
+        """What is wrong with a first state x (n, 3), mm: it meets itself, or parts of it are nearer than the offset."""
+        near = self.offset > 0.0 and not ipctk.has_intersections(self._mesh, x)
+        what = (
+            f"parts of the first state are nearer than {self.offset:.4g} mm"
+            if near
+            else "the first state meets itself"
+        )
+        return f"{what} ({self.meetings(x)})"
+
     def meetings(self, x: Array, most: int = NAMED) -> str:
         """What intersects or lies within the offset at x, in words: the first `most` pairs, by their nodes.
 
@@ -286,7 +355,9 @@ class SheetBarrier:
             return self._last[1]
         found = ipctk.NormalCollisions()
         found.use_area_weighting = True
-        found.build(self._detection.candidates(x), self._mesh, x, self.reach, self.offset)
+        near = self._detection.candidates(x)
+        found.build(near, self._mesh, x, self.reach, self.offset)
+        self._built += len(near) * DETECTED + len(found) * PRESSED
         self._last = (x.copy(), found)
         return found
 
@@ -337,53 +408,15 @@ def sheet_barrier(model: Model) -> SheetBarrier:
             f"{what}: layers {offset + reach:.4g} mm apart do not fit triangles {heights.min():.4g} mm high; "
             "give a smaller gap, or a coarser mesh"
         )
-    # what bends a panel as wide as the sheet's mean edge is long flat: any pressure would do, this one is in the middle
-    pressure = sheet.E * (sheet.t / float(np.median(lengths))) ** 3
-    return SheetBarrier(mesh, offset, reach, pressure)
+    return SheetBarrier(mesh, offset, reach, barrier_pressure(model))
 
 
-class ContactBlocks:
-    """Where the Hessian of a barrier goes in the tangent: pairs of nodes, a new set only where a pair is new."""
+def barrier_pressure(model: Model) -> float:
+    """Kappa of a barrier, N / mm^2: what bends a panel as wide as the sheet's mean edge is long flat.
 
-    def __init__(self) -> None:
-        """No pairs."""
-        self.pairs: Ints = np.zeros((0, 2), dtype=np.int64)
-        self._keys: Ints = np.zeros(0, dtype=np.int64)
+    Others would do, this one is in the middle.
 
-    def known(self, pairs: Ints) -> bool:
-        """Are all of these (p, 2) among the pairs? If not, the pairs are now these."""
-        keys = _keys(pairs)
-        if np.isin(keys, self._keys).all():
-            return True
-        order = np.argsort(keys)
-        self.pairs, self._keys = pairs[order], keys[order]
-        return False
-
-    def add(
-        self, pairs: Ints, blocks: Array, frame_of: Ints, frames: Array, slots: Slots, data: Array
-    ) -> None:
-        """Adds the blocks (p, 6, 6) of pairs (p, 2) to the values `data`; `slots` are those of `self.pairs`.
-
-        Args:
-            pairs: (p, 2) nodes.
-            blocks: (p, 6, 6) N / mm.
-            frame_of: (nodes,) row of `frames` of each node, -1 where axes are global.
-            frames: (k, 3, 3) axes of oblique supports.
-            slots: of `self.pairs`.
-            data: values of the matrix, N / mm; added to.
-        """
-        if len(pairs):
-            rows = np.searchsorted(self._keys, _keys(pairs))
-            _add_blocks(pairs, blocks, rows, frame_of, frames, slots, data)
-
-
-def _keys(pairs: Ints) -> Ints:
-    return np.asarray(pairs[:, 0] * 2**31 + pairs[:, 1])
-
-
-@njit(**OPTIONS)
-def _add_blocks(pairs, blocks, rows, frame_of, frames, slots, data):  # type: ignore[no-untyped-def]
-    for k in range(len(pairs)):
-        if len(frames) > 0:
-            rotate(blocks[k], pairs[k], frame_of, frames)
-        add_lower(blocks[k], np.int64(6), slots[rows[k]], data)
+    Args:
+        model: of the sheet.
+    """
+    return model.sheet.E * (model.sheet.t / float(np.median(mesh_edges(model.mesh)))) ** 3

@@ -35,9 +35,13 @@ class Detection:
             slack: motion of a node, mm, for which pairs are kept.
         """
         self.mesh, self.least, self.most = mesh, least, most
+        self.searches = self.looks = 0  # for pairs in the whole mesh; at single pairs
         self._slack = slack
         self._found: tuple[Array, ipctk.Candidates] | None = None
         self._linked: deque[Array] = deque(maxlen=KEPT)
+        self._marks: deque[int] = deque(
+            maxlen=KEPT
+        )  # of the linked ones, which tell most others apart at once
         self._ways: deque[tuple[Array, Array, float]] = deque(maxlen=WAYS)
         # additive detection (Li, Kaufman and Jiang 2021): root finders take seconds where edges move in one plane
         self._method = ipctk.AdditiveCCD(STEPS)
@@ -51,6 +55,7 @@ class Detection:
         if self._found is None or _moved(self._found[0], x) > self._slack:
             near = ipctk.Candidates()
             near.build(self.mesh, x, 0.5 * self.most + self._slack)
+            self.searches += 1
             self._found = (x.copy(), near)
         return self._found[1]
 
@@ -75,25 +80,32 @@ class Detection:
 
     def _free_part(self, x: Array, moved: Array, within: float) -> float:
         """Detection stops at a tenth of a distance at once; what comes nearer than that is not yet in the way."""
-        first = part = self._seen_free(x, moved, within)
+        near = self._on_the_way(x, moved, within)  # also of the rest of the way
+
+        first = part = self._seen_free(near, x, moved, within)
         for _ in range(LOOKS):
             if part >= 1.0 or first <= 0.0:
                 return part
-            part += (1.0 - part) * self._seen_free(x + part * (moved - x), moved, within)
+            part += (1.0 - part) * self._seen_free(near, x + part * (moved - x), moved, within)
         return first if part < 1.0 else 1.0
 
-    def _seen_free(self, x: Array, moved: Array, within: float) -> float:
+    def _seen_free(self, near: ipctk.Candidates, x: Array, moved: Array, within: float) -> float:
+        self.looks += len(near)
+        return float(near.compute_collision_free_stepsize(self.mesh, x, moved, within, self._method))
+
+    def _on_the_way(self, x: Array, moved: Array, within: float) -> ipctk.Candidates:
+        """Pairs that may come within a distance on the straight way from x to `moved`, and more."""
         if _moved(x, moved) > self._slack:
-            free = ipctk.compute_collision_free_stepsize(
-                self.mesh, x, moved, within, narrow_phase_ccd=self._method
-            )
-            return float(free)
+            near = ipctk.Candidates()
+            near.build(self.mesh, x, moved, 0.5 * within)
+            self.searches += 1
+            return near
         near = self.candidates(x)
         assert self._found is not None
         if _moved(self._found[0], moved) > self._slack:
             self._found = None
             near = self.candidates(0.5 * (x + moved))
-        return float(near.compute_collision_free_stepsize(self.mesh, x, moved, within, self._method))
+        return near
 
     def begin(self, x: Array) -> None:
         """Forget all links; x, with nothing passing through anything, is what others are linked with from now on.
@@ -102,8 +114,9 @@ class Detection:
             x: (nodes, 3) positions, mm.
         """
         self._linked.clear()
+        self._marks.clear()
         self._ways.clear()
-        self._linked.append(x.copy())
+        self._keep(x)
 
     def linked(self, x: Array) -> bool:
         """Is there a motion to x, from where the links begin, in which nothing passes through anything? If so, keep x.
@@ -121,11 +134,19 @@ class Detection:
                     break
             else:
                 return False
-        self._linked.append(x.copy())
+        self._keep(x)
         return True
 
+    def _keep(self, x: Array) -> None:
+        self._linked.append(x.copy())
+        self._marks.append(hash(x.tobytes()))
+
     def _known(self, x: Array) -> bool:
-        return any(np.array_equal(x, known) for known in self._linked)
+        mark = hash(x.tobytes())
+        return any(
+            mark == other and np.array_equal(x, known)
+            for other, known in zip(self._marks, self._linked, strict=True)
+        )
 
     @staticmethod
     def _on(x: Array, begin: Array, way: Array, part: float) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
@@ -13,15 +11,16 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep, crease_hinges
+from bh.loading.tethers import NONE, Tethers, tethers
 from bh.mechanics.shared import penetration as hinge_penetration
 from bh.mechanics.shared.crease_curves import CreaseCurves
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.kinematics import dihedral_angles, dihedral_gradients
 from bh.mechanics.shared.outside import Outside
+from bh.mechanics.shared.pressing import PressedSheet
 from bh.model.constraints import MOTIONS, TURNED, rigid_motions
 from bh.model.laws import PRESCRIBED, SHEET
 from bh.model.model import Model
-from bh.model.ramp import Ramp
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix
 from bh.solvers.hinged import Stops
@@ -32,13 +31,12 @@ from meshes.topology import Ints
 
 if TYPE_CHECKING:
     from bh.loading.symmetry import Mirror
-    from bh.mechanics.contact.barrier import SheetBarrier
 
 Array = NDArray[np.float64]
 TINIEST = 1e-300  # N; less is nothing
 
 
-class SupportedSheet:
+class SupportedSheet(PressedSheet):
     """The part of `bh.solvers.System` that depends on nodes, triangles and supports only.
 
     Unknowns begin with the free displacements of the nodes in local axes (mm); what follows is the formulation's own.
@@ -46,6 +44,7 @@ class SupportedSheet:
 
     size: int
     curves: CreaseCurves | None = None  # None where all creases are straight lines
+    tethers: Tethers  # in the place of supports that the step lets go of
 
     def __init__(
         self, model: Model, load_step: LoadStep, start: State | None, plane: Mirror | None = None
@@ -71,77 +70,30 @@ class SupportedSheet:
             from bh.mechanics.shared.mirrored import MirroredDisplacements
 
             self.displacements = MirroredDisplacements(self.mesh, load_step.constraints, start_points, plane)
-        if load_step.releases and start is not None:  # what let go pulls on for a while, less and less
-            let_go = start.reactions - self.displacements.reactions(start.reactions)
-            self.force = Ramp(self.force.start + let_go, self.force.end)
+        self.tethers = NONE
         if not load_step.bodies:
             self.displacements.bring_home()
         self.constraints = self.displacements.constraints
         self.moving = len(self.displacements.free)
-        if self.constraints.rigid_body and (start is None or not load_step.releases):
+        if self.constraints.rigid_body:
             self.displacements.check_balance(self.force)
-        self.barrier: SheetBarrier | None = None
-        if model.stops_itself:
-            if plane is not None:
-                raise ModelError("contact is solved on the whole sheet; leave out symmetry, or contact")
-            from bh.mechanics.contact.barrier import ContactBlocks, sheet_barrier
-
-            self.barrier, self.contact_blocks = sheet_barrier(model), ContactBlocks()
-            self._check_start(start_points)
+        if model.stops_itself and plane is not None:
+            raise ModelError("contact is solved on the whole sheet; leave out symmetry, or contact")
         acts = load_step.bodies or load_step.pressure is not None or load_step.ground is not None
         self.outside = Outside(self.mesh, load_step, start_points, self.displacements) if acts else None
         if self.constraints.rigid_body and load_step.pressure is not None:
             raise ModelError(
                 "a pressure pushes a sheet that nothing holds as a whole; add supports or springs"
             )
+        self.begin_contact(model, load_step, start, start_points)
 
-    def _check_start(self, x: Array) -> None:
-        """Raises `ModelError` where the step begins with a sheet that passes through itself."""
-        if self.barrier is not None and not self.barrier.begin(
-            x + (self.displacements.home - self.displacements.reference)
-        ):
-            met = self.barrier.meetings(x)
-            raise ModelError(
-                f"contact: the first state meets itself ({met}); begin with panels apart (layers of a folded form: "
-                "untangle = true)"
-            )
-
-    def _passed(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Whether panels in contact would pass through each other on the straight way between two states."""
-        if self.barrier is None:
-            return ""
-        if not self.barrier.passed(self.near(q, lam), self.near(q_new, lam_new)):
-            return ""
-        return "panels would pass through each other on the way there"
-
-    def press_on(self, x: Array, lam: float, f: Array) -> float:
-        """Energy of panels in contact; what they and bodies press with is added to nodal forces.
-
-        Held nodes that are pressed on hand it on to their supports, so reactions are read behind this.
-
-        Args:
-            x: (n, 3) positions, mm.
-            lam: load parameter of the step, 0 to 1.
-            f: (n, 3) N; the gradient is added.
-
-        Returns:
-            N mm, of panels alone.
-        """
-        if self.outside is not None:
-            self.outside.forces(x, lam, f)
-        return 0.0 if self.barrier is None else self.barrier.forces(x, f)
-
-    def _touching(self, x: Array) -> tuple[Ints, Array] | None:
-        """What panels in contact add to the tangent at positions x (`SheetBarrier.blocks`); None without contact.
-
-        A pair that the pattern of the tangent has no place for makes it be built anew.
-        """
-        if self.barrier is None:
-            return None
-        found = self.barrier.blocks(x)
-        if not self.contact_blocks.known(found[0]):
-            vars(self).pop("_pattern", None)
-        return found
+    def _let_go(self, start: State | None, begin: Array, couples: Array | None = None) -> None:
+        """Tethers for what the step lets go of, from unknowns `begin` on, and for `couples` (rotations,) of clamps."""
+        if self.load_step.releases and start is not None:
+            exerted = start.reactions - self.displacements.reactions(start.reactions)
+            pull = self.displacements.components(exerted)
+            pull = pull if couples is None else np.concatenate((pull, couples))
+            self.tethers = tethers(begin, pull, self.moving, self.mesh.areas)
 
     @property
     def conservative(self) -> bool:
@@ -162,70 +114,67 @@ class SupportedSheet:
     @property
     def remembers(self) -> bool:
         """Does what it answers depend on states before (`bh.solvers.system.Remembering`)?"""
+        return self.friction is not None or self.yields
+
+    @property
+    def yields(self) -> bool:
+        """Do creases remember what they were turned by?"""
         return self.curves is not None and self.curves.remembers
 
     @property
     def history(self) -> Array:
-        """(m, 2) of creases as they were accepted last, rad; see `State.crease_history`."""
-        return np.zeros((0, 2)) if self.curves is None else self.curves.history
+        """(k, 2) of creases as they were accepted last, rad (`State.crease_history`), then of friction."""
+        kept = self._kept if self.friction is not None else np.zeros((0, 2))
+        return np.vstack((self._turned, kept))
+
+    @property
+    def _turned(self) -> Array:
+        return self.curves.history if self.curves is not None and self.yields else np.zeros((0, 2))
+
+    def history_at(self, q: Array, lam: float) -> Array:
+        """(k, 2) what is remembered where a state is accepted; see `bh.solvers.system.Remembering`.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        turned = self.crease_history_at(q, lam) if self.yields else np.zeros((0, 2))
+        if self.friction is None:
+            return turned
+        return np.vstack((turned, self.friction.history_at(self.near(q, lam), lam)))
+
+    def crease_history_at(self, q: Array, lam: float) -> Array:
+        """(m, 2) the part of it that is of creases.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        raise NotImplementedError
 
     def remember(self, history: Array) -> None:
-        """Go on from a history (m, 2).
+        """Go on from a history (k, 2).
 
         Args:
             history: as `history_at` gives it.
         """
-        if self.curves is not None:
-            self.curves.history = history
+        count = len(self._turned)
+        if self.curves is not None and self.yields:
+            self.curves.history = history[:count]
+        if self.friction is not None and len(history) > count:
+            self._kept = history[count:]
+            self.friction.remember(self._kept, len(self.mesh.points))
 
-    def free_part(self, q: Array, dq: Array, lam: float) -> float:
-        """How much of a step dq (size,) from q no panels stand in, 0 to 1; see `bh.solvers.system.Limited`."""
-        if self.barrier is None:
-            return 1.0
-        return self.barrier.free_part(self.near(q, lam), self.near(q + dq, lam))
-
-    def meetings(self, x: Array) -> str:
-        """Which parts of the sheet meet or lie too near at positions x (n, 3), in words; empty where it is clear.
+    def takes(self, history: Array) -> bool:
+        """Can a history (k, 2) from a file be one of this system?
 
         Args:
-            x: (nodes, 3) positions, mm.
+            history: that is asked about.
         """
-        if self.barrier is None or self.barrier.clear(x):
-            return ""
-        return self.barrier.meetings(x) or "layers nearer than contact allows"
-
-    def approach(self, q: Array, dq: Array, lam: float) -> float:
-        """How much of a step dq (size,) from q leads to where panels begin to press on each other, 0 to 1.
-
-        Args:
-            q: (size,) unknowns.
-            dq: (size,) step.
-            lam: load parameter of the step, 0 to 1.
-        """
-        if self.barrier is None:
-            return 1.0
-        return self.barrier.approach(self.near(q, lam), self.near(q + dq, lam))
-
-    @property
-    def hindered(self) -> bool:
-        """Do panels stop each other?"""
-        return self.barrier is not None
-
-    def unhindered(self) -> AbstractContextManager[None]:
-        """While it lasts no panels stop each other."""
-        return nullcontext() if self.barrier is None else self.barrier.asleep()
-
-    def clear_ways(self, places: Sequence[tuple[Array, float]]) -> float:
-        """How many of the straight ways from place to place no panels come near each other on.
-
-        If it is all of them, the last place is one that the path has come to.
-
-        Args:
-            places: unknowns (size,) and load parameter of each; the first is an accepted state.
-        """
-        if self.barrier is None:
-            return len(places) - 1.0
-        return self.barrier.clear_ways([self.near(q, lam) for q, lam in places])
+        count = len(self._turned)
+        if self.friction is None:
+            return history.shape == (count, 2)
+        return self.friction.fits(history[count:], len(self.mesh.points))
 
     def reshaped(self, one: tuple[Array, float], other: tuple[Array, float]) -> float:
         """By how much two shapes differ, rigid motions aside: the norm over all nodes, mm.
@@ -235,15 +184,6 @@ class SupportedSheet:
             other: the same of the other shape.
         """
         return apart_in_shape(self.near(*one), self.near(*other))
-
-    def pressing(self, q: Array, lam: float) -> bool:
-        """Do panels press on each other at q (size,)?
-
-        Args:
-            q: (size,) unknowns.
-            lam: load parameter of the step, 0 to 1.
-        """
-        return self.barrier is not None and self.barrier.presses(self.near(q, lam))
 
     @cached_property
     def rotation(self) -> float:

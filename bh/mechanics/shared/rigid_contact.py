@@ -1,4 +1,4 @@
-"""Rigid indenters that a sheet touches without friction, and springs to where its nodes were or are pulled. Compiled.
+"""Rigid indenters that a sheet touches, and springs to where its nodes were or are pulled. Compiled.
 
 An indenter is a rounded rectangle along an axis. With g the distance of a point of the sheet from its surface (mm,
 negative inside), d its `gap` and k its stiffness (N/mm for every mm of edge of the mesh), the potential a length is
@@ -14,6 +14,7 @@ may lie anywhere between nodes.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
@@ -29,8 +30,12 @@ from bh.model.supports import select
 from meshes import SheetMesh
 from meshes.topology import Ints
 
+if TYPE_CHECKING:
+    from bh.mechanics.contact.friction import Rubbing
+
 Array = NDArray[np.float64]
 POINTS = 4  # on every edge
+INDENTED = 20  # kind of a contact with an indenter, and the number of the point on its edge
 
 
 class RigidContact:
@@ -76,8 +81,51 @@ class RigidContact:
         self._from = np.array([b.at for b in self.indenters], dtype=float).reshape(-1, 3)
         self.velocity: Array = np.array([b.by for b in self.indenters], dtype=float).reshape(-1, 3)
 
-    def _centres(self, lam: float) -> Array:
+    def centres(self, lam: float) -> Array:
+        """(indenters, 3) where the centres of their sections are, mm.
+
+        Args:
+            lam: load parameter of the step, 0 to 1.
+        """
         return self._from + lam * self.velocity
+
+    def rubbing(self, x: Array, lam: float, mu: float, first: int) -> Rubbing:
+        """Points that indenters press on, to rub against their centres; nothing is stuck.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+            mu: coefficient of friction of indenters that have none of their own.
+            first: number of the centre of the first indenter among the places of `Friction`.
+        """
+        from bh.mechanics.contact.friction import Rubbing
+
+        shape = (len(self.owner), len(self.indenters))
+        push, normal = np.zeros(shape), np.zeros((*shape, 3))
+        _pushes(
+            x,
+            self.triangles,
+            self.owner,
+            self.weights,
+            self.share,
+            self.centres(lam),
+            self._axes,
+            self._shape,
+            push,
+            normal,
+        )
+        point, body = np.nonzero(push)
+        corners, weights = self.triangles[self.owner[point]], self.weights[point]
+        ends = np.argsort(weights == 0.0, axis=1, kind="stable")[:, :2]
+        keys = np.full((len(point), 5), -1, dtype=np.int64)
+        keys[:, 0] = INDENTED + point // (len(self.owner) // POINTS)
+        keys[:, 1:3] = np.take_along_axis(corners, ends, axis=1)
+        keys[:, 3] = first + body
+        parts = np.zeros((len(point), 4))
+        parts[:, :2], parts[:, 2] = np.take_along_axis(weights, ends, axis=1), -1.0
+        own = np.array([mu if each.friction is None else each.friction for each in self.indenters])
+        force = own[body] * push[point, body]
+        return Rubbing(keys, parts, normal[point, body], force, np.zeros((len(point), 3)))
 
     def forces(self, x: Array, lam: float, f: Array) -> float:
         """Adds the gradient to f (n, 3), N, and returns the energy, N mm.
@@ -96,7 +144,7 @@ class RigidContact:
             self.owner,
             self.weights,
             self.share,
-            self._centres(lam),
+            self.centres(lam),
             self._axes,
             self._shape,
             f,
@@ -118,7 +166,7 @@ class RigidContact:
             self.owner,
             self.weights,
             self.share,
-            self._centres(lam),
+            self.centres(lam),
             self._axes,
             self._shape,
             np.zeros_like(x),
@@ -143,7 +191,7 @@ class RigidContact:
             self.owner,
             self.weights,
             self.share,
-            self._centres(lam),
+            self.centres(lam),
             self._axes,
             self._shape,
             self.home,
@@ -172,7 +220,7 @@ class RigidContact:
             self.owner,
             self.weights,
             self.share,
-            self._centres(lam),
+            self.centres(lam),
             moving * self.velocity,
             self._axes,
             self._shape,
@@ -298,6 +346,18 @@ def _forces(x, triangles, owner, weights, share, centres, axes, shape, f, total)
                 for i in range(3):
                     f[corners[i], c] += weights[k, i] * force
     return energy
+
+
+@njit(**OPTIONS)
+def _pushes(x, triangles, owner, weights, share, centres, axes, shape, push, normal):  # type: ignore[no-untyped-def]
+    p, n, H = np.empty(3), np.empty(3), np.empty((3, 3))
+    for k in range(len(owner)):
+        _place(x, triangles[owner[k]], weights[k], p)
+        for b in range(len(centres)):
+            g = _measure(p, centres[b], axes[b], shape[b], n, H)
+            if g < shape[b, 4]:
+                push[k, b] = -share[k] * _law(g, shape[b, 3], shape[b, 4])[1]
+                normal[k, b] = n
 
 
 @njit(**OPTIONS)

@@ -1,6 +1,7 @@
 // Controls, numbers and curves at the side.
-import { $, ask, degrees, make, now, number } from "./common.js";
+import { $, ask, degrees, make, now, number, tell } from "./common.js";
 import { light } from "./view.js";
+import { key, panel as pinchPanel, wide } from "./pinch.js";
 import { taken } from "./pull.js";
 
 const MOST = 200; // sliders of single creases
@@ -12,10 +13,42 @@ function options(select, names, chosen, first = "") {
   for (const [value, text] of names) select.append(new Option(text, value, false, value === chosen));
 }
 
+const SAID = { scene: "scene, for bh run", python: "lines of Python", result: "numbers, JSON", picture: "picture, PNG", film: "film of the recording, GIF" };
+function saves(formats) {
+  const select = $("export"), groups = { "What was done": [], "Folded sheet": [], "Flat pattern, to cut": [] };
+  for (const name of [...formats, "picture", "film"]) groups[name.startsWith("flat.") ? "Flat pattern, to cut" : name.startsWith("folded.") || name in { picture: 1, film: 1 } ? "Folded sheet" : "What was done"].push(name);
+  select.replaceChildren(new Option("choose", ""));
+  for (const [label, names] of Object.entries(groups)) {
+    const group = document.createElement("optgroup"); group.label = label;
+    group.append(...names.map((name) => new Option(SAID[name] ?? name.split(".")[1].toUpperCase(), name))); select.append(group);
+  }
+}
+
+// Numbers of a pattern of the library; lists as numbers between blanks.
+function values(sheet) {
+  const box = $("values"), entries = Object.entries(sheet.values);
+  box.hidden = !entries.length;
+  box.replaceChildren(box.firstElementChild, ...entries.map(([key, value]) => {
+    const label = document.createElement("label"), input = document.createElement("input");
+    input.value = [value].flat().join(" "); input.dataset.key = key; label.append(`${key[0].toUpperCase()}${key.slice(1)} `, input);
+    input.onchange = () => {
+      const given = Object.fromEntries([...box.querySelectorAll("input")].map((item) => {
+        const numbers = item.value.trim().split(/[\s,;]+/).map(Number);
+        return [item.dataset.key, Array.isArray(sheet.values[item.dataset.key]) ? numbers : numbers[0]];
+      }));
+      if (Object.values(given).flat().every(Number.isFinite)) ask({ do: "pattern", name: sheet.name, values: given });
+      else tell("A number of the pattern cannot be read; give numbers, such as 60 75 90.");
+    };
+    return label;
+  }));
+}
+
 export function panel() {
   const { sheet } = now;
   options($("library"), sheet.library.map((n) => [n, n]), "", "choose");
-  options($("export"), sheet.formats.map((n) => [n, n]), "", "choose");
+  saves(sheet.formats); values(sheet);
+  options($("spring-of"), [["all", "all"], ...sheet.creases.filter((c) => c.handled).map((c) => [c.name, c.name])], "all");
+  $("Lstar").value = Object.values(sheet.springs)[0] ?? "";
   options($("material"), Object.entries(sheet.materials), sheet.material.name);
   options($("colour"), [...Object.entries(sheet.colours).map(([name, [label]]) => [name, label]), ["none", "none"]], sheet.colour);
   $("E").value = sheet.material.E; $("t").value = sheet.material.t;
@@ -63,13 +96,16 @@ export function numbers() {
   } else $("percent-out").textContent = "each its own";
   scale(head.top);
   $("let-go").disabled = Object.keys(head.grips).length === 0;
+  pinchPanel(head);
   if (head.rest) curves();
 }
 
 function curves() {
   const { head, points } = now;
   history.energy.push([history.energy.length, head.energy.total]);
-  for (const [node, force] of Object.entries(head.forces).slice(0, 1)) if (taken[node]) {
+  const pinch = head.pinches.at(-1);
+  if (pinch) history.force.push([Math.max(0, (wide[key(pinch.a, pinch.b)] ?? pinch.apart) - pinch.apart), pinch.force]);
+  else for (const [node, force] of Object.entries(head.forces).slice(-1)) if (taken[node]) {
     const d = Math.hypot(...[0, 1, 2].map((c) => points[3 * node + c] - taken[node][c]));
     history.force.push([d, Math.hypot(...force)]);
   }

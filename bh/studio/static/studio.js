@@ -5,13 +5,13 @@ import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
 import { back, badge, finer, refined, seenCoarse } from "./finer.js";
 import { history, numbers, panel, slider } from "./panel.js";
-import { remember } from "./record.js";
+import { remember, saveFilm, savePicture } from "./record.js";
 
 // ---------------------------------------------------------------- what the server sends
 
 function answer(message) {
   if (message.kind === "sheet") show(message);
-  else if (message.kind === "file") save(message.name, message.data);
+  else if (message.kind === "file") { save(message.name, message.data); tell(`${message.name} is saved.`); }
   else if (message.kind === "line") tell(message.text);
 }
 
@@ -49,7 +49,9 @@ $("flatten").onclick = () => ask({ do: "flatten" });
 $("let-go").onclick = letGo;
 $("check").onclick = () => { tell("It is solved anew from flat ..."); ask({ do: "check" }); };
 $("library").onchange = (e) => { if (e.target.value) ask({ do: "pattern", name: e.target.value }); };
-$("export").onchange = (e) => { if (e.target.value) ask({ do: "export", what: e.target.value }); e.target.value = ""; };
+const OWN = { picture: savePicture, film: saveFilm };
+$("export").onchange = (e) => { const what = e.target.value; e.target.value = ""; if (OWN[what]) OWN[what](); else if (what) { tell("It is written ..."); ask({ do: "export", what }); } };
+$("spring").onclick = () => ask({ do: "spring", crease: $("spring-of").value, Lstar: Number($("Lstar").value) || null });
 $("material").onchange = (e) => ask({ do: "material", name: e.target.value });
 $("E").onchange = (e) => ask({ do: "material", E: Number(e.target.value) });
 $("t").onchange = (e) => ask({ do: "material", t: Number(e.target.value) });
@@ -73,4 +75,4 @@ async function open(file) {
 
 connect(answer, frame); draw();
 window.studio = { get points() { return now.points; }, get rest() { return now.head?.rest ?? false; }, get head() { return now.head; }, get sheet() { return now.sheet; }, get refined() { return refined(); },
-  place: (node) => seen(vector(now.points, node)) };
+  place: (node) => seen(vector(now.points, node)), spot: (at) => seen(vector(at, 0)) };

@@ -120,10 +120,10 @@ def solve(
 def rotate(model: Model, crease: str = "crease", strategy: LoadControl | None = ROTATE) -> Solved:
     """Impose the right angle, mountain or valley as drawn; by default in one increment from flat.
 
-    `strategy` None is the driver's own.
+    `strategy` None is the driver's own. Other stable states are looked for by the case `branches`, not here.
     """
     began = time.perf_counter()
-    path = trace(model.fold(crease, by=ANGLE), strategy=strategy)
+    path = trace(model.fold(crease, by=ANGLE), strategy=strategy, neighbours=False)
     state = path[-1]
     spent = time.perf_counter() - began
     return Solved(state, math.nan, path.unknowns, path.iterations, spent, path.outcome)

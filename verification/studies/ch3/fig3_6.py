@@ -99,7 +99,8 @@ def reach_of_end(density: Array) -> float:
 
 def fold(angle: float, mesh: Mesh) -> Folded:
     """Fold a sector to a right angle."""
-    path = trace(cone.cone_model(angle, mesh.alpha, mesh.kind, mesh.rows, mesh.formulation, SHEET))
+    model = cone.cone_model(angle, mesh.alpha, mesh.kind, mesh.rows, mesh.formulation, SHEET)
+    path = trace(model, neighbours=False)
     state = path[-1]
     ratio = state.energy.total / cone.energy(angle, SHEET) if path.reached else math.nan
     return Folded(path, ratio, density_along(state, angle) if mesh.cell <= 0.5 * BIN else None)

@@ -163,7 +163,8 @@ def pinched(
     path = trace(
         model.pinch(
             "all", by=math.pi - left, length=way.zone, profile=way.profile, how=how, couple=way.couple
-        )
+        ),
+        neighbours=False,  # the figures are of the branch that the source follows
     )
     return Pinched(path, way.zone)
 

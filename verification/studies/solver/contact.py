@@ -1,4 +1,4 @@
-"""Case `contact`: a strip that wraps round a cylinder, stacks of layers, and random sheets whose panels meet.
+"""Case `contact`: strips on a cylinder and each other, a ring on itself, layers, and random sheets whose panels meet.
 
 The strip lies on two supports and is pressed in its middle: force and lift-off by the elastica. Stacks are as high as
 their sheets are thick. Scenes are stored one
@@ -22,6 +22,7 @@ from verification.framework.checks import CaseResult, Context
 from verification.framework.random_scenes import part_of, played
 from verification.studies.solver.contact_layers import layers
 from verification.studies.solver.contact_scenes import SEED, Row, play
+from verification.studies.solver.contact_strips import met
 from verification.theory.wrapped import wrapped_by
 
 CASE = "contact"
@@ -29,6 +30,7 @@ E, T, WIDE, HALF, RADIUS = 4000.0, 0.3, 5.0, 40.0, 60.0  # MPa, mm
 TRAVEL = 12.0  # mm
 GAPS = (0.2, 0.1, 0.05)  # mm
 ALONG = (32, 64, 128)
+FREE, LEFT_OUT = 1.15, 2.0  # of the arm, mm of the end: between them the strip is free
 TOLERANCE = 0.02
 SCENES, QUICK, RUNS, PART = 200, 2, "contact_runs.json", "BH_CONTACT"
 APART = 0.02  # in parts of the energy
@@ -46,6 +48,27 @@ def pressed(along: int, gap: float) -> Path:
     size = 2.0 * RADIUS
     bar = bh.Indenter("bar", at, 0.5 * np.pi, size, size, RADIUS, by=(0.0, 0.0, -TRAVEL), gap=gap)
     return bh.trace(model.step(bar), estimate=False)
+
+
+def lift_off(path: Path, arm: float) -> float:
+    """Distance of the lift-off from the middle, mm, by the curvature of the free part: there it reaches the cylinder's.
+
+    That curvature is linear along x (the moment of the support's force), so a line through what is beyond the contact
+    says where; points on the cylinder would only tell to a cell.
+
+    Args:
+        path: of the strip.
+        arm: of the force of the cylinder on one half, mm; what lies well beyond is free.
+    """
+    x, first = path[-1].points, path.model.mesh.points
+    line = np.flatnonzero(np.isclose(first[:, 1], 0.5 * WIDE) & (first[:, 0] >= HALF))
+    line = line[np.argsort(first[line, 0])]
+    way = np.diff(x[line][:, [0, 2]], axis=0)
+    length, slope = np.linalg.norm(way, axis=1), np.arctan2(way[:, 1], way[:, 0])
+    curvature = np.diff(slope) / (0.5 * (length[1:] + length[:-1]))
+    at = x[line][1:-1, 0] - HALF
+    free = (at > FREE * arm) & (at < at.max() - LEFT_OUT)
+    return float(np.polyval(np.polyfit(curvature[free], at[free], 1), 1.0 / RADIUS))
 
 
 def read(path: Path) -> tuple[float, float, float]:
@@ -79,6 +102,7 @@ def wrapping(result: CaseResult, quick: bool) -> None:
             for name, value, right, unit in (
                 ("force of the cylinder", force, exact.force, "N"),
                 ("arm of the force", arm, exact.arm, "mm"),
+                ("lift-off of the strip", lift_off(path, arm), RADIUS * math.sin(exact.phi), "mm"),
             ):
                 result.check(
                     name,
@@ -90,6 +114,23 @@ def wrapping(result: CaseResult, quick: bool) -> None:
                     params=params,
                     path=path,
                 )
+
+
+def orders(result: CaseResult) -> None:
+    """With which power of the gap the errors go, of every quantity that has three gaps, on its finest mesh.
+
+    Args:
+        result: to which checks are added.
+    """
+    names = dict.fromkeys(check.quantity for check in result.checks if "gap" in check.params)
+    for name in names:
+        found = [check for check in result.checks if check.quantity == name]
+        cells = max(check.params["along"] for check in found)
+        at = {c.params["gap"]: c.error for c in found if c.params["along"] == cells and c.error}
+        if len(at) == len(GAPS):
+            widest, least = max(at), min(at)
+            order = math.log(at[widest] / at[least]) / math.log(widest / least)
+            result.check(f"order in the gap: {name}", order, source="measured", params={"along": cells})
 
 
 def meeting(result: CaseResult, rows: Sequence[Row]) -> None:
@@ -152,6 +193,8 @@ def run(context: Context) -> CaseResult:
         f"{ELASTICA}; {SCENES} random scenes of seed {SEED}",
     )
     wrapping(result, context.quick)
+    met(result, context.quick)
+    orders(result)
     layers(result)
     numbers = part_of(PART, QUICK if context.quick else SCENES, SCENES)
     known = played(context, CASE, RUNS, numbers, SCENES, play)

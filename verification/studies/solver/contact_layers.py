@@ -1,4 +1,4 @@
-"""Layers of case `contact`: a block of sheets, pleats between plates, and a carton that opens."""
+"""Layers of case `contact`: a block of sheets, pleats between plates, a carton and a map that open."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ EXAMPLES = FilePath(__file__).resolve().parents[3] / "examples"
 SHEETS, SIDE, APART, FORCE = 5, 20.0, 1.02, 0.5  # of the block: mm, thicknesses at first, N
 THICK = (0.1, 0.2, 0.4)  # mm
 TOLERANCE = 0.01
-OPENED, PANELS = ("pressed_pleats", "carton"), 4  # examples, and panels of the first
+OPENED, PANELS = ("pressed_pleats", "carton", "map"), 4  # examples, and panels of the first
+CORNERS, ACROSS = [0, 80, 8, 72], 60.0 * math.sqrt(2.0)  # of the map, and its diagonal, mm
+WITHIN = 0.02  # of the diagonal: its creases are turned and its panels stand in wedges at first
 STACK = "a stack is as high as its sheets are thick"
 
 
@@ -50,7 +52,7 @@ def height(path: Path) -> float:
 
 
 def layers(result: CaseResult) -> None:
-    """Heights of stacks, and what the carton opens to.
+    """Heights of stacks, and what the carton and the map open to.
 
     Args:
         result: to which checks are added.
@@ -58,7 +60,7 @@ def layers(result: CaseResult) -> None:
     for t in THICK:
         _stack(result, "height of five loose sheets that are pressed", block(t), SHEETS)
     paths = {name: bh.trace(load_scene(EXAMPLES / f"{name}.toml").model, warn=False) for name in OPENED}
-    pleats, carton = (paths[name] for name in OPENED)
+    pleats, carton, opened = (paths[name] for name in OPENED)
     _stack(result, "height of four pleats between plates", pleats, PANELS)
     result.check(
         "fold angle of an opened carton",
@@ -69,6 +71,17 @@ def layers(result: CaseResult) -> None:
         tolerance=TOLERANCE,
         params={},
         path=carton,
+    )
+    a, b, c, d = opened[-1].points[CORNERS]
+    result.check(
+        "diagonal of a map that was folded twice across",
+        float(np.linalg.norm(b - a) + np.linalg.norm(d - c)) / 2.0 if opened.reached else math.nan,
+        unit="mm",
+        reference=ACROSS,
+        source="two squares by two lie flat",
+        tolerance=WITHIN,
+        params={},
+        path=opened,
     )
     result.check(
         "states of layers that meet themselves",

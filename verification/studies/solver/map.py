@@ -2,13 +2,14 @@
 
 At least five random sheets of every kind (`map_sheets`) are solved by every model and by the shell on two meshes: the
 finer is the truth, its distance to the coarser one the bar. Cells of the map are kept in `map_runs.json` as they are
-done, a sheet at a time; a run that was stopped goes on. Where a model has no figure, a record says why.
+done, a sheet at a time; a run that was stopped goes on. Where a model has no figure, a record says why. With
+BH_MAP="network, closed ring" in the environment these kinds alone are played and shown.
 """
 
 from __future__ import annotations
 
 import math
-import signal
+import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -24,10 +25,11 @@ from meshes import MeshError, SheetMesh
 from meshes.cells import Kind, RuledCells
 from meshes.choices import choices, cut
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
+from verification.framework.random_scenes import OutOfTimeError, processor_limit
 from verification.framework.store import Store
 from verification.studies.solver.map_sheets import KINDS, UNMEASURED, Sample, on, sample
 
-CASE, RUNS = "map", "map_runs.json"
+CASE, RUNS, PART = "map", "map_runs.json", "BH_MAP"
 SHEETS, QUICK, QUICK_KINDS = 5, 1, ("narrow ring", "twisted", "orthotropic")
 LIMIT_S = 60.0  # processor time of a sheet, the shell included
 NO_FIGURES, ERROR = "sheets without figures", ": median relative error"
@@ -147,25 +149,29 @@ def examine(kind: str, number: int) -> dict[str, Any]:
     return found
 
 
-class OutOfTime(BaseException):
-    """A sheet took more than its processor time."""
-
-
 def within_time(kind: str, number: int) -> dict[str, Any]:
     """`examine`, given up after `LIMIT_S` of processor time: then the sheet has no figures, and that is said."""
-
-    def stop(_signal: int, _frame: object) -> None:
-        raise OutOfTime
-
-    before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, LIMIT_S)
     try:
-        return examine(kind, number)
-    except OutOfTime:
+        with processor_limit(LIMIT_S):
+            return examine(kind, number)
+    except OutOfTimeError:
         return {"words": sample(kind, number).words, "why": f"more than {LIMIT_S:g} s of processor time"}
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
+
+
+def wanted(kinds: tuple[str, ...]) -> list[str]:
+    """The kinds that the environment names, else those given.
+
+    Args:
+        kinds: without BH_MAP.
+
+    Raises:
+        InputError: it names one that there is not.
+    """
+    named = [word.strip() for word in os.environ.get(PART, "").split(",") if word.strip()]
+    for name in named:
+        if name not in KINDS:
+            raise InputError(f"{PART}: there is no kind {name[:40]!r}; give some of {', '.join(KINDS)}")
+    return named or list(kinds)
 
 
 def run(context: Context) -> CaseResult:
@@ -178,7 +184,7 @@ def run(context: Context) -> CaseResult:
     )
     store = Store.open(context.folder, RUNS, context.quick)
     count = QUICK if context.quick else SHEETS
-    kinds = list(QUICK_KINDS if context.quick else KINDS)
+    kinds = wanted(QUICK_KINDS if context.quick else tuple(KINDS))
     for kind in kinds:
         for number in range(count):
             key = f"{kind}/{number}"
@@ -191,7 +197,8 @@ def run(context: Context) -> CaseResult:
     for kind, why in UNMEASURED.items():
         _without(result, kind, "all", SHEETS, why)
     _plots(result, kinds)
-    store.file.unlink(missing_ok=True)
+    if len(kinds) == len(KINDS):
+        store.file.unlink(missing_ok=True)
     result.notes.append(
         "A cell is the median of the sheets of its kind, its bar the median distance of the shell's two meshes (2 and "
         "4 rows): an error below its bar is not told apart from it. Times are processor times of one trace, on a "

@@ -155,7 +155,9 @@ KINDS: dict[str, Callable[[Random], Sample]] = {
     "closed ring": _ring,
     "network": _network,
 }
-UNMEASURED = {"pressed": "sheets between plates have no random scenes yet"}
+UNMEASURED = {
+    "pressed": "rigid bodies that press are not in the shell, so it cannot judge; bh verify contact does"
+}
 
 
 def on(item: Sample, mesh: meshes.SheetMesh, formulation: str) -> Model:

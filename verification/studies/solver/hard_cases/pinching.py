@@ -215,8 +215,8 @@ def fan(result: CaseResult) -> None:
             path=folded,
         )
     for share in (0.5, 0.7, 0.9):
-        path = trace(it.pinched(folded[-1], share))
-        fine = trace(it.pinched(folded[-1], share), strategy=FINE)
+        path = trace(it.pinched(folded[-1], share), neighbours=False)
+        fine = trace(it.pinched(folded[-1], share), strategy=FINE, neighbours=False)
         buckled = share > 0.8  # then there are many states with nearly the same energy
         how = "that of finer increments; 2 % is another branch" if buckled else "four times finer increments"
         result.check(
