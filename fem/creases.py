@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -72,6 +73,11 @@ class Connectors:
         """Number of creased edges, c."""
         return len(self.edges)
 
+    @cached_property
+    def _straight(self) -> Array:
+        """(c, r, r) stiffness of creases that are straight lines, N mm / rad^2."""
+        return self.stiffness[:, None, None] * self.mass
+
     def energy(self, beta: Array, lam: float) -> Array:
         """(c,) energies of springs, with what yielding has dissipated, N mm.
 
@@ -100,7 +106,7 @@ class Connectors:
             lam: load parameter of the step, 0 to 1.
         """
         turn = beta - self.rest.at(lam)
-        out: Array = self.stiffness[:, None] * np.einsum("cij,cj->ci", self.mass, turn)
+        out: Array = np.einsum("cij,cj->ci", self._straight, turn)
         return out if self.laws is None else out + self.laws.held(turn).gradient
 
     def tangents(self, beta: Array, lam: float) -> Array:
@@ -110,7 +116,7 @@ class Connectors:
             beta: (c, r) turns of the connectors, rad.
             lam: load parameter of the step, 0 to 1.
         """
-        out: Array = self.stiffness[:, None, None] * self.mass
+        out = self._straight
         return out if self.laws is None else out + self.laws.held(beta - self.rest.at(lam)).tangent
 
     def gradient(self, beta: Array, lam: float) -> Array:

@@ -292,7 +292,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
         scatter(K, self.components.sides, pattern.slots, data)
         if met is not None:
             self.add_blocks(*met, pattern, data)
-        if len(self.creases):
+        if len(self._springs.places):
             tangents = self.creases.tangents(self.components.beta(here.components), here.lam)
             np.add.at(data, self._springs.places, tangents[tuple(self._springs.which)])
         self.tethers.stiffen(here.lam, data, pattern)

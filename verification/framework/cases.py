@@ -72,7 +72,7 @@ STUDIES = (
     Study("eigenvalues", "solver"),
     Study("loads", "solver"),
     Study("actuated", "solver", seconds=8),
-    Study("bifurcations", "solver", seconds=60),
+    Study("bifurcations", "solver", seconds=150),
     Study("published", "solver", seconds=250),
     Study("cones", "solver", long=True),
     Study("peers", "solver", seconds=15),
