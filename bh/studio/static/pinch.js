@@ -1,7 +1,7 @@
 // Jaws on two points of the folded sheet: chosen by two clicks or a stroke, closed by dragging either of them.
 import * as THREE from "./vendor/three.module.min.js";
 import { $, ask, now, number, tell } from "./common.js";
-import { camera, redraw, renderer, scene, seen, vector, whenDrawn } from "./view.js";
+import { camera, redraw, renderer, scene, seen, vector, beforeDrawn } from "./view.js";
 
 const NEAR = 16; // pixels in which a jaw is taken
 const ink = new THREE.MeshBasicMaterial({ color: 0xb06000, depthTest: false, transparent: true, opacity: 0.9 });
@@ -70,7 +70,7 @@ $("gap").oninput = ({ target }) => ask({ do: "pinch", a: Number(target.dataset.a
 for (const id of ["hand-pull", "hand-pinch"]) $(id).onchange = forget;
 addEventListener("keydown", (event) => { if (event.key === "Escape") forget(); });
 
-whenDrawn(() => {
+beforeDrawn(() => {
   const pinch = now.head?.pinches?.at(-1), ends = first !== null ? [vector(now.points, first)] : pinch ? [at(pinch, -1), at(pinch, 1)] : [];
   jaws.forEach((jaw, side) => {
     jaw.visible = side < ends.length;

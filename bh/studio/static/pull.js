@@ -1,7 +1,7 @@
 // A hand on the folded sheet: a point is taken and pulled, its force stands beside the pointer; two are pinched.
 import * as THREE from "./vendor/three.module.min.js";
 import { $, ask, now, number } from "./common.js";
-import { camera, controls, renderer, scene, surface, vector, whenDrawn } from "./view.js";
+import { camera, controls, renderer, scene, surface, vector, beforeDrawn } from "./view.js";
 import * as pinch from "./pinch.js";
 
 const ray = new THREE.Raycaster(), plane = new THREE.Plane(), spot = new THREE.Vector3();
@@ -78,7 +78,7 @@ $("lift").oninput = ({ target }) => {
   ask({ do: "pull", node: Number(which), to: [x, y, z + Number(target.value)] });
 };
 
-whenDrawn(() => {
+beforeDrawn(() => {
   const { head, points } = now, held = head && Object.keys(head.forces).at(-1);
   const squeezed = held && head.pinches.find((each) => [String(each.a), String(each.b)].includes(held));
   $("force").hidden = !held; string.visible = Boolean(held) && !squeezed;

@@ -18,14 +18,20 @@ lines.frustumCulled = false;
 scene.add(surface, lines);
 
 let dirty = true, pairs = [], laid = null, lit = "";
-const after = []; // what is to be done when a picture was drawn
+const before = [], after = []; // what is to be done before a picture is drawn, and when it was
 export const redraw = () => { dirty = true; };
+export const beforeDrawn = (done) => before.push(done);
 export const whenDrawn = (done) => after.push(done);
 export function draw() {
   requestAnimationFrame(draw);
   if (dirty) picture();
 }
-export function picture() { dirty = false; renderer.render(scene, camera); for (const done of after) done(); }
+export function picture() {
+  dirty = false; camera.updateMatrixWorld();
+  for (const done of before) done();
+  renderer.render(scene, camera);
+  for (const done of after) done();
+}
 
 function resize() {
   const box = $("stage");
