@@ -36,6 +36,17 @@ class CreaseMemory:
         if self.creases.laws is not None:
             self.creases.laws.history = history
 
+    def takes(self, history: Array) -> bool:
+        """Can it go on from a history that was read from a file?
+
+        Args:
+            history: of any shape.
+
+        Returns:
+            whether it is one of this system.
+        """
+        return history.shape == self.history.shape
+
     def history_at(self, q: Array, lam: float) -> Array:
         """(m p, 2) what creases remember where this state is accepted.
 
