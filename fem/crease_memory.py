@@ -37,10 +37,13 @@ class CreaseMemory:
             self.creases.laws.history = history
 
     def takes(self, history: Array) -> bool:
-        """Can a history (k, 2) from a file be one of this system?
+        """Can it go on from a history that was read from a file?
 
         Args:
-            history: that is asked about.
+            history: of any shape.
+
+        Returns:
+            whether it is one of this system.
         """
         return history.shape == self.history.shape
 
