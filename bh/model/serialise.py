@@ -44,8 +44,8 @@ ACTUATIONS: dict[str, type[Actuation]] = {
     "pressure": Pressure,
     "line_force": LineForce,
     "area_force": AreaForce,
-    "couple": Couple,
     "edge_moment": EdgeMoment,
+    "couple": Couple,
     "expand": Expand,
 }
 CURVES: dict[str, type[Curve]] = {"line": Line, "arc": Arc, "arc-chain": ArcChain, "polyline": Polyline}

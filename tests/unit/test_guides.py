@@ -66,7 +66,7 @@ TRIALS: dict[str, Callable[[str], bh.Model]] = {
         .crease("crease", stiffness=0.3, law=bh.Softening(peak=1.0))
         .moment("crease", to=0.01)
     ),
-    "panels that stop each other (`contact`), bars that press": lambda how: bh.Model(
+    "panels that stop each other (`contact`)": lambda how: bh.Model(
         MESH, SHEET, formulation=how, contact="thickness"
     ).fold("crease", by=0.05),
 }

@@ -242,6 +242,7 @@ def _plots(result: CaseResult, rows: Sequence[Row]) -> None:
             "points",
         )
         for kind in LEVELS
+        if any(row.kind == kind for row in rows)
     ]
     ends = [min(allowed), max(allowed)]
     series.append(line("as much as both allow", ends, ends, "reference"))
