@@ -85,14 +85,26 @@ class StoppedShell:
         return self.barrier.free_part(self.nodes_at(q, lam), self.nodes_at(q + dq, lam))
 
     def approach(self, q: Array, dq: Array, lam: float, since: float | None = None) -> float:
-        """How much of a step dq (size,) from q leads to where panels begin to press on each other, 0 to 1."""
+        """How much of a step leads to where panels begin to press on each other, 0 to 1.
+
+        Args:
+            q: (size,) unknowns.
+            dq: (size,) step.
+            lam: load parameter of the step, 0 to 1.
+            since: not needed here, where nothing moves but the sheet.
+        """
         del since
         if self.barrier is None:
             return 1.0
         return self.barrier.approach(self.nodes_at(q, lam), self.nodes_at(q + dq, lam))
 
     def pressing(self, q: Array, lam: float) -> bool:
-        """Do panels press on each other at q (size,)?"""
+        """Do panels press on each other?
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
         return self.barrier is not None and self.barrier.presses(self.nodes_at(q, lam))
 
     @property
@@ -155,7 +167,14 @@ class StoppedShell:
         return self.barrier.meetings(x) or "layers nearer than contact allows"
 
     def passed(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Whether panels would pass through each other on the way between two states."""
+        """Whether panels would pass through each other on the way between two states, in words; empty if not.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+            q_new: (size,) unknowns behind it.
+            lam_new: load parameter there.
+        """
         if self.barrier is None:
             return ""
         if not self.barrier.passed(self.nodes_at(q, lam), self.nodes_at(q_new, lam_new)):
