@@ -20,7 +20,7 @@ from bh.paths.path import Path
 from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context
 from verification.framework.random_scenes import part_of, played
-from verification.studies.solver.contact_layers import layers
+from verification.studies.solver.contact_layers import crushing, layers
 from verification.studies.solver.contact_scenes import SEED, Row, play
 from verification.studies.solver.contact_strips import met
 from verification.theory.wrapped import wrapped_by
@@ -196,6 +196,8 @@ def run(context: Context) -> CaseResult:
     met(result, context.quick)
     orders(result)
     layers(result)
+    if not context.quick:
+        crushing(result)
     numbers = part_of(PART, QUICK if context.quick else SCENES, SCENES)
     known = played(context, CASE, RUNS, numbers, SCENES, play)
     meeting(result, [Row(**{**row, "told": tuple(row["told"])}) for row in known])

@@ -1,4 +1,4 @@
-"""Layers of case `contact`: a block of sheets, pleats between plates, a carton and a map that open."""
+"""Layers of case `contact`: a block, pleats between plates, a crushed corrugation, a carton and a map that open."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ import meshes
 from bh.analysis.contact import first_contact
 from bh.paths.path import Path
 from bh.scene.load import load_scene
+from bh.solvers.automatic import Automatic
+from bh.solvers.load_control import LoadControl
+from bh.solvers.walk import Strategy
 from verification.framework.checks import CaseResult
 
 EXAMPLES = FilePath(__file__).resolve().parents[3] / "examples"
@@ -21,6 +24,10 @@ TOLERANCE = 0.01
 OPENED, PANELS = ("pressed_pleats", "carton", "map"), 4  # examples, and panels of the first
 CORNERS, ACROSS = [0, 80, 8, 72], 60.0 * math.sqrt(2.0)  # of the map, and its diagonal, mm
 WITHIN = 0.02  # of the diagonal: its creases are turned and its panels stand in wedges at first
+CRUSHED, TRAVEL, FINER = "crushed_corrugation", 6.7, 0.005  # example, mm, largest increment beside some 0.02
+CLOSE = 0.02  # loads and work of increments a quarter as long
+QUARTER = "increments a quarter as long"
+SHORT: Strategy = Automatic(LoadControl(first=FINER, largest=FINER))
 STACK = "a stack is as high as its sheets are thick"
 
 
@@ -106,3 +113,41 @@ def _stack(result: CaseResult, quantity: str, path: Path, sheets: int) -> None:
         params={"t": t},
         path=path,
     )
+
+
+def crushing(result: CaseResult) -> None:
+    """Crush load of a corrugation between plates, and what the plate has done, beside finer increments.
+
+    Args:
+        result: to which checks are added.
+    """
+    model = load_scene(EXAMPLES / f"{CRUSHED}.toml").model
+    path = bh.trace(model, warn=False, estimate=False, neighbours=False)
+    fine = _crush(bh.trace(model, strategy=SHORT, warn=False, estimate=False, neighbours=False))
+    found = _crush(path)
+    for quantity, unit, value, reference, source in (
+        ("load that crushes a corrugation", "N", found[0], fine[0], QUARTER),
+        ("energy of a crushed corrugation", "N mm", found[1], fine[1], QUARTER),
+        ("work of the plate that crushes it", "N mm", found[2], found[1], "what the sheet has gained"),
+    ):
+        result.check(
+            quantity,
+            value,
+            unit=unit,
+            reference=reference,
+            source=source,
+            tolerance=CLOSE,
+            params={"travel": TRAVEL},
+            path=path,
+        )
+
+
+def _crush(path: Path) -> tuple[float, float, float]:
+    """Load at the end, N, what the sheet has gained, and the work of the plate, N mm; nan where it does not arrive."""
+    if not path.reached:
+        return math.nan, math.nan, math.nan
+    states = [state for state in path if state.step == 1]
+    load = np.array([0.0, *(-state.contact_forces["upper"][2] for state in states)])
+    folded = next(state for state in reversed(list(path)) if state.step == 0).energy
+    work = TRAVEL * float(np.trapezoid(load, [0.0, *(state.lam for state in states)]))
+    return float(load[-1]), states[-1].energy.total - folded.total, work
