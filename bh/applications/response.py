@@ -271,10 +271,16 @@ def lines(found: Response) -> list[str]:
         for row in (heads, *rows)
     ]
     peaks = [
-        f"{peak.kind} of {peak.force:.5g} N (within {peak.within:.2g}) at {peak.displacement:.5g} mm"
+        f"{peak.kind} of {peak.force:.5g} N{_bounds(peak)} at {peak.displacement:.5g} mm"
         for peak in found.peaks
     ]
     return [*table, *(peaks or ["no peak"]), *found.critical]
+
+
+def _bounds(peak: Peak) -> str:
+    """How well a peak is known, where the points leave that open to a digit that is printed."""
+    known = peak.within <= 1e-6 * abs(peak.force)
+    return "" if known else f" (within {peak.within:.2g} N; more points make it smaller)"
 
 
 def picture(found: Response) -> Figure:

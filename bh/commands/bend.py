@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -55,11 +56,10 @@ def bend(  # noqa: PLR0913 - the options of a command line
 ) -> None:
     """Bend a folded corrugation over supports; show its stiffness."""
     from bh.applications.corrugation import Rig, report
-    from meshes.quantities import spoken
 
     check_picture(picture)
     rig = Rig(span=span, bar=width, travel=travel, tape=tape)
-    angles = [spoken(text, "angle") for text in azimuth or ("0", "90deg")]
+    angles = [_azimuth(text) for text in azimuth or ("0", "90deg")]
     sheet = _sheet(source, depth, changes or ())
     found = report.tests(sheet, 6.0 if depth is None else depth, angles, rig)
     hand_out(
@@ -74,6 +74,17 @@ def bend(  # noqa: PLR0913 - the options of a command line
     if early:
         say(f"bh: {source}: the test ended early: {early[0].outcome} ({early[0].reason})", err=True)
         raise typer.Exit(1)
+
+
+def _azimuth(text: str) -> float:
+    """Of the bar, rad; 90 without a unit is 14 turns and never meant."""
+    from bh.errors import InputError
+    from meshes.quantities import degrees_meant, spoken
+
+    angle = spoken(text, "angle")
+    if abs(angle) > 2.0 * math.pi:
+        raise InputError(f"--azimuth {text} is more than a turn{degrees_meant(angle)}")
+    return angle
 
 
 def _sheet(source: str, depth: float | None, changes: Sequence[str]) -> str | Model:
@@ -93,6 +104,7 @@ def _sheet(source: str, depth: float | None, changes: Sequence[str]) -> str | Mo
     scene = load_scene(Path(source), changes)
     if scene.accuracy is not None:
         raise InputError(
-            f"{source}: bars press on one mesh; give it a [mesh], such as --set mesh.along=32 --set mesh.rows=2"
+            f"{source}: bars press on one mesh; give it a [mesh], such as --set mesh.along=32 --set mesh.rows=2, "
+            "and no accuracy"
         )
     return scene.model

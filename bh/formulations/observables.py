@@ -64,7 +64,8 @@ def depth_of(state: State) -> tuple[float, Array]:
         a, b = found.x[:2]
         if max(abs(a), abs(b)) > 0.999:
             raise ModelError(
-                "the creases leave the direction of the depth open; use at least two of either kind"
+                "the creases leave the direction of the depth open; use at least two of either kind, "
+                "and fold less than to where the sheet is as deep as wide"
             )
         up = np.array([-a, -b, 1.0]) @ frame
         up /= np.linalg.norm(up)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+
+import numpy as np
 
 from bh.errors import ModelError
 from bh.model.actuations import Displace
@@ -39,12 +40,23 @@ def legs(
     found: list[Step] = []
     before: tuple[float, ...] = (0.0, 0.0, 0.0)
     for number, corner in enumerate(along):
-        here = tuple(float(part) for part in corner)
-        if len(here) != 3 or not all(math.isfinite(part) for part in here):
-            raise ModelError(f"{what}: along[{number}] is no point [x, y, z] in mm")
+        here = _point(corner)
+        if here is None:
+            raise ModelError(
+                f"{what}: along[{number}] = {corner!r} is no point [x, y, z] in mm; give a list of such corners"
+            )
         if here == before:
             raise ModelError(f"{what}: along[{number}] is where the move is already; leave it out")
         asked = [Displace(at, axis, further=b - a) for axis, a, b in zip("xyz", before, here, strict=True)]
         found.append(Step(tuple(asked), None, *((support, release) if number == 0 else ((), ()))))
         before = here
     return tuple(found)
+
+
+def _point(corner: object) -> tuple[float, ...] | None:
+    """The three finite numbers of a corner, or None where it has others or is none at all."""
+    try:
+        found = np.asarray(corner, dtype=float)
+    except (TypeError, ValueError):
+        return None
+    return tuple(found.tolist()) if found.shape == (3,) and np.isfinite(found).all() else None

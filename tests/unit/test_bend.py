@@ -75,7 +75,16 @@ def test_names_are_folded_to_a_depth(monkeypatch: pytest.MonkeyPatch) -> None:
         (["straight.toml", "--tape=-1"], "tape = -1.0 cannot be"),
         (["straight.toml", "--picture", "b.gif"], "picture 'b.gif' is no .png, .svg or .pdf file"),
         (["straight.toml", "--set", "pattern.fold=mountain"], "this sheet has no valley"),
-        (["straight.toml", "--set", "accuracy=0.05"], "bars press on one mesh"),
+        (
+            ["straight.toml", "--azimuth", "90"],
+            '--azimuth 90 is more than a turn; angles are radians, not degrees: write "90deg"',
+        ),
+        (["straight.toml", "--set", "accuracy=0.05"], "bars press on one mesh; give it a [mesh]"),
+        (["straight.toml", "--set", "accuracy=0.05"], "and no accuracy"),
+        (
+            ["straight.toml", "--set", "steps[0].until.depth=30"],
+            "fold less than to where the sheet is as deep as wide",
+        ),
     ],
 )
 def test_what_cannot_be_is_one_line(

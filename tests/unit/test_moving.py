@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -104,11 +105,13 @@ def test_what_cannot_be_is_one_line(old: str, new: str, told: str) -> None:
     ("along", "told"),
     [
         ([], "along 0 corners cannot be"),
-        ([(0.0, 0.0, float("nan"))], "along[0] is no point"),
+        ([(0.0, 0.0, float("nan"))], "along[0] = (0.0, 0.0, nan) is no point"),
         ([(0.0, 1.0, 0.0), (0.0, 1.0, 0.0)], "along[1] is where the move is already"),
+        ((0.0, 0.0, 5.0), "along[0] = 0.0 is no point [x, y, z] in mm; give a list of such corners"),
+        ("up", "along[0] = 'u' is no point"),
     ],
 )
-def test_what_cannot_be_in_python(along: list[tuple[float, ...]], told: str) -> None:
+def test_what_cannot_be_in_python(along: Sequence[Sequence[float]], told: str) -> None:
     with pytest.raises(bh.ModelError) as error:
         bh.Model(STRIP, SHEET).move("edge:end", along)
     assert told in str(error.value)

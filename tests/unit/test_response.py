@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import meshes
 from bh import Displace, Model, ModelError, Sheet, Until
-from bh.applications.response import lines, picture, response
+from bh.applications.response import Peak, lines, picture, response
 from bh.commands.cli import main
 
 STRIP = meshes.structured(meshes.strip(60.0, 10.0, [5.0]), along=6)
@@ -81,7 +82,9 @@ def test_of_an_arch_that_snaps() -> None:
     np.testing.assert_allclose(slopes[behind[:-1]], means[behind[:-1]], rtol=1e-3)
     told = lines(found)
     assert " ".join(told[0].split()) == "u / mm force / N stiffness / N/mm energy / N mm stable under force"
-    assert any(line.startswith("minimum of -0.") for line in told)
+    assert f"minimum of {peak.force:.5g} N at {peak.displacement:.5g} mm" in told
+    loose = lines(replace(found, peaks=(Peak("maximum", 1.5, 2.0, 0.0125),)))
+    assert "maximum of 2 N (within 0.013 N; more points make it smaller) at 1.5 mm" in loose
     assert len(picture(found).axes[0].lines) > len(found.points)
 
 
