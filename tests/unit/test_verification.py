@@ -71,6 +71,7 @@ SLOW = {
     "fig5_11",
     "pinch_shell",
     "three_point",
+    "corrugation_stiffness",
     "appendix_b_shell",  # test_shell_convergence.py has the same figures
     "shell_benchmarks",  # the same
     "appendix_b_cross",

@@ -92,6 +92,7 @@ STUDIES = (
     Study("bottom_up", "4", seconds=1),
     Study("three_point", "4", seconds=550),
     Study("bending_fit", "4", long=True),
+    Study("corrugation_stiffness", "4", long=True),
     Study("forward", "6"),
     Study("problem_a", "6", seconds=60),
     Study("problem_b", "6"),
