@@ -8,14 +8,20 @@ from __future__ import annotations
 
 import io
 import sys
+import tempfile
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from bh.commands.run import solve  # noqa: E402 - found beside this file
+from bh.scene.load import load_scene  # noqa: E402
 from bh.studio.opening import Opened  # noqa: E402 - found beside this file
 from tests.unit.browsers import opened  # noqa: E402
 
@@ -23,6 +29,7 @@ DRAWING = ROOT / "examples" / "wave.svg"
 TARGET = ROOT / "docs" / "images" / "studio.gif"
 SIZE = {"width": 1180, "height": 700}
 WIDE, COLOURS, MS = 800, 160, 140
+ROUNDED = 1e-4  # mm; the window's positions are of single precision
 DRESS = """() => {
   const put = (id, style) => {
     const item = document.createElement("div");
@@ -56,7 +63,8 @@ class Film:
 
     def __init__(self, page: Any) -> None:
         """Nothing was taken yet."""
-        self.page, self.pictures = page, []
+        self.page = page
+        self.pictures: list[bytes] = []
 
     def say(self, text: str, times: int = 0) -> None:
         """A line below, held for some pictures."""
@@ -171,10 +179,34 @@ def play(film: Film) -> None:
         ("scene", "6  ... and the scene: bh run repeats it to the digit"),
     ):
         film.say(text)
-        with page.expect_download():
+        with page.expect_download() as waiting:
             page.locator("#export").select_option(what)
         page.locator("#message", has_text="is saved").wait_for()
         film.take(8)
+    repeated(Path(waiting.value.path()), page.evaluate("Array.from(studio.points)"))
+
+
+def repeated(file: Path, points: list[float]) -> None:
+    """Run the saved scene and say how far it ends from what is in the film.
+
+    Args:
+        file: .zip of the scene.
+        points: (3 n,) of the window, mm, in single precision.
+
+    Raises:
+        SystemExit: it ends elsewhere than the film says.
+    """
+    with tempfile.TemporaryDirectory() as place, zipfile.ZipFile(file) as archive:
+        archive.extractall(place)
+        scene = load_scene(next(Path(place).glob("*.toml")))
+        out = Path(place) / f"{scene.name}-out"
+        path = solve(scene, out, resume=out.is_dir(), estimate=False).path
+    off = float(np.abs(path[-1].points.ravel() - np.array(points)).max())
+    print(
+        f"bh run ends as {path.outcome}, {path[-1].energy.total:.6g} N mm, at most {off:.2g} mm from the film"
+    )
+    if not path.reached or off > ROUNDED:
+        raise SystemExit("the film's last caption is wrong; the film is not written")
 
 
 def main() -> None:

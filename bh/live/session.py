@@ -26,7 +26,7 @@ from bh.model.model import Model
 from bh.model.step import Actuation, Step
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.load_control import LoadControl
-from bh.solvers.points import point
+from bh.solvers.points import Point, point
 from meshes import SheetMesh
 from meshes.mesh import count
 
@@ -86,6 +86,7 @@ class Session:
         self._undone: list[Controls] = []
         self._iterations = 0
         self._stable: bool | None = True
+        self._left = False
         self._under = self._begin(Way(self._wanted, self._wanted), None)
 
     # ------------------------------------------------------------------------------- what a hand does
@@ -99,6 +100,16 @@ class Session:
     def size(self) -> int:
         """Number of unknowns."""
         return self._under.system.size
+
+    @property
+    def left(self) -> bool:
+        """Whether it has snapped since it was flat: a run from flat may end on another branch."""
+        return self._left
+
+    @property
+    def newest(self) -> Point:
+        """The newest state in the solver's terms."""
+        return self._under.march.here
 
     @property
     def wanted(self) -> Controls:
@@ -235,6 +246,7 @@ class Session:
                 snapped = snapped or march.snapped
                 going = time.perf_counter() - began < budget
             snapped = snapped or march.snapped
+            self._left = self._left or snapped
             march.snapped = False
             frame = self._frame(snapped, time.perf_counter() - began)
         if frame.at_rest and (not self._past or self._past[-1] != self._wanted):
@@ -267,7 +279,7 @@ class Session:
         """The model whose steps lead straight to what is wanted: one that folds, one that pulls.
 
         Returns:
-            a model for `bh.trace`; where the sheet has snapped on its way here it may end on another branch.
+            a model for `bh.trace`; where the sheet has `left` its branch on its way here, it may end on another one.
         """
         laws = self.model.creases
         folds = tuple(fold_of(name, angle, laws.get(name)) for name, angle in self._wanted.folds.items())

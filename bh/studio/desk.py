@@ -18,7 +18,7 @@ from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
 from bh.solving.trace import trace
 from bh.studio.colours import offered, top_of
-from bh.studio.exports import export, film
+from bh.studio.exports import export, film, moving
 from bh.studio.finer import Finer, finer
 from bh.studio.frames import Json, creases_of, described, head_of, line, packed, surface
 from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
@@ -100,10 +100,10 @@ class Desk:
                 self._paint(by)
             case asked.Export(what=what):
                 name, data = export(what, self.sheet, self.session, self.session.rest(20.0))
-                return [{"kind": "file", "name": name, "data": base64.b64encode(data).decode()}]
-            case asked.Film(pictures=pictures, ms=ms):
-                name, data = f"{Path(self.sheet.name).stem or 'sheet'}.gif", film(pictures, ms)
-                return [{"kind": "file", "name": name, "data": base64.b64encode(data).decode()}]
+                return [_file(name, data), *self._behind_a_snap(what, name)]
+            case asked.Film(pictures=pictures, ms=ms, kind=kind):
+                name = f"{Path(self.sheet.name).stem or 'sheet'}.{kind}"
+                return [_file(name, film(pictures, ms) if kind == "gif" else moving(pictures, ms))]
         return []
 
     def _laid(self, message: asked.Asked) -> bool:
@@ -132,6 +132,18 @@ class Desk:
         elif not (self.session.undo() if what == "undo" else self.session.redo()):
             return [line(f"there is nothing to {what}")]
         return []
+
+    def _behind_a_snap(self, what: str, name: str) -> list[Json]:
+        """What to know of a scene whose state a run from flat may miss."""
+        if what not in ("scene", "python") or not self.session.left:
+            return []
+        stem = Path(name).stem
+        how = (
+            f"`bh run {stem}.toml --resume` begins in the state that is saved with it"
+            if what == "scene"
+            else "the lines begin flat and may end elsewhere; the scene has the state"
+        )
+        return [line(f"{name} is saved; it was reached by way of a snap: {how}")]
 
     def _paint(self, by: str) -> None:
         if by != "none" and by not in self._colours:
@@ -224,7 +236,7 @@ class Desk:
         frame = self.frame
         chosen = self._colours.get(self._colour)
         values = np.zeros(len(frame.points)) if chosen is None else chosen.values(frame.state)
-        head = {**head_of(frame), "snapped": self._snapped, "top": top_of(values)}
+        head = {**head_of(frame), "snapped": self._snapped, "left": self.session.left, "top": top_of(values)}
         self._snapped = False
         return packed(head, frame.points, values)
 
@@ -283,3 +295,7 @@ class Desk:
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name."""
         return described(self.sheet, self.session, self.material, self._colours, self._colour)
+
+
+def _file(name: str, data: bytes) -> Json:
+    return {"kind": "file", "name": name, "data": base64.b64encode(data).decode()}

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import base64
+import importlib
 import io
 import json
 import tempfile
 import zipfile
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bh.errors import InputError
 from bh.live import Frame, Session
-from bh.model.actuations import Pull
-from bh.model.supports import Support
 from bh.paths.export import FLAT, FOLDED, write_flat, write_state
+from bh.studio.scenes import scene_files
 from bh.studio.sheets import LiveSheet, quoted
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 MOST_PIXELS = 1_000_000  # of a picture of a film
 FORMATS = (
@@ -40,20 +43,21 @@ def export(what: str, sheet: LiveSheet, session: Session, frame: Frame) -> tuple
         frame: the newest state.
 
     Returns:
-        the name that the file should have, and its bytes. A scene of a drawing comes with it, as .zip.
+        the name that the file should have, and its bytes. A scene of a drawing comes with it, as .zip; one that was
+        reached by way of a snap with the state, too.
 
     Raises:
         InputError: there is no such format, or the sheet has no scene.
     """
     stem = Path(sheet.name).stem or "sheet"
     if what == "scene":
-        text = scene_text(sheet, session)
-        if sheet.drawing is None:
-            return f"{stem}.toml", text.encode()
+        files = scene_files(stem, sheet, session)
+        if len(files) == 1:
+            return f"{stem}.toml", files[f"{stem}.toml"]
         packed = io.BytesIO()
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr(f"{stem}.toml", text)
-            archive.writestr(*sheet.drawing)
+            for name, data in files.items():
+                archive.writestr(name, data)
         return f"{stem}.zip", packed.getvalue()
     if what == "python":
         return f"{stem}.py", python_text(sheet, session).encode()
@@ -81,6 +85,41 @@ def film(pictures: Sequence[str], ms: int) -> bytes:
     Raises:
         InputError: one is no picture, too large, or of another size.
     """
+    frames = [picture.quantize(128) for picture in _decoded(pictures)]
+    out = io.BytesIO()
+    frames[0].save(out, "GIF", save_all=True, append_images=frames[1:], duration=ms, loop=0)
+    return out.getvalue()
+
+
+def moving(pictures: Sequence[str], ms: int) -> bytes:
+    """An MP4 (H.264) of pictures, by the ffmpeg that comes with imageio-ffmpeg.
+
+    Args:
+        pictures: as of `film`.
+        ms: between two of them.
+
+    Raises:
+        InputError: as of `film`, or imageio-ffmpeg is not installed.
+    """
+    try:
+        ffmpeg = importlib.import_module("imageio_ffmpeg")
+    except ImportError as error:
+        raise InputError(
+            "an MP4 needs imageio-ffmpeg: `pip install imageio-ffmpeg`; or save the GIF"
+        ) from error
+    frames = _decoded(pictures)
+    with tempfile.TemporaryDirectory(prefix="bh-studio-") as place:
+        file = Path(place) / "film.mp4"
+        writer = ffmpeg.write_frames(str(file), frames[0].size, fps=1000.0 / ms)
+        writer.send(None)  # it starts there
+        for frame in frames:
+            writer.send(frame.tobytes())
+        writer.close()
+        return file.read_bytes()
+
+
+def _decoded(pictures: Sequence[str]) -> list[Image.Image]:
+    """Pictures in RGB, of one size."""
     from PIL import Image  # of matplotlib's own needs
 
     frames: list[Image.Image] = []
@@ -89,59 +128,10 @@ def film(pictures: Sequence[str], ms: int) -> bytes:
             found = Image.open(io.BytesIO(base64.b64decode(text, validate=True)), formats=("PNG", "JPEG"))
             if found.width * found.height > MOST_PIXELS or (frames and found.size != frames[0].size):
                 raise InputError(f"pictures of a film are of one size, at most {MOST_PIXELS:,} pixels")
-            frames.append(found.convert("RGB").quantize(128))
+            frames.append(found.convert("RGB"))
         except (ValueError, OSError, Image.DecompressionBombError) as error:
             raise InputError("a picture of the film cannot be read; record it anew") from error
-    out = io.BytesIO()
-    frames[0].save(out, "GIF", save_all=True, append_images=frames[1:], duration=ms, loop=0)
-    return out.getvalue()
-
-
-def scene_text(sheet: LiveSheet, session: Session) -> str:
-    """The scene that `bh run` repeats: the same mesh and supports, one step that folds and one that pulls.
-
-    Args:
-        sheet: what was opened.
-        session: its handling.
-
-    Raises:
-        InputError: the sheet was given as a model, which no scene describes.
-    """
-    if not sheet.tables:
-        raise InputError(
-            "this sheet was given as a model of Python, which no scene describes; take the Python lines"
-        )
-    model = session.scene()
-    lines = [f"# {sheet.name} as it stood in bh studio; run it by `bh run`. mm, N, rad.", ""]
-    lines += ["contact = false                  # as in the window, where panels pass through each other", ""]
-    lines += [sheet.tables]
-    values = {item.name: getattr(model.sheet, item.name) for item in fields(model.sheet)}
-    lines += ["[sheet]", *(f"{key} = {value!r}" for key, value in values.items() if value is not None), ""]
-    for support in model.supports:
-        assert isinstance(support, Support)
-        at = support.at if isinstance(support.at, str) else list(support.at)
-        fix = (
-            support.fix if isinstance(support.fix, str) else [list(map(float, axis)) for axis in support.fix]
-        )
-        lines += ["[[supports]]", f"at = {json.dumps(at)}", f"fix = {json.dumps(fix)}", ""]
-    for name, law in model.creases.items():
-        value = f"Lstar = {law.Lstar!r}" if law.Lstar is not None else f"stiffness = {law.stiffness!r}"
-        lines += [f"[creases.{quoted(name)}]", value, ""]
-    folds = []
-    for name, angle in session.wanted.folds.items():
-        law_of = model.creases.get(name)
-        spring = (
-            "" if law_of is None
-            else f", Lstar = {law_of.Lstar!r}" if law_of.Lstar is not None
-            else f", stiffness = {law_of.stiffness!r}"
-        )  # fmt: skip
-        folds.append(f"  {{ crease = {quoted(name)}, by = {angle!r}{spring} }},")
-    lines += ["[[steps]]", "fold = [", *folds, "]", ""]
-    pulls = [item for step in model.steps for item in step.actuations if isinstance(item, Pull)]
-    if pulls:
-        rows = [f"  {{ node = {p.node}, to = {list(p.to)}, stiffness = {p.stiffness!r} }}," for p in pulls]
-        lines += ["[[steps]]", "pull = [", *rows, "]", ""]
-    return "\n".join([*lines, "[outputs]", "pictures = true", ""])
+    return frames
 
 
 def python_text(sheet: LiveSheet, session: Session) -> str:
@@ -162,8 +152,12 @@ def python_text(sheet: LiveSheet, session: Session) -> str:
         f"session.pull({node}, {grip.to!r}, {grip.stiffness!r})\n"
         for node, grip in session.wanted.grips.items()
     )
+    said = (
+        " It was reached by way of a snap: these lines may end elsewhere; the scene has the state."
+        * session.left
+    )
     return (
-        f'"""{sheet.name} as it stood in bh studio."""\n\nimport bh\nfrom bh.live import Session\n\n{begin}'
+        f'"""{sheet.name} as it stood in bh studio.{said}"""\n\nimport bh\nfrom bh.live import Session\n\n{begin}'
         f"session = Session(model)\nfor crease, angle in {{{folds}}}.items():\n    session.fold(crease, angle)\n"
         f"{pulls}frame = session.rest()\nprint(frame.state, frame.fold_angles(), frame.forces)\n"
     )

@@ -55,11 +55,12 @@ class Spring(Message):
 
 
 class Film(Message):
-    """Pictures of the folded sheet, as JPEG or PNG, to a GIF."""
+    """Pictures of the folded sheet, as JPEG or PNG, to a GIF or an MP4."""
 
     do: Literal["film"]
     pictures: Annotated[list[Annotated[str, Field(max_length=400_000)]], Field(min_length=1, max_length=200)]
     ms: Annotated[int, Field(ge=20, le=1000)] = 80
+    kind: Literal["gif", "mp4"] = "gif"
 
 
 class Fold(Message):

@@ -8,6 +8,7 @@ import base64
 import io
 import json
 import struct
+import sys
 import tomllib
 import zipfile
 from collections.abc import Awaitable, Callable
@@ -21,12 +22,14 @@ import tornado.httpclient
 import tornado.websocket
 
 import bh
+from bh.commands.run import solve
 from bh.errors import InputError
 from bh.scene.load import load_scene
 from bh.studio import server
 from bh.studio.desk import Desk
-from bh.studio.exports import FORMATS, scene_text
+from bh.studio.exports import FORMATS
 from bh.studio.messages import read
+from bh.studio.scenes import scene_text
 from bh.studio.server import Studio
 from bh.studio.sheets import LIBRARY, LONGEST, of_file, of_library, of_model
 
@@ -87,6 +90,68 @@ def test_the_scene_that_comes_out_is_what_was_seen(name: str, tmp_path: Path) ->
     path = bh.trace(load_scene(file).model)
     assert path.reached
     np.testing.assert_allclose(path[-1].points, desk.frame.points, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_state_behind_a_snap_comes_out_with_the_state_itself(tmp_path: Path) -> None:
+    """A run from flat ends on another branch; the scene says so, and `bh run --resume` ends in what was seen."""
+    desk = Desk(of_library("arc"))
+    take(desk, do="percent", value=30.0)
+    settled(desk)
+    node = int(np.argmax(desk.frame.points[:, 0]))
+    far = desk.frame.points[node] + [-42.0, -28.0, -52.5]
+    for part in (0.2, 0.4, 0.6, 0.8, 1.0):
+        at = desk.frame.points[node] + part * (far - desk.frame.points[node])
+        take(desk, do="pull", node=node, to=at.tolist())
+        assert settled(desk)["rest"]
+    assert desk.session.left
+    answer, said = take(desk, do="export", what="scene")
+    assert "by way of a snap: `bh run arc.toml --resume`" in str(said["text"])
+    with zipfile.ZipFile(io.BytesIO(base64.b64decode(str(answer["data"])))) as archive:
+        assert archive.namelist() == ["arc.toml", "arc-out/path.bh"]
+        archive.extractall(tmp_path)
+    assert "by way of a snap" in (tmp_path / "arc.toml").read_text()
+    scene = load_scene(tmp_path / "arc.toml")
+    flat = bh.trace(scene.model, warn=False, neighbours=False)
+    assert np.abs(flat[-1].points - desk.frame.points).max() > 1.0
+    path = solve(scene, tmp_path / "arc-out", resume=True, estimate=False, neighbours=False).path
+    assert path.reached
+    assert len(path) > 3  # the second step was solved
+    np.testing.assert_allclose(path[-1].points, desk.frame.points, atol=1e-6)
+    assert path[-1].energy.total == pytest.approx(desk.frame.state.energy.total, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_pinched_wave_is_repeated_to_the_digit(tmp_path: Path) -> None:
+    """A net of springs, folded and squeezed to 55 % without a snap; by motion to rest its run ended 16 mm away."""
+    drawing = Path(__file__).resolve().parents[2] / "examples" / "wave.svg"
+    desk = Desk(of_file(drawing.name, drawing.read_bytes()))
+    for percent in range(6, 49, 6):
+        take(desk, do="percent", value=percent)
+        settled(desk)
+    right = desk.frame.points[:, 0] + 0.3 * desk.frame.points[:, 1]
+    a, b = int(np.argmin(right)), int(np.argmax(right))
+    take(desk, do="pinch", a=a, b=b)
+    settled(desk)
+    gap = desk.session.wanted.jaws[0].gap(desk.session.wanted.grips)
+    for k in range(1, 9):
+        take(desk, do="pinch", a=a, b=b, gap=gap * (1.0 - 0.45 * k / 8))
+        assert settled(desk)["rest"]
+    assert not desk.session.left
+    (answer,) = take(desk, do="export", what="scene")
+    with zipfile.ZipFile(io.BytesIO(base64.b64decode(str(answer["data"])))) as archive:
+        archive.extractall(tmp_path)
+    scene = load_scene(tmp_path / "wave.toml")
+    path = bh.trace(scene.model, strategy=scene.strategy, neighbours=False)
+    assert path.reached
+    np.testing.assert_allclose(path[-1].points, desk.frame.points, atol=1e-6)
+    assert path[-1].energy.total == pytest.approx(desk.frame.state.energy.total, rel=1e-8)
+
+
+def test_without_ffmpeg_an_mp4_says_what_to_install(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(InputError, match="pip install imageio-ffmpeg"):
+        take(desk, do="film", pictures=["aGVsbG8="], kind="mp4")
 
 
 def test_a_drawing_comes_out_with_its_scene(tmp_path: Path) -> None:

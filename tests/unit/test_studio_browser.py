@@ -232,6 +232,57 @@ def test_what_cannot_be_opened_is_said_in_the_window(window: Visit, tmp_path: Pa
     assert window.page.evaluate("studio.sheet.name") == "arc"
 
 
+def test_a_point_pulled_to_infinity_is_one_line_and_the_sheet_stays(window: Visit) -> None:
+    """Numbers beyond all sense are refused, or the sheet says that it cannot follow; then it folds on."""
+    page = window.page
+    page.locator("#percent").fill("20")
+    window.rests("Object.values(head.asked)[0] > 0.5")
+    before = window.points()
+    page.evaluate(
+        "import('./static/common.js').then((all) => all.ask({ do: 'pull', node: 0, to: [1e999, 0, 0] }))"
+    )
+    page.wait_for_function(
+        "!document.getElementById('message').hidden && /cannot be asked/.test(message.textContent)"
+    )
+    assert "\n" not in page.locator("#message").inner_text()
+    np.testing.assert_array_equal(window.points(), before)
+    page.evaluate(
+        "import('./static/common.js').then((all) => all.ask({ do: 'pull', node: 0, to: [1e9, 0, 1e9] }))"
+    )
+    page.wait_for_function(
+        "studio.head.grips[0] && (studio.head.rest || studio.head.note)", timeout=4 * PATIENCE
+    )
+    assert np.isfinite(window.points()).all()
+    page.locator("#let-go").click()
+    window.rests("Object.keys(head.forces).length === 0")
+    np.testing.assert_allclose(window.points(), before, atol=1e-3)
+    assert window.told == []
+
+
+def test_a_network_that_drops_is_one_line_and_the_last_state_stays(chromium: Any) -> None:
+    """The server goes; the sheet stays on the screen, one line says so, and a new server is found again."""
+    opened = Opened(of_library("strip"))
+    port = int(opened.address.split(":")[2].split("/")[0])
+    seen = Visit(chromium, opened.address)
+    seen.page.locator("#percent").fill("20")
+    seen.rests("Object.values(head.asked)[0] > 0.5")
+    before = seen.points()
+    opened.close()
+    line = seen.page.locator("#message", has_text="The connection to bh is gone")
+    line.wait_for()
+    assert "\n" not in line.inner_text()
+    seen.page.locator("#percent").fill("40")  # nobody hears it
+    np.testing.assert_array_equal(seen.points(), before)
+    assert seen.page.locator("#badge").inner_text() == "not connected"
+    again = Opened(of_library("strip"), port)
+    again._studio.token = opened._studio.token  # so that the page finds it
+    seen.rests("Object.values(head.asked)[0] > 0.5")
+    np.testing.assert_allclose(seen.points(), before, atol=1e-3)
+    assert "is back" in seen.page.locator("#message").inner_text()
+    again.close()
+    seen.context.close()
+
+
 def test_a_crease_lights_up_and_a_dot_holds(window: Visit) -> None:
     page = window.page
     page.locator("#flat g[data-crease]").first.focus()

@@ -21,12 +21,29 @@ export function connect(answer, frame) {
   const query = new URLSearchParams(location.search);
   socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(query.get("token") ?? "")}`);
   socket.binaryType = "arraybuffer";
-  socket.onopen = () => { wait = 500; asked = 0; tell(""); };
+  socket.onopen = () => { wait = 500; asked = 0; tell(""); again(); };
   socket.onmessage = ({ data }) => (typeof data === "string" ? answer(JSON.parse(data)) : frame(data));
   socket.onclose = () => {
+    if (now.head) lost = now.head;
+    $("badge").textContent = "not connected"; $("badge").classList.add("away-from");
     tell("The connection to bh is gone; what you see is the last state. It is tried again.", true);
     setTimeout(() => connect(answer, frame), wait); wait = Math.min(2 * wait, 8000);
   };
+}
+// A server that comes back knows nothing of the sheet: it is laid again, and asked for what it was asked for last.
+let lost = null, laid = []; // the last frame before, and the messages that made the sheet
+function again() {
+  if (!lost) return;
+  const { asked: folds, grips } = lost, sheet = laid;
+  lost = null; laid = [];
+  for (const message of sheet) ask(message);
+  for (const [crease, angle] of Object.entries(folds)) ask({ do: "fold", crease, angle });
+  for (const [node, to] of Object.entries(grips)) ask({ do: "pull", node: Number(node), to });
+  tell("The connection to bh is back, and the sheet is folded again as it was asked for.");
+}
+function remembered(message) {
+  if (message.do === "open" || message.do === "pattern") laid = laid.filter((each) => each.do === "material");
+  if (["open", "pattern", "material", "spring", "hold"].includes(message.do)) laid.push(message);
 }
 const before = []; // what is to be done before anything is asked
 export const whenAsked = (done) => before.push(done);
@@ -34,7 +51,7 @@ export let asked = 0; // messages of this connection; what was computed before t
 export function ask(message) {
   for (const done of before) done(message);
   if (socket?.readyState !== WebSocket.OPEN) return;
-  asked += 1; socket.send(JSON.stringify(message));
+  remembered(message); asked += 1; socket.send(JSON.stringify(message));
 }
 
 let quiet = 0;

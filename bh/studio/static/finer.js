@@ -37,6 +37,7 @@ export function finer(head, floats) {
 export function badge() {
   const { head } = now, place = $("badge");
   place.textContent = said || (head.note ? `cannot go on: ${head.note}` : head.snapped ? "snapped" : head.rest ? "in equilibrium" : "on its way");
+  if (head.left && head.rest && !head.snapped) place.textContent += ", behind a snap";
   place.classList.toggle("away-from", !said && (Boolean(head.note) || head.snapped || !head.rest));
 }
 export const refined = () => shown;

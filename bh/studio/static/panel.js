@@ -13,10 +13,10 @@ function options(select, names, chosen, first = "") {
   for (const [value, text] of names) select.append(new Option(text, value, false, value === chosen));
 }
 
-const SAID = { scene: "scene, for bh run", python: "lines of Python", result: "numbers, JSON", picture: "picture, PNG", film: "film of the recording, GIF" };
+const SAID = { scene: "scene, for bh run", python: "lines of Python", result: "numbers, JSON", picture: "picture, PNG", film: "film of the recording, GIF", mp4: "film of the recording, MP4" };
 function saves(formats) {
   const select = $("export"), groups = { "What was done": [], "Folded sheet": [], "Flat pattern, to cut": [] };
-  for (const name of [...formats, "picture", "film"]) groups[name.startsWith("flat.") ? "Flat pattern, to cut" : name.startsWith("folded.") || name in { picture: 1, film: 1 } ? "Folded sheet" : "What was done"].push(name);
+  for (const name of [...formats, "picture", "film", "mp4"]) groups[name.startsWith("flat.") ? "Flat pattern, to cut" : name.startsWith("folded.") || name in { picture: 1, film: 1, mp4: 1 } ? "Folded sheet" : "What was done"].push(name);
   select.replaceChildren(new Option("choose", ""));
   for (const [label, names] of Object.entries(groups)) {
     const group = document.createElement("optgroup"); group.label = label;

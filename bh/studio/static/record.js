@@ -58,10 +58,10 @@ export async function savePicture() {
   const canvas = await new Promise((done) => { wanted = done; picture(); });
   save(`${now.sheet.name.replace(/\.\w+$/, "")}.png`, canvas.toDataURL("image/png").split(",")[1]);
 }
-export async function saveFilm() {
+export async function saveFilm(kind) {
   if (kept.length < 2) { tell("There is no recording yet: press Record, fold and pull, press Stop, then save the film."); return; }
   filming = [];
   await play();
   const pictures = filming; filming = null;
-  if (pictures.length) ask({ do: "film", pictures, ms: 80 });
+  if (pictures.length) ask({ do: "film", pictures, ms: 80, kind });
 }

@@ -49,7 +49,7 @@ $("flatten").onclick = () => ask({ do: "flatten" });
 $("let-go").onclick = letGo;
 $("check").onclick = () => { tell("It is solved anew from flat ..."); ask({ do: "check" }); };
 $("library").onchange = (e) => { if (e.target.value) ask({ do: "pattern", name: e.target.value }); };
-const OWN = { picture: savePicture, film: saveFilm };
+const OWN = { picture: savePicture, film: () => saveFilm("gif"), mp4: () => saveFilm("mp4") };
 $("export").onchange = (e) => { const what = e.target.value; e.target.value = ""; if (OWN[what]) OWN[what](); else if (what) { tell("It is written ..."); ask({ do: "export", what }); } };
 $("spring").onclick = () => ask({ do: "spring", crease: $("spring-of").value, Lstar: Number($("Lstar").value) || null });
 $("material").onchange = (e) => ask({ do: "material", name: e.target.value });
