@@ -79,7 +79,11 @@ def sweep(
         )
     if failed:
         kinds = ", ".join(f"{failed.count(kind):,} {kind}" for kind in dict.fromkeys(failed))
-        say(f"bh: {file}: {len(failed):,} points have no values ({kinds}); see 'reason' in {place}", err=True)
+        have = "1 point has" if len(failed) == 1 else f"{len(failed):,} points have"
+        reasons = zip(outcomes, data["reason"].values.ravel().tolist(), strict=True)
+        first = next((" ".join(why.split()) for end, why in reasons if end != Outcome.REACHED and why), "")
+        told = f"the first: {first}; see" if first else "see"
+        say(f"bh: {file}: {have} no values ({kinds}); {told} 'reason' in {place}", err=True)
         return 1
     return 0
 

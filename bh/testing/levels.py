@@ -11,7 +11,7 @@ import hashlib
 import json
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path as FilePath
@@ -70,9 +70,11 @@ def wanted(levels: Sequence[L] | None) -> tuple[L, ...]:
         at least three.
 
     Raises:
-        ModelError: there are fewer, or one stands twice.
+        ModelError: it is no list, there are fewer, or one stands twice.
     """
     __tracebackhide__ = True
+    if levels is not None and (isinstance(levels, str) or not isinstance(levels, Iterable)):
+        raise ModelError(f"levels = {levels!r} are no list; an order needs three or more, such as (1, 2, 4)")
     test = running()
     marked = None if test is None else test.levels
     found = tuple(levels) if levels is not None else cast("tuple[L, ...]", marked or LEVELS)

@@ -360,7 +360,8 @@ def test_command(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert main(["sweep", str(file), "-o", str(place), "-w", "0"]) == 1
     out, err = capsys.readouterr()
     assert "2 of 4 points reached" in out
-    assert "2 points have no values (2 refused)" in err
+    assert "2 points have no values (2 refused); the first: " in err
+    assert "see 'reason' in" in err
     assert "4 of 4 points, 2 failed" in err
     assert main(["sweep", str(file), "-o", str(place), "-w", "0", "--dask-workers", "2"]) == 2
 

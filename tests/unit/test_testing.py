@@ -10,7 +10,7 @@ import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -136,6 +136,10 @@ def test_levels_that_do_not_refine_are_refused_in_one_line() -> None:
         ),
         (lambda: assert_energy_converges(folded, (1, 1, 2)), "one stands twice"),
         (lambda: assert_energy_converges(folded, (1, 2)), "too few"),
+        (
+            lambda: assert_energy_converges(folded, levels=cast("tuple[int, ...]", 3)),
+            "levels = 3 are no list",
+        ),
         (lambda: assert_energy_converges(folded(1), (1, 2, 2.5)), "whole numbers from 1"),
         (lambda: assert_energy_converges(folded, part="torsion"), "energy has no part 'torsion'"),
         (lambda: assert_values_converge([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]), "sizes that fall"),
