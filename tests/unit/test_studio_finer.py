@@ -109,7 +109,7 @@ def test_panels_that_pass_through_each_other_are_counted() -> None:
     """Two wide panels beside a narrow one, both folded up, go through each other; at first they do not."""
     scene = of_library("strip", values={"length": 60.0, "width": 50.0, "creases": [22.0, 28.0]})
     mesh = scene.model.mesh
-    model = replace(scene.model, mesh=replace(mesh, folds={name: "mountain" for name in mesh.folds}))
+    model = replace(scene.model, mesh=replace(mesh, folds=dict.fromkeys(mesh.folds, "mountain")))
     desk = Desk(replace(scene, model=model))
     for percent, meets in ((20.0, False), (70.0, True)):
         desk.take(read(json.dumps({"do": "percent", "value": percent})))
