@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 import bh.studio.messages as asked
 from bh.analysis.contact import self_contact
@@ -24,6 +25,7 @@ from bh.studio.frames import Json, creases_of, described, head_of, line, packed,
 from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
 
 BUDGET = 0.03  # s of an update
+FARTHEST = 10.0  # sizes of the sheet that a hand may be away from it
 TIDY = 5.0  # s between two times that free memory goes back to the system
 
 
@@ -89,8 +91,10 @@ class Desk:
                 for crease in self.session.creases:
                     self.session.fold(crease, 0.01 * value * self.sheet.full[crease])
             case asked.Pull(node=node, to=to):
+                self._near(f"node {node} is pulled", np.array(to) - self.session.mesh.points.mean(axis=0))
                 self.session.pull(node, to)
             case asked.Pinch(a=a, b=b, gap=gap):
+                self._near("jaws are opened", np.array([gap or 0.0]))
                 self.session.pinch(a, b, gap)
             case asked.LetGo(node=node):
                 self.session.let_go(node)
@@ -132,6 +136,15 @@ class Desk:
         elif not (self.session.undo() if what == "undo" else self.session.redo()):
             return [line(f"there is nothing to {what}")]
         return []
+
+    def _near(self, what: str, away: NDArray[np.float64]) -> None:
+        """Refuse a place (mm from the middle of the flat sheet) from which no sheet comes back as it was."""
+        size = float(np.ptp(self.session.mesh.points, axis=0).max())
+        far = float(np.linalg.norm(away))
+        if far > FARTHEST * size:
+            raise InputError(
+                f"{what} {far:.3g} mm away, the sheet is {size:.3g} mm wide; stay within {FARTHEST:g} times that"
+            )
 
     def _behind_a_snap(self, what: str, name: str) -> list[Json]:
         """What to know of a scene whose state a run from flat may miss."""

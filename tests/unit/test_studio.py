@@ -191,6 +191,8 @@ def test_every_format_is_written(desk: Desk, what: str) -> None:
         ({"do": "fold", "crease": "crease", "angle": 1.0, "more": 1}, "more"),
         ({"do": "pull", "node": 10**6, "to": [0, 0, 0]}, "no node"),
         ({"do": "pull", "node": 0, "to": [0, 0]}, "cannot be asked"),
+        ({"do": "pull", "node": 0, "to": [1e9, 0, 0]}, "1e\\+09 mm away"),
+        ({"do": "pinch", "a": 0, "b": 7, "gap": 1e9}, "jaws are opened"),
         ({"do": "pinch", "a": 0, "b": 10**6}, "no node"),
         ({"do": "pinch", "a": 7, "b": 7}, "at one point"),
         ({"do": "pinch", "a": 0, "b": 7, "gap": -1}, "cannot be asked"),

@@ -20,7 +20,7 @@ from bh.studio.sheets import of_library
 from tests.unit.browsers import needs_browser
 
 pytestmark = needs_browser
-PATIENCE = 15_000  # ms
+PATIENCE = 30_000  # ms
 DATA = Path(__file__).resolve().parents[1] / "data"
 
 
@@ -79,7 +79,7 @@ class Visit:
     def rests(self, condition: str = "true") -> None:
         """Wait until the sheet is in equilibrium with what is asked, and a condition on `head` holds."""
         self.page.wait_for_function(
-            f"(() => {{ const head = studio.head; return head.rest && ({condition}); }})()"
+            f"(() => {{ const head = studio.head; return head?.rest && ({condition}); }})()"
         )
 
     def points(self) -> np.ndarray[Any, Any]:
@@ -233,29 +233,20 @@ def test_what_cannot_be_opened_is_said_in_the_window(window: Visit, tmp_path: Pa
 
 
 def test_a_point_pulled_to_infinity_is_one_line_and_the_sheet_stays(window: Visit) -> None:
-    """Numbers beyond all sense are refused, or the sheet says that it cannot follow; then it folds on."""
+    """Places beyond all sense are refused; then it folds on."""
     page = window.page
     page.locator("#percent").fill("20")
     window.rests("Object.values(head.asked)[0] > 0.5")
     before = window.points()
-    page.evaluate(
-        "import('./static/common.js').then((all) => all.ask({ do: 'pull', node: 0, to: [1e999, 0, 0] }))"
-    )
-    page.wait_for_function(
-        "!document.getElementById('message').hidden && /cannot be asked/.test(message.textContent)"
-    )
-    assert "\n" not in page.locator("#message").inner_text()
-    np.testing.assert_array_equal(window.points(), before)
-    page.evaluate(
-        "import('./static/common.js').then((all) => all.ask({ do: 'pull', node: 0, to: [1e9, 0, 1e9] }))"
-    )
-    page.wait_for_function(
-        "studio.head.grips[0] && (studio.head.rest || studio.head.note)", timeout=4 * PATIENCE
-    )
-    assert np.isfinite(window.points()).all()
-    page.locator("#let-go").click()
-    window.rests("Object.keys(head.forces).length === 0")
-    np.testing.assert_allclose(window.points(), before, atol=1e-3)
+    for to, words in (("[1e999, 0, 0]", "cannot be asked"), ("[1e9, 0, 1e9]", "mm away, the sheet is")):
+        page.evaluate(
+            f"import('./static/common.js').then((all) => all.ask({{ do: 'pull', node: 0, to: {to} }}))"
+        )
+        page.locator("#message", has_text=words).wait_for()
+        assert "\n" not in page.locator("#message").inner_text()
+        np.testing.assert_array_equal(window.points(), before)
+    page.locator("#percent").fill("25")
+    window.rests("Object.values(head.asked)[0] > 0.7")
     assert window.told == []
 
 
