@@ -267,7 +267,9 @@ def test_a_network_that_drops_is_one_line_and_the_last_state_stays(chromium: Any
     assert seen.page.locator("#badge").inner_text() == "not connected"
     again = Opened(of_library("strip"), port)
     again._studio.token = opened._studio.token  # so that the page finds it
-    seen.page.locator("#message", has_text="is back").wait_for()  # else the state of before is the one that rests
+    seen.page.locator(
+        "#message", has_text="is back"
+    ).wait_for()  # else the state of before is the one that rests
     seen.rests("Object.values(head.asked)[0] > 0.5")
     np.testing.assert_allclose(seen.points(), before, atol=1e-3)
     again.close()
