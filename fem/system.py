@@ -17,7 +17,7 @@ from bh.solvers.matrices import FreeBodyMatrix, Matrix
 from bh.solvers.outcome import Outcome
 from bh.solvers.system import Evaluation, Tangent, grows_ahead
 from fem import loads
-from fem.assembly import Pattern, build_pattern, scatter, turn_blocks
+from fem.assembly import NO_PAIRS, Pattern, build_pattern, scatter, turn_blocks
 from fem.components import lay_out
 from fem.contact import StoppedShell
 from fem.crease_memory import CreaseMemory
@@ -380,7 +380,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
             q_new: (size,) after it.
             lam_new: after it.
         """
-        if stopped := self.passed(q, lam, q_new, lam_new):
+        if stopped := self._passed(q, lam, q_new, lam_new):
             return stopped
         before, after = self.components.whole(q, lam), self.components.whole(q_new, lam_new)
         turn = float(np.abs(self.components.alpha(after) - self.components.alpha(before)).max())
@@ -395,7 +395,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
 
     def penetration(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
         """What passed through itself between two states; without contact sides may do so, and nothing is said."""
-        return self.passed(q, lam, q_new, lam_new)
+        return self._passed(q, lam, q_new, lam_new)
 
     def obstacle(self, q: Array, lam: float) -> tuple[Outcome, str] | None:
         """What stands in the way of loads on a free sheet, with its outcome; None if nothing does."""
@@ -415,7 +415,8 @@ class ShellSystem(StoppedShell, CreaseMemory):
     @cached_property
     def _pattern(self) -> Pattern:
         c = self.components
-        return build_pattern(self.mesh, c.of_element, c.number, touching=self.touching)
+        touching = NO_PAIRS if self.contact_blocks is None else self.contact_blocks.pairs
+        return build_pattern(self.mesh, c.of_element, c.number, touching=touching)
 
     @cached_property
     def _springs(self) -> SpringEntries:

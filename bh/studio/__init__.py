@@ -7,13 +7,11 @@ as a function: `bh.studio(model)` opens the window, in a notebook as a frame (`b
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from types import ModuleType
 
-from bh.model.model import Model
 from bh.studio.opening import Opened, opened
 from bh.studio.server import open_window
-from bh.studio.sheets import LiveSheet, of_file, of_library, of_model
+from bh.studio.sheets import of_file, of_library, of_model
 
 __all__ = ["Opened", "of_file", "of_library", "of_model", "open_window"]
 
@@ -21,17 +19,7 @@ __all__ = ["Opened", "of_file", "of_library", "of_model", "open_window"]
 class _Module(ModuleType):
     """A module that is called."""
 
-    def __call__(
-        self,
-        what: Model | LiveSheet | Path | str | None = None,
-        *,
-        material: str = "card",
-        port: int = 0,
-        browser: bool | None = None,
-        wait: bool | None = None,
-    ) -> Opened:
-        """Open the window; see `bh.studio.opening.opened`."""
-        return opened(what, material=material, port=port, browser=browser, wait=wait)
+    __call__ = staticmethod(opened)
 
 
 sys.modules[__name__].__class__ = _Module

@@ -12,9 +12,9 @@ from bh.scene.load import load_scene
 from bh.solvers.automatic import Automatic
 from bh.solvers.load_control import LoadControl
 from bh.solvers.walk import Strategy
+from verification.studies.solver.contact_layers import crush
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "crushed_corrugation.toml"
-TRAVEL = 6.7  # mm
 COARSE = ("mesh.along=16", "mesh.rows=2")  # a fifth of the time
 
 
@@ -23,12 +23,7 @@ def crushed(*changes: str, strategy: Strategy | None = None) -> tuple[bh.Path, f
     model = load_scene(EXAMPLE, changes).model
     path = bh.trace(model, strategy=strategy, neighbours=False)
     assert path.reached, path.steps[-1].reason
-    states = [state for state in path if state.step == 1]
-    folded = [state for state in path if state.step == 0][-1].energy.total
-    load = np.array([0.0, *(-state.contact_forces["upper"][2] for state in states)])
-    work = TRAVEL * float(np.trapezoid(load, [0.0, *(state.lam for state in states)]))
-    last = states[-1].energy
-    return path, float(load[-1]), last.total + last.friction - folded, work
+    return path, *crush(path)
 
 
 def test_crush_load_and_energy() -> None:

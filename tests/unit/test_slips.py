@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import bh
-from bh.mechanics.shared.base_system import apart_in_shape
+from bh.mechanics.contact.in_the_way import apart_in_shape
 from bh.solvers.hindrance import slipped
 from bh.solvers.points import Point, point
 from verification.studies.solver.benchmark_systems import VonMisesTruss

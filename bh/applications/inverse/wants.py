@@ -309,8 +309,8 @@ def _reached(model: Forward, landing: Landing, design: Design, share: float) -> 
 
 
 @dataclass(frozen=True, eq=False)
-class _Steady:
-    """Residuals of a problem, and beside them a part of the movements of the end by one spread of each thing."""
+class _Beside:
+    """A problem whose residuals have others beside them; its variables and their ends are the same."""
 
     problem: ReachAll
 
@@ -321,6 +321,10 @@ class _Steady:
     @property
     def upper(self) -> Array:
         return self.problem.upper
+
+
+class _Steady(_Beside):
+    """Residuals of a problem, and beside them a part of the movements of the end by one spread of each thing."""
 
     def residuals(self, x: Array, on: Bools) -> Array:
         moves = predicted(self.problem.surrogate, *self.problem.split(x), on).moves
@@ -329,19 +333,8 @@ class _Steady:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Outside:
+class _Outside(_Beside):
     """Residuals of a problem, and beside them how deep the strip is in each box, folded and pinched."""
-
-    problem: ReachAll
-
-    @property
-    def lower(self) -> Array:
-        return self.problem.lower
-
-    @property
-    def upper(self) -> Array:
-        return self.problem.upper
 
     def residuals(self, x: Array, on: Bools) -> Array:
         problem = self.problem

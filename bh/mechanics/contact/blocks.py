@@ -34,6 +34,14 @@ class ContactBlocks:
         self.pairs = np.column_stack((self._keys >> 31, self._keys & (2**31 - 1)))
         return False
 
+    def rows(self, pairs: Ints) -> Ints:
+        """(p,) where pairs (p, 2) that are known stand among `pairs`.
+
+        Args:
+            pairs: (p, 2) nodes.
+        """
+        return np.searchsorted(self._keys, _keys(pairs))
+
     def add(
         self, pairs: Ints, blocks: Array, frame_of: Ints, frames: Array, slots: Slots, data: Array
     ) -> None:
@@ -48,8 +56,7 @@ class ContactBlocks:
             data: values of the matrix, N / mm; added to.
         """
         if len(pairs):
-            rows = np.searchsorted(self._keys, _keys(pairs))
-            _add_blocks(pairs, blocks, rows, frame_of, frames, slots, data)
+            _add_blocks(pairs, blocks, self.rows(pairs), frame_of, frames, slots, data)
 
 
 def _keys(pairs: Ints) -> Ints:

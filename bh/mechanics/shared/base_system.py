@@ -176,15 +176,6 @@ class SupportedSheet(PressedSheet):
             return history.shape == (count, 2)
         return self.friction.fits(history[count:], len(self.mesh.points))
 
-    def reshaped(self, one: tuple[Array, float], other: tuple[Array, float]) -> float:
-        """By how much two shapes differ, rigid motions aside: the norm over all nodes, mm.
-
-        Args:
-            one: unknowns (size,) and load parameter.
-            other: the same of the other shape.
-        """
-        return apart_in_shape(self.near(*one), self.near(*other))
-
     @cached_property
     def rotation(self) -> float:
         """Largest change of an imposed or rest angle in the step, rad."""
@@ -308,19 +299,6 @@ class SupportedSheet(PressedSheet):
     def describe(self, q: Array, lam: float, motion: Array) -> str:
         """A motion (size,) of the unknowns in words."""
         return describe_motion(self.mesh, self.positions(q, lam), self.vectors(motion))
-
-
-def apart_in_shape(x: Array, y: Array) -> float:
-    """Norm of what is left between two shapes (n, 3), mm, where one is turned onto the other (Kabsch 1976).
-
-    Args:
-        x: (n, 3) positions, mm.
-        y: (n, 3) positions of the same nodes, mm.
-    """
-    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-    left, _, right = np.linalg.svd(x.T @ y)
-    left[:, 2] *= np.sign(np.linalg.det(left @ right))  # no mirror image
-    return float(np.linalg.norm(x @ (left @ right) - y))
 
 
 def refuse_outside(load_step: LoadStep) -> None:

@@ -5,8 +5,7 @@ The part of a system that is asked of states with contact; a sheet that touches 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
+from bh.mechanics.contact.in_the_way import InTheWay
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.outside import Outside
 from bh.model.model import Model
@@ -33,27 +33,16 @@ Array = NDArray[np.float64]
 SLIP = 0.01  # of the thickness: slip up to which a contact sticks
 
 
-class PressedSheet:
+class PressedSheet(InTheWay):
     """Contact of a sheet in one step; see `bh.solvers.system.Hindered` and `bh.solvers.system.Lagging`."""
 
     mesh: SheetMesh
     displacements: Displacements
     outside: Outside | None
-    barrier: SheetBarrier | None = None  # between panels
     moulds: MouldBarrier | None = None
-    barriers: tuple[SheetBarrier, ...] = ()  # all of them
     friction: Friction | None = None
     contact_blocks: ContactBlocks | None = None
     _kept: Array = np.zeros((0, 2))  # what friction remembers
-
-    def near(self, q: Array, lam: float) -> Array:
-        """(n, 3) positions of the nodes, mm.
-
-        Args:
-            q: (size,) unknowns.
-            lam: load parameter of the step, 0 to 1.
-        """
-        raise NotImplementedError
 
     def begin_contact(self, model: Model, load_step: LoadStep, start: State | None, x: Array) -> None:
         """What can press in a step that begins at positions x (n, 3), mm; call it when bodies are known.
@@ -271,99 +260,6 @@ class PressedSheet:
         rates = self._place_rates(np.zeros_like(x), 1.0)
         alone = self._touch_rates(x, np.zeros_like(x), lam, 1.0)
         return float(np.vdot(alone, rates)) + float(np.vdot(alone[: len(x)], v))
-
-    # ------------------------------------------------------------------------------- what stands in the way
-
-    def _passed(self, q: Array, lam: float, q_new: Array, lam_new: float) -> str:
-        """Whether something would pass through the sheet on the straight way between two states."""
-        for barrier in self.barriers:
-            if barrier.passed(
-                barrier.places(self.near(q, lam), lam), barrier.places(self.near(q_new, lam_new), lam_new)
-            ):
-                what = (
-                    "panels would pass through each other"
-                    if barrier is self.barrier
-                    else "a mould would pass through"
-                )
-                return f"{what} on the way there"
-        return ""
-
-    def free_part(self, q: Array, dq: Array, lam: float, since: float | None = None) -> float:
-        """How much of a step dq (size,) from q nothing stands in, 0 to 1; see `bh.solvers.system.Limited`."""
-        return self._least(q, dq, lam, since, "free_part")
-
-    def approach(self, q: Array, dq: Array, lam: float, since: float | None = None) -> float:
-        """How much of a step dq (size,) from q leads to where something begins to press, 0 to 1.
-
-        Args:
-            q: (size,) unknowns.
-            dq: (size,) step.
-            lam: load parameter of the step, 0 to 1.
-            since: that of q, if it is another one: moulds move on the way.
-        """
-        return self._least(q, dq, lam, since, "approach")
-
-    def _least(self, q: Array, dq: Array, lam: float, since: float | None, what: str) -> float:
-        part = 1.0
-        for barrier in self.barriers:
-            # prescribed nodes are where they are at the end of the way, moulds where they come from
-            begin = lam if since is None or barrier is self.barrier else since
-            x, moved = self.near(q, begin), self.near(q + dq, lam)
-            part = min(part, getattr(barrier, what)(barrier.places(x, begin), barrier.places(moved, lam)))
-        return part
-
-    def meetings(self, x: Array) -> str:
-        """Which parts of the sheet meet or lie too near at positions x (n, 3), in words; empty where it is clear.
-
-        Args:
-            x: (nodes, 3) positions, mm.
-        """
-        if self.barrier is None or self.barrier.clear(x):
-            return ""
-        return self.barrier.meetings(x) or "layers nearer than contact allows"
-
-    @property
-    def hindered(self) -> bool:
-        """Does anything stand in the way, ever?"""
-        return bool(self.barriers)
-
-    @property
-    def looking(self) -> float:
-        """What looks for contact have taken so far, s of one core of 2.5 GHz, counted by their work."""
-        return sum(barrier.seconds for barrier in self.barriers)
-
-    @contextmanager
-    def unhindered(self) -> Iterator[None]:
-        """While it lasts nothing stands in the way."""
-        with ExitStack() as stack:
-            for barrier in self.barriers:
-                stack.enter_context(barrier.asleep())
-            yield
-
-    def clear_ways(self, places: Sequence[tuple[Array, float]]) -> float:
-        """How many of the straight ways from place to place are clear of all that can press.
-
-        If it is all of them, the last place is one that the path has come to.
-
-        Args:
-            places: unknowns (size,) and load parameter of each; the first is an accepted state.
-        """
-        ways = len(places) - 1.0
-        for barrier in self.barriers:
-            ways = min(
-                ways, barrier.clear_ways([barrier.places(self.near(q, lam), lam) for q, lam in places])
-            )
-        return ways
-
-    def pressing(self, q: Array, lam: float) -> bool:
-        """Does anything press that can stand in the way at q (size,)?
-
-        Args:
-            q: (size,) unknowns.
-            lam: load parameter of the step, 0 to 1.
-        """
-        x = self.near(q, lam)
-        return any(barrier.presses(barrier.places(x, lam)) for barrier in self.barriers)
 
     # ------------------------------------------------------------------------------- friction, one state after another
 

@@ -89,6 +89,19 @@ class RigidContact:
         """
         return self._from + lam * self.velocity
 
+    def _pressed(self, x: Array, lam: float) -> tuple[Array, Ints, Ints, Array, Array, Array, Array, Array]:
+        """What every kernel takes first: the sheet, its points, and where the indenters are."""
+        return (
+            x,
+            self.triangles,
+            self.owner,
+            self.weights,
+            self.share,
+            self.centres(lam),
+            self._axes,
+            self._shape,
+        )
+
     def rubbing(self, x: Array, lam: float, mu: float, first: int) -> Rubbing:
         """Points that indenters press on, to rub against their centres; nothing is stuck.
 
@@ -103,14 +116,7 @@ class RigidContact:
         shape = (len(self.owner), len(self.indenters))
         push, normal = np.zeros(shape), np.zeros((*shape, 3))
         _pushes(
-            x,
-            self.triangles,
-            self.owner,
-            self.weights,
-            self.share,
-            self.centres(lam),
-            self._axes,
-            self._shape,
+            *self._pressed(x, lam),
             push,
             normal,
         )
@@ -139,14 +145,7 @@ class RigidContact:
         f += self.spring * moved
         total = np.zeros((len(self.indenters), 3))
         energy = _forces(
-            x,
-            self.triangles,
-            self.owner,
-            self.weights,
-            self.share,
-            self.centres(lam),
-            self._axes,
-            self._shape,
+            *self._pressed(x, lam),
             f,
             total,
         )
@@ -161,14 +160,7 @@ class RigidContact:
         """
         total = np.zeros((len(self.indenters), 3))
         _forces(
-            x,
-            self.triangles,
-            self.owner,
-            self.weights,
-            self.share,
-            self.centres(lam),
-            self._axes,
-            self._shape,
+            *self._pressed(x, lam),
             np.zeros_like(x),
             total,
         )
@@ -186,14 +178,7 @@ class RigidContact:
             data: values of the matrix, N / mm; added to.
         """
         _tangent(
-            x,
-            self.triangles,
-            self.owner,
-            self.weights,
-            self.share,
-            self.centres(lam),
-            self._axes,
-            self._shape,
+            *self._pressed(x, lam),
             self.home,
             self.spring,
             frame_of,

@@ -123,8 +123,8 @@ def crushing(result: CaseResult) -> None:
     """
     model = load_scene(EXAMPLES / f"{CRUSHED}.toml").model
     path = bh.trace(model, warn=False, estimate=False, neighbours=False)
-    fine = _crush(bh.trace(model, strategy=SHORT, warn=False, estimate=False, neighbours=False))
-    found = _crush(path)
+    fine = crush(bh.trace(model, strategy=SHORT, warn=False, estimate=False, neighbours=False))
+    found = crush(path)
     for quantity, unit, value, reference, source in (
         ("load that crushes a corrugation", "N", found[0], fine[0], QUARTER),
         ("energy of a crushed corrugation", "N mm", found[1], fine[1], QUARTER),
@@ -142,12 +142,20 @@ def crushing(result: CaseResult) -> None:
         )
 
 
-def _crush(path: Path) -> tuple[float, float, float]:
-    """Load at the end, N, what the sheet has gained, and the work of the plate, N mm; nan where it does not arrive."""
+def crush(path: Path) -> tuple[float, float, float]:
+    """What the plate of the example does to the corrugation; nan where it does not arrive.
+
+    Args:
+        path: of the example, folded in its first step and crushed in its second one.
+
+    Returns:
+        its load at the end, N, what the sheet has gained and friction used up, and the work of the plate, N mm.
+    """
     if not path.reached:
         return math.nan, math.nan, math.nan
     states = [state for state in path if state.step == 1]
     load = np.array([0.0, *(-state.contact_forces["upper"][2] for state in states)])
     folded = next(state for state in reversed(list(path)) if state.step == 0).energy
     work = TRAVEL * float(np.trapezoid(load, [0.0, *(state.lam for state in states)]))
-    return float(load[-1]), states[-1].energy.total - folded.total, work
+    last = states[-1].energy
+    return float(load[-1]), last.total + last.friction - folded.total, work
