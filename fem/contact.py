@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.mechanics.contact.in_the_way import InTheWay
 from bh.model.model import Model
+from bh.solvers.in_the_way import InTheWay
 from fem.assembly import Pattern, scatter, turn_blocks
 from fem.components import Components
 from fem.here import Here
@@ -24,6 +24,7 @@ from meshes.curved import ElementMesh
 from meshes.topology import Ints
 
 if TYPE_CHECKING:
+    from bh.mechanics.contact.barrier import SheetBarrier
     from bh.mechanics.contact.blocks import ContactBlocks
 
 Array = NDArray[np.float64]
@@ -38,6 +39,7 @@ class StoppedShell(InTheWay):
 
     mesh: ElementMesh
     components: Components
+    barrier: SheetBarrier | None = None
     contact_blocks: ContactBlocks | None = None
     _here: Here | None = None
 

@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import bh
-from bh.mechanics.contact.in_the_way import apart_in_shape
 from bh.solvers.hindrance import slipped
+from bh.solvers.in_the_way import apart_in_shape
 from bh.solvers.points import Point, point
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 from verification.studies.solver.contact_scenes import drawn

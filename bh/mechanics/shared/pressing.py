@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.state import State
 from bh.loading.load_step import LoadStep
-from bh.mechanics.contact.in_the_way import InTheWay
 from bh.mechanics.shared.displacements import Displacements
 from bh.mechanics.shared.outside import Outside
 from bh.model.model import Model
 from bh.model.mould import Mould
+from bh.solvers.in_the_way import InTheWay
 from meshes import SheetMesh
 from meshes.topology import Ints
 
@@ -39,7 +39,9 @@ class PressedSheet(InTheWay):
     mesh: SheetMesh
     displacements: Displacements
     outside: Outside | None
+    barrier: SheetBarrier | None = None  # between panels
     moulds: MouldBarrier | None = None
+    barriers: tuple[SheetBarrier, ...] = ()  # all of them
     friction: Friction | None = None
     contact_blocks: ContactBlocks | None = None
     _kept: Array = np.zeros((0, 2))  # what friction remembers

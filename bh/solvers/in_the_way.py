@@ -3,16 +3,85 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from bh.mechanics.contact.barrier import SheetBarrier
-
 Array = NDArray[np.float64]
+
+
+class Barrier(Protocol):
+    """What keeps parts apart that can meet; positions are those that `places` gives, (n, 3), mm."""
+
+    @property
+    def seconds(self) -> float:
+        """What it has taken so far, s, counted by its work."""
+        ...
+
+    def places(self, x: Array, lam: float) -> Array:
+        """Positions of all that can meet.
+
+        Args:
+            x: (nodes, 3) positions of the sheet, mm.
+            lam: load parameter of the step, 0 to 1.
+
+        Returns:
+            (n, 3) mm, those of the sheet first.
+        """
+        ...
+
+    def passed(self, x: Array, moved: Array) -> bool:
+        """Would something pass through something on the straight way?
+
+        Args:
+            x: (n, 3) where the way begins, mm.
+            moved: (n, 3) where it ends, mm.
+        """
+        ...
+
+    def free_part(self, x: Array, moved: Array) -> float:
+        """How much of the straight way is free, 0 to 1.
+
+        Args:
+            x: (n, 3) where the way begins, mm.
+            moved: (n, 3) where it ends, mm.
+        """
+        ...
+
+    def approach(self, x: Array, moved: Array) -> float:
+        """How much of it leads to where parts begin to press, 0 to 1.
+
+        Args:
+            x: (n, 3) where the way begins, mm.
+            moved: (n, 3) where it ends, mm.
+        """
+        ...
+
+    def clear_ways(self, places: Sequence[Array]) -> float:
+        """How many of the straight ways from place to place are clear.
+
+        Args:
+            places: positions.
+        """
+        ...
+
+    def clear(self, x: Array) -> bool:
+        """Does nothing meet?"""
+        ...
+
+    def meetings(self, x: Array) -> str:
+        """What meets, in words."""
+        ...
+
+    def presses(self, x: Array) -> bool:
+        """Does anything press?"""
+        ...
+
+    def asleep(self) -> AbstractContextManager[None]:
+        """While it lasts it keeps nothing apart."""
+        ...
 
 
 class InTheWay:
@@ -23,8 +92,8 @@ class InTheWay:
         barriers: all of them.
     """
 
-    barrier: SheetBarrier | None = None
-    barriers: tuple[SheetBarrier, ...] = ()
+    barrier: Barrier | None = None
+    barriers: tuple[Barrier, ...] = ()
 
     def near(self, q: Array, lam: float) -> Array:
         """(n, 3) positions of the nodes that can meet, mm.
