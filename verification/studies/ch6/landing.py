@@ -33,9 +33,7 @@ Array = NDArray[np.float64]
 Target = tuple[float, float, float]
 Designs = tuple[tuple[Target, tuple[tuple[float, float, bool], ...]], ...]
 REFINED = (0.625, 6)  # of the shell that judges segments: mm along the crease, rows a panel
-DOUBTFUL = (
-    1.0  # mm that the shell's last refinement may move the end of a strip; else it is refined once more
-)
+WITHIN = 1.0  # mm that a design may miss
 SHELL = "shell"
 BLOCKS = 10
 
@@ -106,7 +104,7 @@ class SegmentTask:
 
 @dataclass(frozen=True)
 class JudgeTask:
-    """A design by the shell.
+    """A design by the shell; on its refined mesh where the last refinement leaves open whether it is near enough.
 
     Attributes:
         designs: k0 (1/mm), length (mm) and pinch of every segment, by target.
@@ -117,14 +115,14 @@ class JudgeTask:
     @property
     def identity(self) -> str:
         """Of the task, its meshes and the designs."""
-        return f"judge {MESHES} {REFINED} {DOUBTFUL} {_data()} {self.designs!r}"
+        return f"judge {MESHES} {REFINED} {WITHIN} open {_data()} {self.designs!r}"
 
     def __call__(self, point: Mapping[str, Any]) -> dict[str, float]:
         """What the design for the target {"x", "y", "z"} (mm) misses."""
         target = (float(point["x"]), float(point["y"]), float(point["z"]))
         k0, length, on = zip(*dict(self.designs)[target], strict=True)
         verdict = judge(k0, length, on, model().setting, MESHES)
-        if verdict.change > DOUBTFUL:
+        if verdict.missed(np.array(target)) + verdict.change > WITHIN:  # it could be on the other side
             finer = judge(k0, length, on, model().setting, (REFINED,))
             verdict = Verdict((*verdict.strips, *finer.strips))
         return {"missed": verdict.missed(np.array(target)), "change": verdict.change}
