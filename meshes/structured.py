@@ -25,7 +25,7 @@ from meshes.errors import MeshError
 from meshes.limits import check_limit
 from meshes.mesh import Origin, SheetMesh
 from meshes.pattern import CreasePattern, drawn_angles, with_groups
-from meshes.tapered import tapered_mesh, tapers
+from meshes.tapered import followed, tapered_mesh, tapers
 from meshes.topology import Ints, build
 
 
@@ -124,6 +124,8 @@ def _tapered(pattern: CreasePattern, along: int, rows: int, kind: Kind, alpha: f
         sets[names[k]] = np.array(own)
     curves: dict[str, Curve] = {f"edge:{name}": curve for name, curve in pattern.edges}
     curves.update({f"crease:{crease.name}": crease.curve for crease in pattern.creases})
+    for name, edges in sets.items():
+        curves[name] = followed(curves[name], points[[edges[0, 0], *edges[:, 1]]])
     start, end = chains[-1][0], chains[-1][-1]
     mesh = SheetMesh(
         points=points,

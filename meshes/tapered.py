@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from meshes.curves import Array, Curve
+from meshes.curves import Array, Curve, Polyline
 from meshes.errors import MeshError
 from meshes.pattern import CreasePattern
 from meshes.topology import Ints
@@ -26,6 +26,7 @@ FINEST = 0.5  # of the widest cell's width
 LOWEST = 0.45  # height of a row over the width of its cells, below which it ends
 THINNEST = 0.04  # the same of a whole panel, below which the curves on its sides are taken as one
 CLOSEST = 0.45  # of the width of a cell, from a column to the end of a rail
+ON = 1e-9  # of the sheet's width: nodes farther from a rail do not lie on it
 Chain = list[int]
 
 
@@ -77,6 +78,32 @@ def tapered_mesh(
             chain = following
         chains.append(chain)
     return nodes.array, np.array(triangles, dtype=np.int64), chains
+
+
+def followed(rail: Curve, nodes: Array) -> Curve:
+    """The curve that a line of edges lies on: the rail, but for where it is one with another rail.
+
+    Where two rails are closer than cells can tell (`THINNEST`), nodes lie on one of them or between them. From such a
+    node to its neighbours the curve is straight, so that every node is on its curve and middles of edges are, too.
+
+    Args:
+        rail: that the nodes were laid along.
+        nodes: (k, 2) of the line in order, mm.
+
+    Returns:
+        the rail itself where all nodes lie on it.
+    """
+    graph = _Graph(rail)
+    on = np.abs(nodes[:, 1] - graph(nodes[:, 0])) <= ON * graph.reach
+    if on.all():
+        return rail
+    pieces = [nodes[:1]]
+    for i in range(len(nodes) - 1):
+        if on[i] and on[i + 1]:
+            x = graph.points[:, 0]
+            pieces.append(graph.points[(x > nodes[i, 0]) & (x < nodes[i + 1, 0])])
+        pieces.append(nodes[i + 1 : i + 2])
+    return Polyline(np.concatenate(pieces))
 
 
 class _Graph:

@@ -14,6 +14,7 @@ from bh.scene.load import parse_scene
 from meshes import PatternError
 from meshes.cells import Kind
 from meshes.corrugations import KINDS
+from meshes.curved import edge_middles
 from meshes.curves import sample
 from meshes.tapered import smallest_angles
 from verification.studies.ch4.tables4 import PRINTED, formula
@@ -74,6 +75,30 @@ def test_symmetric_about_y() -> None:
     mirrored = mesh.points * [-1.0, 1.0, 1.0]
     gap = np.linalg.norm(mesh.points[:, None] - mirrored[None], axis=2).min(axis=1)
     assert gap.max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", CURVED)
+@pytest.mark.parametrize(("along", "rows"), [(24, 1), (36, 3), (48, 4)])
+def test_middles_of_edges_are_on_the_curves_of_a_mesh(kind: str, along: int, rows: int) -> None:
+    """Also where curves touch and nodes lie between them: edges are straight there, elsewhere they bow."""
+    pattern = meshes.corrugation(kind)
+    mesh = meshes.structured(pattern, along=along, rows=rows)
+    middles, chords = edge_middles(mesh), mesh.points[mesh.topology.edges].mean(axis=1)
+    bow = np.linalg.norm(middles - chords, axis=1)
+    off = 0
+    for rail, name in zip(
+        pattern.rails[1:], [*(f"crease:{name}" for name in mesh.creases), "edge:outer"], strict=True
+    ):
+        edges = mesh.topology.find_edges(mesh.edge_sets[name])
+        ends = mesh.points[mesh.edge_sets[name], :2]
+        x, y = sample(rail).T
+        apart = np.abs(ends[..., 1] - np.interp(ends[..., 0], x, y)).max(axis=1) > 1e-6
+        assert bow[edges[apart]].max(initial=0.0) < 1e-12
+        assert bow[edges[~apart]].max() > 1e-3
+        off += int(apart.sum())
+        if not apart.any():
+            assert mesh.curves[name] is rail
+    assert (off > 0) == (kind == "elliptical-point")
 
 
 def test_creases_that_touch_join() -> None:

@@ -1,4 +1,4 @@
-"""Spread loads on strips: beams that bear them, and curves that nodes leave in corners."""
+"""Spread loads on strips: beams that bear them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ import pytest
 
 import meshes
 from bh import Model, Sheet, trace
-from meshes.curved import edge_middles
-from meshes.errors import MeshError
-from verification.studies.ch4.spread_bending import REACH, SPAN, bending, on_curves, strip
+from verification.studies.ch4.spread_bending import REACH, SPAN, bending, strip
 
 FLAT = Sheet(E=4000.0, nu=0.0, t=0.381)
 WIDTH = 100.0
@@ -44,17 +42,3 @@ def test_loads_of_a_strip_have_the_sum_and_the_couple_of_one() -> None:
     load, couple = strip(mesh, x, y - y.mean())
     assert [load.sum(), couple.sum(), couple @ x] == pytest.approx([1.0, 0.0, 1.0], abs=1e-12)
     assert load @ (y - y.mean()) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_curves_that_touch_get_straight_edges_in_the_corners_only() -> None:
-    mesh = meshes.structured(meshes.corrugation("elliptical-point"), along=48, rows=4)
-    with pytest.raises(MeshError, match="off its curve"):
-        edge_middles(mesh)
-    mended = on_curves(mesh)
-    middles = edge_middles(mended)
-    chords = mesh.points[mesh.topology.edges].mean(axis=1)
-    edges = mesh.topology.find_edges(mesh.edge_sets["crease:crease-2"])
-    bowed = np.linalg.norm(middles - chords, axis=1)[edges] > 1e-4
-    assert bowed[len(bowed) // 4 : -len(bowed) // 4].all()
-    clean = meshes.structured(meshes.corrugation("parabolic-edge"), along=24, rows=2)
-    assert on_curves(clean).curves == clean.curves

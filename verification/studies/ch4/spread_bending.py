@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,6 @@ from bh import Model, Path, depth, trace
 from bh.analysis.stiffness_probe import Probe
 from bh.applications.corrugation.folding import LSTAR, POLYESTER, SHARPEST
 from bh.formulations.observables import depth_of
-from meshes.curved import edge_middles
-from meshes.curves import Curve, arc_lengths
 from verification.studies.ch4.corrugations import AZIMUTHS, DEPTH
 
 Array = NDArray[np.float64]
@@ -23,7 +21,6 @@ SPAN, REACH = (
     50.0,
     10.0,
 )  # mm: between the supports; half of a strip, whose load fades as cos^2: 10 mm in the mean
-SAMPLES, ON = 2001, 1e-4  # of a curve; mm, nodes nearer than this are on it
 CUTS = 8  # of the edges of a triangle where loads are integrated
 
 
@@ -54,77 +51,12 @@ def stiff(kind: str, formulation: str, along: int, rows: int) -> Stiff:
         along: cells along the creases.
         rows: of cells in a panel.
     """
-    mesh = on_curves(meshes.structured(meshes.corrugation(kind), along=along, rows=rows))
+    mesh = meshes.structured(meshes.corrugation(kind), along=along, rows=rows)
     model = Model(mesh, POLYESTER, formulation=formulation, contact=False).support("rigid-body")
     path = trace(model.fold("all", by=SHARPEST, Lstar=LSTAR, until=depth(DEPTH)), warn=False)
     if not path.reached:
         return Stiff(path, False, {"x": math.nan, "y": math.nan}, math.nan)
     return Stiff(path, True, bending(path, ("x", "y")), path[-1].energy.total)
-
-
-@dataclass(frozen=True, eq=False)
-class Along:
-    """A curve that leaves another where nodes do: it is that curve between nodes on it, and straight between others.
-
-    Attributes:
-        samples: (s, 2) of the curve that nodes were meant to lie on, at even parameters, mm.
-        nodes: (k, 2) of a chain, mm.
-    """
-
-    samples: Array
-    nodes: Array
-
-    @cached_property
-    def _pieces(self) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Lengths of the chain up to its nodes (k,), their parameters on the curve (k,), and which lie on it (k,)."""
-        u = np.linspace(0.0, 1.0, len(self.samples))
-        step = np.diff(self.samples, axis=0)
-        gap = self.nodes[:, None, :] - self.samples[None, :-1, :]
-        part = np.clip((gap * step).sum(axis=2) / (step**2).sum(axis=1), 0.0, 1.0)
-        off = np.linalg.norm(gap - part[:, :, None] * step, axis=2)
-        best = np.argmin(off, axis=1)
-        rows = np.arange(len(best))
-        return arc_lengths(self.nodes), u[best] + part[rows, best] * u[1], off[rows, best] < ON
-
-    @property
-    def length(self) -> float:
-        """Of the chords, mm."""
-        return float(self._pieces[0][-1])
-
-    @property
-    def closed(self) -> bool:
-        """False: a chain ends elsewhere."""
-        return False
-
-    def point(self, u: Array) -> Array:
-        """(k, 2) points, mm, at (k,) parameters in [0, 1]."""
-        lengths, at, on = self._pieces
-        s = np.clip(u, 0.0, 1.0) * lengths[-1]
-        k = np.clip(np.searchsorted(lengths, s, side="right") - 1, 0, len(lengths) - 2)
-        part = ((s - lengths[k]) / (lengths[k + 1] - lengths[k]))[:, None]
-        straight = (1.0 - part) * self.nodes[k] + part * self.nodes[k + 1]
-        wanted = (1.0 - part[:, 0]) * at[k] + part[:, 0] * at[k + 1]
-        even = np.linspace(0.0, 1.0, len(self.samples))
-        bowed = np.column_stack([np.interp(wanted, even, column) for column in self.samples.T])
-        return np.where((on[k] & on[k + 1])[:, None], bowed, straight)
-
-
-def on_curves(mesh: meshes.SheetMesh) -> meshes.SheetMesh:
-    """The mesh with curves that all its nodes are on, which the shell with curved edges asks for.
-
-    Curves that touch in a corner are taken as one where they are close (`meshes.structured`): nodes lie between them
-    there, by up to 0.2 mm. There the edges are straight, and the shell has the same slivers as the other formulation.
-    """
-    curves: dict[str, Curve] = dict(mesh.curves)
-    for name, curve in mesh.curves.items():
-        edges = mesh.edge_sets.get(name)
-        try:
-            edge_middles(replace(mesh, curves={name: curve}))
-        except meshes.MeshError:
-            assert edges is not None
-            chain = np.append(edges[:, 0], edges[-1, 1])
-            curves[name] = Along(curve.point(np.linspace(0.0, 1.0, SAMPLES)), mesh.points[chain, :2])
-    return replace(mesh, curves=curves)
 
 
 def bending(path: Path, names: tuple[str, ...]) -> dict[str, float]:
