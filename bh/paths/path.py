@@ -22,7 +22,7 @@ from bh.model.model import Model
 from bh.model.serialise import describe, rebuild
 from bh.paths.advice import advice
 from bh.paths.provenance import provenance_of
-from bh.paths.record import Record, StepOutcome, check_rows, check_sizes
+from bh.paths.record import Record, StepOutcome, check_rows, check_sizes, not_settled
 from bh.paths.storage import CriticalRow, PathFile, StateRow, reading
 from bh.paths.stored import line, mapping
 from bh.runtime import viewer
@@ -184,7 +184,7 @@ class Path:
             strain = float(np.abs(self[-1].strain).max())
             if strain > LARGE_STRAIN:
                 found.append(f"strains reach {strain:.0%}: the law of the sheet is one of small strains")
-            found += self._hidden()
+            found += self._hidden() + not_settled(self.records, self.system)
         ends = [line for step in self._load_steps for line in open_ends(self.model.mesh, step)]
         found += dict.fromkeys(ends)
         if self.accuracy is not None:

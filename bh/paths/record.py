@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,9 +13,11 @@ from bh.errors import PathFileError
 from bh.model.model import Model
 from bh.paths.storage import StateRow
 from bh.paths.stored import line, mapping
+from bh.solvers.lagging import LAGS, SETTLED, Lagging
 from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.points import LOAD, CriticalPoint, Mode
 from bh.solvers.system import Remembering, System
+from meshes.mesh import count
 
 if TYPE_CHECKING:
     from bh.formulations.symmetry_reduction import Half
@@ -145,3 +147,26 @@ def check_sizes(records: Sequence[Record], step: int, system: System) -> None:
             raise PathFileError(
                 f"the path has states of another size than its model in step {step + 1}; solve it again"
             )
+
+
+def not_settled(records: Sequence[Record], system: Callable[[int], System]) -> list[str]:
+    """A line on every step with states whose friction still changed when they were accepted.
+
+    Args:
+        records: of a path.
+        system: of a step, by its number.
+    """
+    lines = []
+    for step in dict.fromkeys(record.step for record in records if record.history is not None):
+        asked = system(step)
+        if not (isinstance(asked, Lagging) and asked.lags):
+            continue
+        histories = [r.history for r in records if r.step == step and r.history is not None]
+        left = [change for change in map(asked.unsettled, histories) if change > SETTLED]
+        if left:
+            lines.append(
+                f"step {step + 1}: friction had not settled after {LAGS} rounds in {len(left)} of "
+                f"{count(len(histories), 'state')}: its forces still change by {max(left):.2%}; "
+                "take shorter increments"
+            )
+    return lines

@@ -11,9 +11,10 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.lagging import Lagging
 from bh.solvers.matrices import IndefiniteError
 from bh.solvers.points import Point, extrapolate, ways
-from bh.solvers.system import Hindered, Lagging, System, clear_part, meeting, pressing
+from bh.solvers.system import Hindered, System, clear_part, meeting, pressing
 
 Array = NDArray[np.float64]
 SMALLEST = 1e-5  # part of a step that an increment up to a contact may be

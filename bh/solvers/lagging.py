@@ -3,17 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.system import Lagging, System
+from bh.solvers.system import System
 
 Array = NDArray[np.float64]
 Guess = Callable[[], tuple[Array, Array]]  # unknowns and element forces
 SETTLED = 0.002  # change of what is taken from states before, in parts of it, that is nothing
 LAGS = 12  # how often it is taken at most
+
+
+@runtime_checkable
+class Lagging(Protocol):
+    """Ability of a system: its energy holds something that is taken from a state before, such as normal forces."""
+
+    @property
+    def lags(self) -> bool:
+        """Does it, in this model?"""
+        ...
+
+    def lag_back(self) -> None:
+        """Take it from the state that was accepted last."""
+        ...
+
+    def lag(self, q: Array, lam: float, settled: float) -> bool:
+        """Take it from a state, unless it changes by less than a part of `settled`; whether it has changed.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+            settled: largest change, in parts of it.
+        """
+        ...
+
+    def unsettled(self, history: Array) -> float:
+        """By how much it still changed where a state was accepted, in parts of it.
+
+        Args:
+            history: of that state, as `history_at` gives it.
+        """
+        ...
 
 
 class Solved(Protocol):

@@ -422,27 +422,3 @@ class Remembering(Protocol):
             history: that is asked about.
         """
         ...
-
-
-@runtime_checkable
-class Lagging(Protocol):
-    """Ability of a system: its energy holds something that is taken from a state before, such as normal forces."""
-
-    @property
-    def lags(self) -> bool:
-        """Does it, in this model?"""
-        ...
-
-    def lag_back(self) -> None:
-        """Take it from the state that was accepted last."""
-        ...
-
-    def lag(self, q: Array, lam: float, settled: float) -> bool:
-        """Take it from a state, unless it changes by less than a part of `settled`; whether it has changed.
-
-        Args:
-            q: (n,) unknowns.
-            lam: load parameter of the step, 0 to 1.
-            settled: largest change, in parts of it.
-        """
-        ...

@@ -93,6 +93,24 @@ def test_pushed_between_plates() -> None:
     assert used == pytest.approx(2.0 * MU * -ends[1].contact_forces["upper"][2] * 1.0, rel=0.02)
 
 
+@pytest.mark.parametrize("rounds", [12, 0])
+def test_friction_that_has_not_settled_is_told_also_by_a_path_from_its_file(
+    rounds: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bh.solvers.lagging.LAGS", rounds)
+    model = bh.Model(MESH, SHEET, contact=False, friction=MU).spring("all", total=(SPRING, SPRING, 1e-3))
+    model = model.step(plate("bar"), bh.Force("all", total=(0.0, 0.0, -WEIGHT)))
+    model = model.step(plate("bar"), bh.Force("all", total=(2.0 * MU * WEIGHT, 0.0, -3.0 * WEIGHT)))
+    path = bh.trace(model)
+    path.save(tmp_path / "path.bh")
+    for told in (path, bh.Path.load(tmp_path / "path.bh")):
+        assert told.reached
+        found = [line for line in told.remarks if "friction had not settled" in line]
+        assert len(found) == (0 if rounds else 2)
+    if not rounds:
+        assert "step 2: friction had not settled after 12 rounds in" in found[1]
+
+
 def capstan(mu: float) -> float:
     """Force of the pulled end over that of the other, round half a turn of a drum."""
     R, hold, gap, soft = 5.0, 0.2, 0.02, 1e-3

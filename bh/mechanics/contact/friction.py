@@ -25,7 +25,9 @@ from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 ROW = 16  # numbers of a contact in what is remembered: kind and nodes, s, normal, force, weights
-HEAD = 4  # numbers before the positions: energies by forces of ends and by means, lambda
+HEAD = (
+    4  # numbers before the positions: energies by forces of ends and by means, lambda, what had not settled
+)
 TINY = 1e-300
 
 
@@ -102,6 +104,7 @@ class Friction:
         self._used = self._told = dissipated  # by the forces of ends of increments, and by their means
         self._before = np.zeros((0, 3))  # places of the state that was accepted last
         self._kept = self._now = Rubbing.none()
+        self._change: tuple[Array, float, float] | None = None  # where it was looked at last, and what it was
 
     def begin(self, x: Array, lam: float) -> None:
         """Begin at a state in which nothing is stuck.
@@ -125,31 +128,35 @@ class Friction:
 
     def back(self) -> None:
         """Take the normal forces of the state that was accepted last."""
-        self._now = self._kept
+        self._now, self._change = self._kept, None
 
-    def renew(self, x: Array, lam: float) -> float:
-        """Take the normal forces of a state; returns by how much the forces of friction change, in parts of them.
+    def renew(self, x: Array, lam: float, settled: float) -> bool:
+        """Take the normal forces of a state unless they change those of friction by less; whether they were taken.
 
         Args:
             x: (nodes, 3) positions of the sheet, mm.
             lam: load parameter of the step, 0 to 1.
+            settled: largest change that is nothing, in parts of the forces of friction.
         """
-        old, new = self._now, self._found(x, lam)
-        places = self._places(x, lam)
-        was, will = self._pushes(old, places), self._pushes(new, places)
+        new = self._found(x, lam)
+        change = self._changed(new, self._places(x, lam))
+        if change > settled:
+            self._now, self._change = new, None
+            return True
+        self._change = (x.copy(), lam, change)
+        return False
+
+    def _changed(self, new: Rubbing, places: Array) -> float:
+        """By how much the forces of friction change if these contacts are taken, in parts of them."""
+        was, will = self._pushes(self._now, places), self._pushes(new, places)
         size = max(float(np.linalg.norm(was)), float(np.linalg.norm(will)))
-        change = float(np.linalg.norm(will - was)) / size if size > TINY else 0.0
-        self._now = new
-        return change
+        return float(np.linalg.norm(will - was)) / size if size > TINY else 0.0
 
-    def keep(self, renewed: Rubbing) -> None:
-        """Go back to normal forces that were there before (`now`)."""
-        self._now = renewed
-
-    @property
-    def now(self) -> Rubbing:
-        """The contacts with the normal forces that hold."""
-        return self._now
+    def _change_at(self, x: Array, lam: float) -> float:
+        """The same with the normal forces of a state, which are not taken; looked at once."""
+        if self._change is not None and self._change[1] == lam and np.array_equal(self._change[0], x):
+            return self._change[2]
+        return self._changed(self._found(x, lam), self._places(x, lam))
 
     # ------------------------------------------------------------------------------- energy and its derivatives
 
@@ -257,7 +264,7 @@ class Friction:
     # ------------------------------------------------------------------------------- what is remembered
 
     def history_at(self, x: Array, lam: float) -> Array:
-        """(k, 2) what is remembered where a state is accepted: energy, lambda, positions and contacts.
+        """(k, 2) what is remembered where a state is accepted: energy, lambda, what has not settled, places, contacts.
 
         Args:
             x: (nodes, 3) positions of the sheet, mm.
@@ -269,7 +276,9 @@ class Friction:
         lost = self._potential(y) - self._potential(np.minimum(y, self._slip))
         rows = np.hstack((rubbing.keys, stuck, rubbing.normals, rubbing.force[:, None], rubbing.weights))
         used, told = self._used + float(rubbing.force @ lost), self._told + self._lost(y)
-        flat = np.concatenate(([used, lam, told, 0.0], x.ravel(), np.zeros(x.size % 2), rows.ravel()))
+        flat = np.concatenate(
+            ([used, lam, told, self._change_at(x, lam)], x.ravel(), np.zeros(x.size % 2), rows.ravel())
+        )
         return flat.reshape(-1, 2)
 
     def fits(self, history: Array, nodes: int) -> bool:
@@ -289,6 +298,15 @@ class Friction:
         )
 
     @staticmethod
+    def unsettled(history: Array) -> float:
+        """By how much the forces of friction still changed where a state was accepted, in parts of them.
+
+        Args:
+            history: (k, 2) of that state, as `history_at` gives it.
+        """
+        return float(history.ravel()[3])
+
+    @staticmethod
     def _head(nodes: int) -> int:
         return HEAD + 3 * nodes + (3 * nodes) % 2
 
@@ -304,4 +322,5 @@ class Friction:
         self._used, lam, self._told = (float(each) for each in flat[:3])
         self._before = self._places(flat[HEAD : HEAD + 3 * nodes].reshape(-1, 3), lam)
         keys, stuck, normals, force, weights = np.split(rows, [5, 8, 11, 12], axis=1)
+        self._change = None
         self._kept = self._now = Rubbing(keys.astype(np.int64), weights, normals, force[:, 0], stuck)

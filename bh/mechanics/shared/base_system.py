@@ -165,6 +165,15 @@ class SupportedSheet(PressedSheet):
             self._kept = history[count:]
             self.friction.remember(self._kept, len(self.mesh.points))
 
+    def unsettled(self, history: Array) -> float:
+        """By how much forces of friction still changed where a state was accepted (`bh.solvers.lagging.Lagging`).
+
+        Args:
+            history: (k, 2) of that state.
+        """
+        count = len(self._turned)
+        return 0.0 if self.friction is None else self.friction.unsettled(history[count:])
+
     def takes(self, history: Array) -> bool:
         """Can a history (k, 2) from a file be one of this system?
 

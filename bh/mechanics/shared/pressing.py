@@ -34,7 +34,7 @@ SLIP = 0.01  # of the thickness: slip up to which a contact sticks
 
 
 class PressedSheet(InTheWay):
-    """Contact of a sheet in one step; see `bh.solvers.system.Hindered` and `bh.solvers.system.Lagging`."""
+    """Contact of a sheet in one step; see `bh.solvers.system.Hindered` and `bh.solvers.lagging.Lagging`."""
 
     mesh: SheetMesh
     displacements: Displacements
@@ -267,7 +267,7 @@ class PressedSheet(InTheWay):
 
     @property
     def lags(self) -> bool:
-        """Is there something that is taken from states before (`bh.solvers.system.Lagging`)?"""
+        """Is there something that is taken from states before (`bh.solvers.lagging.Lagging`)?"""
         return self.friction is not None
 
     def lag_back(self) -> None:
@@ -283,10 +283,4 @@ class PressedSheet(InTheWay):
             lam: load parameter of the step, 0 to 1.
             settled: largest change, in parts of it.
         """
-        if self.friction is None:
-            return False
-        before = self.friction.now
-        if self.friction.renew(self.near(q, lam), lam) > settled:
-            return True
-        self.friction.keep(before)
-        return False
+        return self.friction is not None and self.friction.renew(self.near(q, lam), lam, settled)
