@@ -96,12 +96,7 @@ class Opened:
             return
         ready.set()
         await self._stop.wait()
-        server.stop()
-        for window in list(self._studio.windows):
-            window.close()
-            window.on_close()
-        await server.close_all_connections()
-        self._studio.pool.shutdown(wait=False, cancel_futures=True)
+        await self._studio.close(server)
 
     def _repr_html_(self) -> str:
         """The frame that a notebook shows."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import secrets
 import threading
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -16,6 +17,7 @@ import tornado.web
 import tornado.websocket
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
+from tornado.websocket import WebSocketClosedError
 
 from bh.errors import InputError
 from bh.runtime.memory import give_back
@@ -49,6 +51,7 @@ class Studio:
         token: that an address must have.
         sheet: that a new window begins with; None for a pattern of the library.
         windows: that are open.
+        tasks: of all windows that are at work, also of those that were just closed.
     """
 
     def __init__(self, sheet: LiveSheet | None = None) -> None:
@@ -56,6 +59,7 @@ class Studio:
         self.token = secrets.token_urlsafe(16)
         self.sheet = sheet
         self.windows: dict[Window, None] = {}  # in the order in which they were opened
+        self.tasks: set[asyncio.Task[None]] = set()
         self.pool = ThreadPoolExecutor(2 * WINDOWS, thread_name_prefix="bh-studio")
 
     def application(self) -> tornado.web.Application:
@@ -91,6 +95,20 @@ class Studio:
         server = HTTPServer(self.application(), max_body_size=LONGEST_REQUEST)
         server.add_sockets(sockets)
         return server, f"http://{HOST}:{sockets[0].getsockname()[1]}/?token={self.token}"
+
+    async def close(self, server: HTTPServer) -> None:
+        """End the server, its windows and their work, which is waited for.
+
+        Args:
+            server: of `serve`.
+        """
+        server.stop()
+        for window in list(self.windows):
+            window.close()
+            window.on_close()
+        await server.close_all_connections()
+        await asyncio.gather(*self.tasks, return_exceptions=True)
+        self.pool.shutdown(wait=False, cancel_futures=True)
 
 
 class Page(tornado.web.RequestHandler):
@@ -131,8 +149,7 @@ class Window(tornado.websocket.WebSocketHandler):
         self.desk: Desk | None = None
         self.queue: asyncio.Queue[str | bytes] = asyncio.Queue()
         self.drawn = asyncio.Event()  # the last frame was shown
-        self.work: asyncio.Task[None] | None = None
-        self.finer: asyncio.Task[None] | None = None
+        self.tasks: set[asyncio.Task[None]] = set()
         self.heard = 0  # messages
         self.going = threading.Event()  # nobody has asked for anything since the finer mesh was begun
 
@@ -157,7 +174,7 @@ class Window(tornado.websocket.WebSocketHandler):
         """
         self.studio.windows[self] = None
         self.drawn.set()
-        self.work = asyncio.create_task(self._work())
+        self._begin(self._work())
 
     def on_message(self, message: str | bytes) -> None:
         """A frame was drawn, or something is asked."""
@@ -172,11 +189,22 @@ class Window(tornado.websocket.WebSocketHandler):
         """Give everything back."""
         self.studio.windows.pop(self, None)
         self.going.clear()
-        for task in (self.work, self.finer):
-            if task is not None:
-                task.cancel()
+        for task in self.tasks:
+            task.cancel()
         self.desk = None
         give_back()
+
+    def _begin(self, work: Coroutine[None, None, None]) -> None:
+        """A task that ends with the window, and that the server waits for when it ends."""
+
+        async def told() -> None:
+            with contextlib.suppress(WebSocketClosedError):  # nobody is there to be told
+                await work
+
+        task = asyncio.create_task(told())
+        for known in (self.tasks, self.studio.tasks):
+            known.add(task)
+            task.add_done_callback(known.discard)
 
     async def _work(self) -> None:
         run = asyncio.get_running_loop().run_in_executor
@@ -191,7 +219,7 @@ class Window(tornado.websocket.WebSocketHandler):
                 if self.queue.empty():
                     self.going = threading.Event()  # its own, so that one that was ended stays so
                     self.going.set()
-                    self.finer = asyncio.create_task(self._refine(desk, self.going))
+                    self._begin(self._refine(desk, self.going))
                 waiting = [await self.queue.get()]
                 while not self.queue.empty():
                     waiting.append(self.queue.get_nowait())
@@ -308,7 +336,6 @@ def open_window(sheet: LiveSheet | None = None, port: int = 0, browser: bool = T
         try:
             await asyncio.Event().wait()
         finally:
-            server.stop()
-            studio.pool.shutdown(wait=False, cancel_futures=True)
+            await studio.close(server)
 
     asyncio.run(run())

@@ -335,8 +335,7 @@ def talk(with_studio: Talk) -> None:
         try:
             await asyncio.wait_for(with_studio(studio, address), 60.0)
         finally:
-            site.stop()
-            studio.pool.shutdown(wait=False, cancel_futures=True)
+            await studio.close(site)
 
     asyncio.run(run())
 
@@ -398,6 +397,32 @@ def test_windows_have_sheets_of_their_own_and_give_them_back() -> None:
             await asyncio.sleep(0.01)
 
     talk(visit)
+
+
+def test_a_server_that_ends_waits_for_what_its_windows_are_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Finer meshes are waited for by two tasks when the server ends: none is left behind, cancelled or not."""
+    monkeypatch.setattr(server, "QUIET", 60.0)
+    left: list[asyncio.Task[Any]] = []
+
+    async def visit() -> None:
+        studio = Studio()
+        site, address = studio.serve()
+        window = await tornado.websocket.websocket_connect(
+            address.replace("http", "ws").replace("/?", "/socket?")
+        )
+        for count in (2, 3):  # the work, and one more each time that waits to refine
+            await window.write_message(json.dumps({"do": "colour", "by": "none"}))
+            while len(studio.tasks) < count:
+                await window.write_message("drawn")
+                await asyncio.sleep(0.02)
+        began = set(studio.tasks)
+        await studio.close(site)
+        left.extend(task for task in began if not task.done())
+        assert not studio.tasks
+        window.close()
+
+    asyncio.run(asyncio.wait_for(visit(), 30.0))
+    assert left == []
 
 
 def test_a_sheet_that_breaks_takes_its_own_session_down_only(monkeypatch: pytest.MonkeyPatch) -> None:

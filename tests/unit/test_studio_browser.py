@@ -14,6 +14,7 @@ import pytest
 
 import bh
 from bh.scene.load import load_scene
+from bh.studio import server
 from bh.studio.opening import Opened
 from bh.studio.server import Studio
 from bh.studio.sheets import of_library
@@ -38,8 +39,7 @@ def address() -> Iterator[str]:
         try:
             await asyncio.Event().wait()
         finally:
-            site.stop()
-            studio.pool.shutdown(wait=False, cancel_futures=True)
+            await studio.close(site)
 
     def run() -> None:
         asyncio.set_event_loop(loop)
@@ -73,8 +73,13 @@ class Visit:
         self.page.on("console", lambda message: self.told.append(f"{message.type}: {message.text}"))
         self.page.on("pageerror", lambda error: self.told.append(f"error: {error}"))
         self.page.on("request", lambda request: self.asked.append(request.url))
+        self.finer = 0  # finer meshes that came
+        self.page.on("websocket", lambda socket: socket.on("framereceived", self._heard))
         self.page.goto(address)
         self.page.wait_for_function("window.studio?.head")
+
+    def _heard(self, frame: str | bytes) -> None:
+        self.finer += isinstance(frame, bytes) and b'"mesh": {' in frame[:500]
 
     def rests(self, condition: str = "true") -> None:
         """Wait until the sheet is in equilibrium with what is asked, and a condition on `head` holds."""
@@ -172,6 +177,51 @@ def test_two_points_are_pinched_by_a_stroke_a_jaw_and_a_slider(window: Visit) ->
     window.rests(f"head.pinches[0].gap < {closed['gap']}")
     page.locator("#let-go").click()
     window.rests("head.pinches.length === 0 && Object.keys(head.forces).length === 0")
+    assert window.told == []
+
+
+def test_a_finer_mesh_that_comes_during_a_stroke_is_put_off(
+    window: Visit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a hand points at stays the mesh that it took hold of, so that no stroke is lost."""
+    monkeypatch.setattr(server, "QUIET", 1.5)  # long enough for the button to be down
+    page, before = window.page, window.finer
+    page.locator("#percent").fill("35")
+    window.rests("Object.values(head.asked)[0] > 1")
+    page.locator("#hand-pinch").check()
+    (x, y), (u, v) = (page.evaluate(f"studio.place({node})") for node in (12, 165))
+    page.mouse.move(x + 0.04 * (u - x), y + 0.04 * (v - y))
+    page.mouse.down()
+    for _ in range(PATIENCE // 100):
+        page.wait_for_timeout(100)
+        if window.finer > before:
+            break
+    assert window.finer > before
+    assert not page.evaluate("studio.refined")
+    page.mouse.move(x + 0.96 * (u - x), y + 0.96 * (v - y), steps=3)
+    page.mouse.up()
+    window.rests("head.pinches.length === 1")
+    pinch = page.evaluate("studio.head.pinches[0]")
+    assert pinch["a"] == 12
+    ends = [page.evaluate(f"studio.place({node})") for node in (pinch["b"], 165)]
+    assert np.linalg.norm(np.subtract(*ends)) < 60.0  # pixels: the end of the stroke, or its neighbour
+    assert window.told == []
+
+
+def test_the_sheet_that_is_turned_is_seen_refined_again(window: Visit) -> None:
+    """A hand beside the sheet asks for nothing: when it lets go, the finer mesh that is there is shown."""
+    page = window.page
+    page.locator("#percent").fill("30")
+    page.wait_for_function("studio.refined && Object.values(studio.head.asked)[0] > 0.5")
+    box = page.locator("#folded").bounding_box()
+    before = page.evaluate("studio.place(12)")
+    page.mouse.move(box["x"] + 8, box["y"] + 8)
+    page.mouse.down()
+    assert not page.evaluate("studio.refined")
+    page.mouse.move(box["x"] + 60, box["y"] + 30, steps=3)
+    page.mouse.up()
+    assert page.evaluate("studio.refined")
+    assert np.linalg.norm(np.subtract(page.evaluate("studio.place(12)"), before)) > 5.0  # pixels: it was turned
     assert window.told == []
 
 

@@ -4,11 +4,12 @@ import { lay, move } from "./view.js";
 import { scale } from "./panel.js";
 
 let shown = false, said = "", coarse = null;
+let held = false, last = null; // a hand is on the sheet; the newest finer frame, which it has put off
 
 // A frame of the coarse mesh: what is seen from now on.
 export function seenCoarse(values) {
   if (shown) lay(now.sheet);
-  coarse = values; shown = false; said = "";
+  coarse = values; shown = false; said = ""; last = null;
 }
 
 // Back to the coarse mesh at once: a point is taken, or a slider moved.
@@ -19,8 +20,15 @@ export function back() {
 }
 whenAsked(back);
 
+// A hand is on the folded sheet, or off it: what it points at must not become another mesh meanwhile.
+export function hand(on) {
+  held = on;
+  if (on) back(); else if (last) finer(...last);
+}
+
 export function finer(head, floats) {
-  if (!now.head?.rest || head.heard !== asked) return;
+  last = now.head?.rest && head.heard === asked ? [head, floats] : null;
+  if (!last || held) return;
   const error = head.error === null ? "" : `, energy within about ${number(100 * head.error, 2)} %`;
   said = head.mesh ? `refined: ${head.mesh.triangles.length / 3} triangles${error}` : "in equilibrium, on this mesh";
   now.error = head.error === null ? `not known: ${head.reason}` : `${number(100 * head.error, 2)} %${head.reason ? `; ${head.reason}` : ""}`;

@@ -24,11 +24,15 @@ function under(event) {
 }
 export const take = (which) => { taken[which] ??= Array.from(now.points.subarray(3 * which, 3 * which + 3)); };
 
-// `begin` is called before the sheet is looked for under the pointer, `took` when a point was taken.
-export function pulls(begin, took) {
+// `hand` is told when a pointer is on the picture and when none is left; `took` is called when a point was taken.
+export function pulls(hand, took) {
+  const down = new Set();
+  const up = (event) => { if (down.delete(event.pointerId) && !down.size) hand(false); };
+  for (const end of ["pointerup", "pointercancel"]) addEventListener(end, up); // behind what the picture does with it
   renderer.domElement.addEventListener("pointerdown", (event) => {
     if (!now.sheet || event.button !== 0 || event.defaultPrevented) return;
-    begin();
+    down.add(event.pointerId);
+    hand(true);
     if (pinch.taken(event)) { hold(event); took(); return; }
     const found = under(event);
     if (found === null) return;

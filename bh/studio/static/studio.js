@@ -3,7 +3,7 @@ import { $, ask, connect, drawn, now, save, tell } from "./common.js";
 import { draw, fit, lay, move, seen, vector } from "./view.js";
 import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
-import { back, badge, finer, refined, seenCoarse } from "./finer.js";
+import { badge, finer, hand, refined, seenCoarse } from "./finer.js";
 import { history, numbers, panel, slider } from "./panel.js";
 import { remember, saveFilm, savePicture } from "./record.js";
 
@@ -41,7 +41,7 @@ function frame(buffer) {
 
 // ---------------------------------------------------------------- what is clicked
 
-pulls(back, () => { history.force = []; });
+pulls(hand, () => { history.force = []; });
 $("percent").oninput = (e) => ask({ do: "percent", value: Number(e.target.value) });
 $("undo").onclick = () => ask({ do: "undo" });
 $("redo").onclick = () => ask({ do: "redo" });
