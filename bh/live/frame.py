@@ -28,6 +28,7 @@ class Frame:
         iterations: of Newton's method in all so far.
         seconds: that the update took.
         fading: what has pulled until now still does, a part of it, or jaws do not press alike yet.
+        looked: whether the state's stability has been looked at, which one that is passed on the way is not.
     """
 
     state: State
@@ -39,10 +40,16 @@ class Frame:
     iterations: int
     seconds: float
     fading: bool = False
+    looked: bool = True
 
     @property
     def at_rest(self) -> bool:
-        """Whether this is the equilibrium of what is wanted."""
+        """Whether this is the equilibrium of what is wanted, and a stable one."""
+        return self.arrived and self.looked
+
+    @property
+    def arrived(self) -> bool:
+        """Whether this is the equilibrium of what is wanted; its stability may not have been looked at."""
         return self.controls == self.wanted and not self.fading
 
     @property

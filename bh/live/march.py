@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.live.keeping import kept_steps
 from bh.solvers.load_control import LoadControl, jump
-from bh.solvers.modes import lowest_mode
-from bh.solvers.newton import Solution
+from bh.solvers.modes import count_negative, lowest_mode
+from bh.solvers.newton import Newton, Solution
 from bh.solvers.points import Point, extrapolate, point
 from bh.solvers.settling import Settling
 from bh.solvers.system import System
@@ -36,6 +37,7 @@ class March:
         snapped: the newest state lies on another branch than the one before.
         stuck: why it cannot go on, or an empty string.
         iterations: so far.
+        unseen: whether the newest state is stable was not looked at; tangents on its way there were positive definite.
     """
 
     system: System
@@ -46,11 +48,12 @@ class March:
     snapped: bool = False
     stuck: str = ""
     iterations: int = 0
+    unseen: bool = False
 
     def __post_init__(self) -> None:
         """Nothing is under way."""
         self._newton = replace(self.settings.newton, hasty=True, transient=None)
-        self._run: Generator[Array, None, None] | None = None
+        self._run: Generator[Array, None, object] | None = None
         self._increment = self.settings.limits(self.system)[0] if self.system.rotation > 0.0 else 1.0
 
     @property
@@ -76,6 +79,37 @@ class March:
             self._run = None
         return True
 
+    def look(self) -> bool:
+        """Look at the stability of the newest state, or go on from an unstable one; False where that was seen."""
+        if self._run is None:
+            if not self.unseen or self.stuck:
+                return False
+            self._run = self._look()
+        return self.advance()
+
+    def _look(self) -> Generator[Array, None, bool]:
+        """Count negative modes of the newest state; from an unstable one downhill, or stuck. Whether it has moved."""
+        here = self.here
+        evaluation = self.system.evaluate(here.q, here.lam)
+        negative = count_negative(self.system.tangent(here.q, here.lam, evaluation.forces).matrix)
+        self.points[-1] = replace(here, negative=negative)
+        if not negative:
+            self.unseen = False
+            return False
+        saddle = Solution(here.q, evaluation, 0, True, negative=negative)
+        found = yield from self._downhill(saddle, here.lam)
+        passed = self.system.penetration(here.q, here.lam, found.q, here.lam)
+        if found is saddle or passed:
+            if self.settles and (yield from self._to_rest(here.lam)):
+                return True
+            self.stuck = passed or "no stable state was found nearby"
+            return False
+        self.points = [
+            point(self.system, found.q, here.lam, evaluation=found.evaluation, negative=found.negative)
+        ]
+        self.snapped, self.unseen = True, False
+        return True
+
     def _go(self) -> Generator[Array, None, None]:
         """One accepted state further, or stuck."""
         size, cuts = self._increment, 0
@@ -86,7 +120,7 @@ class March:
                 return
             lam = self.target if abs(left) <= size else here.lam + float(np.copysign(size, left))
             free = size < SMALLEST * self.settings.limits(self.system)[0]
-            found = yield from self._solve(lam, patient=cuts >= self.settings.brisk or free)
+            found = yield from self._solve(lam, quick=not cuts, patient=cuts >= self.settings.brisk or free)
             reason = found.reason if not found.converged else ""
             left_saddle = False
             if found.converged and found.stable is False:
@@ -106,11 +140,13 @@ class March:
                         free and bool(jump(self.system, here, there, self.settings.work_mismatch))
                     )
                     before = [] if self.snapped else [at for at in self.points[-2:] if at.lam != lam]
-                    self.points = [*before, there]
+                    self.points, self.unseen = [*before, there], found.negative is None
                     self._increment = min(
                         self.settings.limits(self.system)[1], 2.0 * size if not cuts else size
                     )
                     return
+            if self.unseen and ((yield from self._look()) or self.stuck):  # it had become unstable unseen
+                return
             if free or (self.settles and cuts == BRISK):
                 far = min(abs(self.target - here.lam), BOLD * self.settings.limits(self.system)[0])
                 if (yield from self._to_rest(here.lam + float(np.copysign(far, left)))):
@@ -126,13 +162,18 @@ class March:
         if not found.converged or found.stable is False:
             return False
         self.points = [point(self.system, found.q, lam, evaluation=found.evaluation, negative=found.negative)]
+        self.unseen = False
         self.snapped, self._increment = True, self.settings.limits(self.system)[0]
         return True
 
-    def _solve(self, lam: float, patient: bool) -> Generator[Array, None, Solution]:
-        """A state at `lam` near the last ones; `patient` goes downhill where full steps do not converge."""
+    def _solve(self, lam: float, quick: bool, patient: bool) -> Generator[Array, None, Solution]:
+        """A state at `lam` near the last ones; `patient` goes downhill where full steps do not converge.
+
+        One that was found by `quick` steps is not looked at for stability.
+        """
         q, forces = extrapolate(self.points, lam)
-        found = yield from self._newton.full_steps(self.system, q, lam, forces)
+        full = kept_steps if quick else Newton.full_steps
+        found = yield from full(self._newton, self.system, q, lam, forces)
         if found.converged or not patient:
             return found
         found = yield from self._newton.globalised_steps(self.system, q, lam)

@@ -87,6 +87,7 @@ class Session:
         self._iterations = 0
         self._stable: bool | None = True
         self._left = False
+        self._seen: tuple[Array, State] | None = None  # the newest state, and the unknowns that it belongs to
         self._under = self._begin(Way(self._wanted, self._wanted), None)
 
     # ------------------------------------------------------------------------------- what a hand does
@@ -233,7 +234,8 @@ class Session:
             budget: s of wall time, one iteration at least; 0 for no work.
 
         Returns:
-            a frame; `at_rest` says whether it is that of what is wanted.
+            a frame; `at_rest` says whether it is that of what is wanted. Whether a state is stable is looked at once
+            nothing else is wanted, by the next update: the frame is there before.
         """
         began = time.perf_counter()
         snapped = False
@@ -241,8 +243,9 @@ class Session:
             self._aim()
             march = self._under.march
             going = budget > 0.0  # one iteration at least, however little time there is
-            while going and self._busy():
-                march = self._under.march
+            worked = False
+            while going and (self._busy() or (not worked and self._under.march.look())):
+                worked, march = True, self._under.march
                 snapped = snapped or march.snapped
                 going = time.perf_counter() - began < budget
             snapped = snapped or march.snapped
@@ -263,7 +266,10 @@ class Session:
         ends = time.perf_counter() + most
         frame = self.update(most)
         while not frame.at_rest and not frame.note and time.perf_counter() < ends:
+            before = frame
             frame = self.update(ends - time.perf_counter())
+            seconds = before.seconds + frame.seconds
+            frame = replace(frame, snapped=before.snapped or frame.snapped, seconds=seconds)
         return frame
 
     def imbalance(self) -> float:
@@ -378,6 +384,7 @@ class Session:
         system = self._formulation.system(self.model, load, state)
         q = system.start()
         march = March(system, [point(system, q, 0.0)], 0.0, self._settings, self._settles)
+        march.unseen = state is not None and self._under.march.unseen
         under = _Under(way, load, system, march)
         if load.force.start.any():
             march.target = 1.0
@@ -394,8 +401,13 @@ class Session:
 
     def _state(self) -> State:
         under, here = self._under, self._under.march.here
-        stable = True if here.negative is None else here.negative == 0
-        return self._formulation.observe(self.model, under.system, here.q, here.lam, 0, stable)
+        stable = None if under.march.unseen and here.negative is None else here.negative in (None, 0)
+        if self._seen is None or self._seen[0] is not here.q:
+            state = self._formulation.observe(self.model, under.system, here.q, here.lam, 0, stable)
+            self._seen = here.q, state
+        elif self._seen[1].stable is not stable:
+            self._seen = here.q, replace(self._seen[1], stable=stable)
+        return self._seen[1]
 
     def _forces(self, now: Controls, state: State) -> dict[int, Vector]:
         found: dict[int, Vector] = {}
@@ -418,6 +430,7 @@ class Session:
             iterations,
             seconds,
             self._fading() or uneven,
+            not self._under.march.unseen,
         )
 
     def __repr__(self) -> str:
