@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from bh import trace
-from verification.studies.solver.cones import BACK, STAGES, cone_model, disc_mesh, elevations
+from verification.studies.solver.cones import (
+    BACK,
+    OCTAVES,
+    STAGES,
+    cone_model,
+    disc_mesh,
+    elevations,
+    of_octave,
+    small_hole,
+)
 from verification.theory.creased_cone import cone_state, small
 
 
@@ -36,6 +45,17 @@ def test_discs_of_two_holes_are_the_same_but_for_an_octave() -> None:
     assert len(small_.points) - len(large.points) == 2 * around
     assert small_.points[2 * around :] == pytest.approx(large.points)
     assert small_.points[: len(large.points)] == pytest.approx(0.5 * large.points)
+
+
+def test_limits_of_small_holes() -> None:
+    """Values and energies that go as the law of holes says give its limits; those that do not settle give none."""
+    seen = [26.0 - 21.0 / (octaves - 2.4) for octaves in OCTAVES]
+    limit, offset = small_hole(seen)
+    assert (limit, offset) == pytest.approx((26.0, 2.4))
+    energies = [1.145 * octaves * math.log(2.0) - 0.3 - 0.8 / (octaves - 2.4) for octaves in OCTAVES]
+    assert of_octave(energies, offset) == pytest.approx(1.145)
+    assert not np.isfinite(small_hole([20.0, 21.0, 22.5])).any()
+    assert not np.isfinite(of_octave(energies, small_hole([20.0, math.nan, 22.5])[1]))
 
 
 @pytest.mark.slow

@@ -3,15 +3,24 @@
 An isometric cone cannot be pushed through to its other state (the two are apart in the space of such shapes), and a
 push that stretches the sheet crushed small holes (decision 140). Here creases lead: folded down, the four creases make
 the cone of the other sign; then two and two are folded up, and since the sheet is a cone of that sign all the way, it
-ends in the other state. Half-way, with two creases flat, it is the snapped state of two creases. A disc has a hole;
-what the hole costs is the same for any, so energies of two holes, one half as large, are apart by that of one octave of
-a cone, which has a closed form (`verification.theory.creased_cone`).
+ends in the other state. Half-way, with two creases flat, it is the snapped state of two creases.
+
+A disc has a hole, and generators are straight from the hole to the rim, so what the sheet saves at the hole bends it
+all over. With s whatever tells shapes apart, L = ln(R / r0), e an energy of the cone and c one of the hole,
+
+    E(s) = L e(s) + c(s),    s0 where e' = 0:
+    s = s0 - c' / (L e'' + c'') = s0 - a / (L - L0),    E = L e(s0) + c(s0) - K / (L - L0).
+
+So elevations come to those of the closed form as 1 / L, and energies of an octave as 1 / L^2: with a hole of 2^-10 of
+the rim they are 2 degrees and 1 % away. Three holes give s0, a and L0 (`small_hole`), and e(s0) with the same L0
+(`of_octave`). The closed form is in `verification.theory.creased_cone`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,14 +38,17 @@ SOURCE = (
     "verification.theory.creased_cone"
 )
 RIM = 100.0  # mm
-OCTAVES = (9, 10)  # the holes are 2^-9 and 2^-10 of the rim
+OCTAVES = (6, 8, 10)  # the holes are 2^-6, 2^-8 and 2^-10 of the rim
+BEYOND = 12  # the hole whose elevations the others foretell, on the coarsest mesh
 CREASES = 4
 PSI = math.radians(60.0)  # fold angle
 THIN = 60.0  # radius of the hole over the thickness
 LEVELS = ((4, 2), (6, 3), (8, 4))  # cells of half a panel around, and of an octave outwards
-SHELL = (4, 2)
+SHELL = ((6, 3), (8, 4))  # with 4 x 2 its energies are 4 to 8 % high where the sheet is thin to its cells
 # Relative, and degrees: those that were set before the first run of discs, whose second state was not had
 ENERGY, ELEVATION = 0.01, 0.5
+FORESEEN = 0.1  # degrees
+ENERGY_OF = "energy of an octave of the cone over B ln 2"
 REST_BACK = "energy at rest, come back to from the other state, over that before"
 
 
@@ -114,7 +126,7 @@ def disc_mesh(octaves: int, half: int, octave: int) -> SheetMesh:
     )
 
 
-def cone_model(octaves: int, formulation: str, half: int, octave: int) -> Model:
+def cone_model(octaves: int, formulation: str, half: int, octave: int, back: bool = True) -> Model:
     """A free disc: all creases down, 1 and 3 up, 2 and 4 flat and up; then back, 1 and 3 first.
 
     Args:
@@ -122,10 +134,12 @@ def cone_model(octaves: int, formulation: str, half: int, octave: int) -> Model:
         formulation: by name.
         half: cells around in half a panel.
         octave: cells outwards in which radii double.
+        back: whether it comes back.
     """
     sheet = Sheet(E=4000.0, nu=0.0, t=RIM * 2.0**-octaves / THIN)
     model = Model(disc_mesh(octaves, half, octave), sheet, formulation=formulation, contact=False)
-    for odd, even in ((-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)):
+    ways = ((-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0))
+    for odd, even in ways if back else ways[: STAGES[-1].step + 1]:
         folds = [Fold(f"ray-{i + 1}", to=math.pi - PSI * (even if i % 2 else odd)) for i in range(CREASES)]
         model = model.step(*folds)
     return model
@@ -152,8 +166,70 @@ def elevations(state: State, creases: int) -> tuple[float, float]:
     return float(rise[turn == panel // 2].mean()), float(rise[turn == 0].mean())
 
 
+def small_hole(values: Sequence[float]) -> tuple[float, float]:
+    """(s0, L0 in octaves) of s = s0 - a / (L - L0), from a value with each hole of `OCTAVES`; nan where none fits."""
+    large, middle, small = values
+    first, ratio = OCTAVES[0], (middle - large) / (small - middle)
+    if not ratio > 1.0:  # not slower and slower; also where a value is nan
+        return math.nan, math.nan
+    offset = (ratio * first - OCTAVES[-1]) / (ratio - 1.0)
+    here, last = OCTAVES[1] - offset, OCTAVES[-1] - offset
+    return small + (small - middle) * here / (last - here), offset
+
+
+def of_octave(energies: Sequence[float], offset: float) -> float:
+    """e(s0) of E = L e(s0) + c - K / (L - L0), over ln 2.
+
+    Args:
+        energies: over B, with each hole of `OCTAVES`.
+        offset: L0, octaves.
+    """
+    at = np.array(OCTAVES, dtype=float)
+    columns = np.column_stack((at * math.log(2.0), np.ones(3), -1.0 / (at - offset)))
+    return float(np.linalg.solve(columns, np.asarray(energies))[0]) if math.isfinite(offset) else math.nan
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A mesh: the path with each hole of `OCTAVES`."""
+
+    formulation: str
+    mesh: tuple[int, int]
+    paths: tuple[Path, ...]
+
+    def elevations(self, stage: Stage) -> list[tuple[float, float]]:
+        """With each hole, degrees; nan where a path did not get there."""
+        ends = [_end(path, stage.step) for path in self.paths]
+        return [(math.nan, math.nan) if end is None else elevations(end, stage.creases) for end in ends]
+
+    @property
+    def cost(self) -> Cost:
+        """Of all holes."""
+        return Cost(
+            unknowns=self.paths[-1].unknowns,
+            iterations=sum(path.iterations for path in self.paths),
+            wall_time_s=sum(path.wall_time_s for path in self.paths),
+        )
+
+
+def solved(formulation: str, mesh: tuple[int, int], back: bool = False) -> Disc:
+    """A mesh with each hole; with the smallest one it comes back, if asked."""
+    return Disc(
+        formulation,
+        mesh,
+        tuple(
+            trace(
+                cone_model(octaves, formulation, *mesh, back=back and octaves == OCTAVES[-1]),
+                warn=False,
+                neighbours=False,
+            )
+            for octaves in OCTAVES
+        ),
+    )
+
+
 def run(context: Context) -> CaseResult:
-    """Both holes on every mesh, and by the shell."""
+    """All holes on every mesh, and by the shell."""
     result = CaseResult(
         name=CASE,
         title="A creased disc and its two states",
@@ -161,26 +237,29 @@ def run(context: Context) -> CaseResult:
         source=SOURCE,
     )
     levels = LEVELS[:2] if context.quick else LEVELS
-    found = []
-    for formulation, mesh in [*(("consistent", mesh) for mesh in levels), ("shell", SHELL)]:
-        context.tell(f"{CASE}: {formulation}, {mesh[0]} x {mesh[1]}")
-        pair = tuple(
-            trace(cone_model(octaves, formulation, *mesh), warn=False, neighbours=False)
-            for octaves in OCTAVES
-        )
-        found.append((mesh, pair))
+    shells = SHELL[:1] if context.quick else SHELL
+    discs = []
+    for formulation, meshes in (("consistent", levels), ("shell", shells)):
+        for mesh in meshes:
+            context.tell(f"{CASE}: {formulation}, {mesh[0]} x {mesh[1]}")
+            discs.append(solved(formulation, mesh, back=mesh is meshes[-1]))
+    context.tell(f"{CASE}: a hole that others foretell")
+    beyond = trace(cone_model(BEYOND, "consistent", *LEVELS[0], back=False), warn=False, neighbours=False)
     for stage in STAGES:
-        _stage(result, stage, found)
-    for formulation, (mesh, (_, path)) in (("consistent", found[-2]), ("shell", found[-1])):
-        params = {"formulation": formulation, "mesh": _words(mesh), "creases": CREASES}
-        _both_sides(result, path, params)
+        _stage(result, stage, discs)
+        _foretold(result, stage, discs[0], beyond)
+    for disc in (discs[len(levels) - 1], discs[-1]):
+        params = {"formulation": disc.formulation, "mesh": _words(disc.mesh), "creases": CREASES}
+        _both_sides(result, disc.paths[-1], params)
     result.notes += NOTES
     return result
 
 
 NOTES = [
     "Tolerances are those that were set for creased discs before their first run (1 % of the energy, 0.5 degrees); the "
-    "way to the other state was found after it.",
+    "way to the other state was found after it. What is compared was changed after the first record: figures were of "
+    "one hole of 2^-10 of the rim, whose elevations of creases were 1.1 and 2.3 degrees low, and of one octave beside "
+    "it; they are limits of small holes now, as the closed form is. By the shell they were of 4 x 2 cells, too few.",
     "A barrier has no closed form here: isometric cones do not lead from one state to the other while the creases "
     "keep their angles, so a sheet that is pushed through stretches, by an amount that hangs on its thickness.",
 ]
@@ -204,41 +283,67 @@ def _over(path: Path, step: int) -> float:
     return math.nan if state is None else state.energy.total / path.model.sheet.bending_stiffness()
 
 
-def _octave(pair: tuple[Path, ...], step: int) -> float:
-    """Energy of one octave of the cone, over B ln 2."""
-    large, small = (_over(path, step) for path in pair)
-    return (small - large) / math.log(2.0)
-
-
-def _stage(result: CaseResult, stage: Stage, found: list[tuple[tuple[int, int], tuple[Path, ...]]]) -> None:
-    """Energy of an octave and elevations by every mesh, their limits, and by the shell."""
+def _stage(result: CaseResult, stage: Stage, discs: Sequence[Disc]) -> None:
+    """Energy of an octave and elevations by every mesh with small holes, their limits, and by the shell."""
     params = {"state": stage.words, "fold angle, degrees": math.degrees(PSI)}
-    claim = Claim("energy of an octave of the cone over B ln 2", stage.exact.energy, SOURCE, ENERGY, params)
-    levels = [
-        Level(_words(mesh), 1.0 / mesh[0], _octave(pair, stage.step), _cost(pair)) for mesh, pair in found
-    ]
-    converged(result, claim, levels[:-1])
-    by_shell(result, claim, levels[-1])
     sign = 1.0 if stage.snapped else -1.0  # at rest it is that of valley creases: upside down
-    for i, (what, angle) in enumerate((("middle", stage.exact.middle), ("crease", stage.exact.crease))):
+    found: dict[str, list[float]] = {"energy": [], "middle": [], "crease": []}
+    for disc in discs:
+        middles, creases = zip(*disc.elevations(stage), strict=True)
+        crease, offset = small_hole(creases)
+        found["crease"].append(crease)
+        found["middle"].append(small_hole(middles)[0])
+        found["energy"].append(of_octave([_over(path, stage.step) for path in disc.paths], offset))
+        _with_holes(
+            result, {**params, "formulation": disc.formulation, "mesh": _words(disc.mesh)}, middles, creases
+        )
+    claims = [Claim(ENERGY_OF, stage.exact.energy, SOURCE, ENERGY, params)]
+    for what, angle in (("middle", stage.exact.middle), ("crease", stage.exact.crease)):
         exact = sign * math.degrees(angle)
-        within = ELEVATION / abs(exact)
-        rise = Claim(f"elevation of the {what}", exact, SOURCE, within, params, "degrees")
-        seen = []
-        for mesh, pair in found:
-            state = _end(pair[-1], stage.step)
-            value = math.nan if state is None else elevations(state, stage.creases)[i]
-            seen.append(Level(_words(mesh), 1.0 / mesh[0], value, Cost.of(pair[-1])))
-        converged(result, rise, seen[:-1])
-        by_shell(result, rise, seen[-1])
+        claims.append(
+            Claim(f"elevation of the {what}", exact, SOURCE, ELEVATION / abs(exact), params, "degrees")
+        )
+    for claim, values in zip(claims, found.values(), strict=True):
+        levels = [
+            Level(_words(disc.mesh), 1.0 / disc.mesh[0], value, disc.cost)
+            for disc, value in zip(discs, values, strict=True)
+        ]
+        flat = sum(disc.formulation != "shell" for disc in discs)
+        converged(result, claim, levels[:flat])
+        for level in levels[flat:]:
+            by_shell(result, claim if level is levels[-1] else replace(claim, tolerance=None), level)
 
 
-def _cost(pair: tuple[Path, ...]) -> Cost:
-    """Of both holes."""
-    return Cost(
-        unknowns=pair[-1].unknowns,
-        iterations=sum(path.iterations for path in pair),
-        wall_time_s=sum(path.wall_time_s for path in pair),
+def _with_holes(
+    result: CaseResult, params: Mapping[str, object], middles: Sequence[float], creases: Sequence[float]
+) -> None:
+    """Elevations with each hole, as they were read."""
+    for octaves, middle, crease in zip(OCTAVES, middles, creases, strict=True):
+        own = {**params, "hole": f"2^-{octaves}"}
+        result.check("elevation of the middle, with a hole", middle, unit="degrees", params=own)
+        result.check("elevation of the crease, with a hole", crease, unit="degrees", params=own)
+
+
+def _foretold(result: CaseResult, stage: Stage, disc: Disc, beyond: Path) -> None:
+    """What the law of holes says of a smaller one, and what is solved there."""
+    creases = [crease for _, crease in disc.elevations(stage)]
+    limit, offset = small_hole(creases)
+    off = (limit - creases[-1]) * (OCTAVES[-1] - offset) / (BEYOND - offset)
+    end = _end(beyond, stage.step)
+    result.check(
+        "elevation of the crease, with a smaller hole",
+        math.nan if end is None else elevations(end, stage.creases)[1],
+        unit="degrees",
+        reference=limit - off,
+        source="s0 - a / (L - L0) of three larger holes",
+        tolerance=FORESEEN / abs(limit - off),
+        params={
+            "state": stage.words,
+            "hole": f"2^-{BEYOND}",
+            "formulation": "consistent",
+            "mesh": _words(disc.mesh),
+        },
+        path=beyond,
     )
 
 
