@@ -15,11 +15,11 @@ from xarray import Dataset
 from bh.applications.inverse import models, surrogate
 from bh.applications.inverse.converged import Converged
 from bh.applications.inverse.judge import judge
-from bh.applications.inverse.levels import Limit, Series, points
+from bh.applications.inverse.levels import Limit, Series, missed_between, points
 from bh.applications.inverse.models import model
 from bh.applications.inverse.motions import ACROSS, ALONG, exponential, inverse, logarithm, then
-from bh.applications.inverse.piece_data import PieceData
-from bh.applications.inverse.pieces import LEVELS, PieceTask, curvatures, table
+from bh.applications.inverse.piece_data import OWN, PieceData, going
+from bh.applications.inverse.pieces import LARGEST, LEVELS, PieceTask, curvatures, table
 from bh.applications.inverse.reach import Library, Reach
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.simulate import simulate
@@ -112,7 +112,7 @@ def test_points_of_the_data(data: Dataset) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "pair", "level"), [("arc", (12, 12), 0), ("pinch", (12, 12), 0), ("joint", (1, 8), 0)]
+    ("kind", "pair", "level"), [("arc", (12, 12), 0), ("pinch", (40, 40), 0), ("joint", (1, 8), 0)]
 )
 def test_the_data_are_what_is_simulated(kind: str, pair: tuple[int, int], level: int, data: Dataset) -> None:
     mesh = LEVELS[kind][level]  # type: ignore[index]
@@ -131,10 +131,39 @@ def test_the_data_are_what_is_simulated(kind: str, pair: tuple[int, int], level:
     np.testing.assert_allclose(found["r"], data["r"].values[row[0]], atol=1e-7)
 
 
+def test_polynomials_follow_what_is_between_their_points(data: Dataset) -> None:
+    """A pinch near a straight crease, which turns nearly as k0 |k0|, is within that part of its error bar."""
+    read = PieceData(data)
+    limit, mesh = read.limits["pinch"], LEVELS["pinch"][0]
+    arc = going(read.limits["arc"].value)
+    for k0 in (0.0014, 0.0024, 0.0087):
+        found = PieceTask()(
+            {"kind": "pinch", "before": k0, "after": k0, "edge": mesh.edge, "rows": mesh.rows}
+        )
+        back = arc(k0, -float(found["to_middle"][1]))
+        true = OWN["pinch"] * logarithm(*then(then(back, (found["t"][1], found["r"][1])), back))
+        assert (np.abs(limit.levels[0](np.asarray(k0 / LARGEST)) - true) <= limit.between + 1e-6).all()
+    assert np.degrees(limit.between[3:]).max() < 0.05
+
+
+def test_what_is_missed_between_points() -> None:
+    """x |x| is missed by a quarter when points are doubled, as the third says; a polynomial is not missed."""
+
+    def missed(count: int) -> float:
+        at, fine = points(count), np.linspace(-1.0, 1.0, 999)
+        bent = np.stack([at * np.abs(at)] * 6, axis=1)
+        off = np.abs(Series.through(bent)(fine)[:, 0] - fine * np.abs(fine)).max()
+        assert off <= missed_between(bent)[0] <= 4.0 * off
+        return float(off)
+
+    assert missed(17) / missed(33) == pytest.approx(4.0, rel=0.1)
+    assert missed_between(np.stack([points(9) ** 3] * 6, axis=1)) == pytest.approx(np.zeros(6), abs=1e-14)
+
+
 def test_bad_data(tmp_path: Path, data: Dataset) -> None:
     with pytest.raises(DesignError, match="incomplete"):
         Converged.of(data.isel(point=data["rows"].values < 32))
-    with pytest.raises(DesignError, match="pieces have 2"):
+    with pytest.raises(DesignError, match="pieces have 3"):
         Converged.of(data.assign_attrs(format=0))
     with pytest.raises(DesignError, match="there is no model 'other'"):
         model("other")

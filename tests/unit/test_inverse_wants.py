@@ -94,16 +94,17 @@ def test_points_of_the_variants(data: Dataset) -> None:
 
 
 def test_differences_are_those_of_strips() -> None:
-    """A whole strip with each thing off by a step moves as the chain says."""
-    moves = predicted(converged(), K0, LENGTH, ON, Spreads(**STEPS, k0=0.0, length=0.0)).moves
+    """A whole strip with each thing off by a step moves as the chain says, where its pinches lie on the same cells."""
+    length = [130.0, 120.0]  # multiples of 5 mm: a node is in the middle of each pinch, as in the pieces
+    moves = predicted(converged(), K0, length, ON, Spreads(**STEPS, k0=0.0, length=0.0)).moves
     setting = replace(converged().setting, edge=2.5, rows=2)
     for name in ("fold", "pinch", "zone", "t"):
         up, down = (
-            simulate(K0, LENGTH, ON, replace(setting, **{name: getattr(setting, name) + s * STEPS[name]})).t
+            simulate(K0, length, ON, replace(setting, **{name: getattr(setting, name) + s * STEPS[name]})).t
             for s in (1.0, -1.0)
         )
         whole = 0.5 * (up - down)
-        assert np.linalg.norm(moves[name] - whole) < 0.06 * np.linalg.norm(whole) + 0.01, name
+        assert np.linalg.norm(moves[name] - whole) < 0.01 * np.linalg.norm(whole), name
 
 
 def test_the_cut_of_many_designs() -> None:

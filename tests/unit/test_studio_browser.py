@@ -221,7 +221,9 @@ def test_the_sheet_that_is_turned_is_seen_refined_again(window: Visit) -> None:
     page.mouse.move(box["x"] + 60, box["y"] + 30, steps=3)
     page.mouse.up()
     assert page.evaluate("studio.refined")
-    assert np.linalg.norm(np.subtract(page.evaluate("studio.place(12)"), before)) > 5.0  # pixels: it was turned
+    assert (
+        np.linalg.norm(np.subtract(page.evaluate("studio.place(12)"), before)) > 5.0
+    )  # pixels: it was turned
     assert window.told == []
 
 

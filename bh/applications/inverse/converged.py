@@ -293,11 +293,12 @@ class Converged:
             for series in ([each.value for each in known], [each.levels[STRIP] for each in known])
         )
         doubts = tuple(d.times(w) for w, each in zip(weights, known, strict=True) for d in each.doubts)
+        between = sum(abs(w) * each.between for w, each in zip(weights, known, strict=True))
         setting = closed(self.setting, part)
         return Converged(
             {**self._series, "pinch": limit},
             setting,
-            {**self._limits, "pinch": Limit((same,), limit, doubts)},
+            {**self._limits, "pinch": Limit((same,), limit, doubts, np.asarray(between))},
             self._same.pinching(same, setting),
         )
 

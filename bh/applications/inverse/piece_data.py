@@ -132,18 +132,28 @@ class PieceData:
         return self._halved(level, pinch)
 
     def _joints(self, number: int, arc: Arc) -> Array:
-        """(degree + 1, degree + 1, 6) of both curvatures; equal ones need no piece."""
+        """(degree + 1, degree + 1, 6) of both curvatures.
+
+        A joint of equal ones is an arc: it is no motion in the limit, and on a mesh as far off as its neighbours.
+        """
         level = LEVELS["joint"][number]
         k0 = curvatures(level.degree)
+        last = len(k0) - 1
         found = np.zeros((len(k0), len(k0), 6))
-        for i, a in enumerate(k0):
-            for j, b in enumerate(k0):
+
+        def between(kind: Kind, a: float, b: float) -> Array:
+            _, across, to = self._row(kind, level, a, b)
+            sides = [arc(k, -float(to[1])) for k in (a, b)]
+            return logarithm(*then(then(sides[0], across), sides[1]))
+
+        for i, a in enumerate(map(float, k0)):
+            if a >= 0.0:
+                found[i, i] = OWN["arc"] * between("arc", a, a)
+                found[last - i, last - i] = ACROSS * found[i, i]
+            for j, b in enumerate(map(float, k0)):
                 if i < j and a + b >= -1e-12:
-                    _, across, to = self._row("joint", level, float(a), float(b))
-                    sides = (arc(float(k), -float(to[1])) for k in (a, b))
-                    value = logarithm(*then(then(next(sides), across), next(sides)))
+                    value = between("joint", a, b)
                     found[i, j], found[j, i] = value, ALONG * value
-                    last = len(k0) - 1
                     found[last - i, last - j] = ACROSS * value
                     found[last - j, last - i] = ACROSS * ALONG * value
         return found

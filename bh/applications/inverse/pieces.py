@@ -28,7 +28,7 @@ from bh.formulations.state import State
 
 Array = NDArray[np.float64]
 Kind = Literal["arc", "pinch", "joint"]
-PIECES = 2  # format of the data set; raised when its variables change
+PIECES = 3  # format of the data set; raised when its variables or points change
 FREE = 30.0  # mm from a free end or a joint to the section where an arc is taken to be one
 CLEAR = 30.0  # mm from the end of a pinched zone to it
 END = 10.0  # mm from there to the free end
@@ -49,10 +49,10 @@ class Level:
 LEVELS: dict[Kind, tuple[Level, ...]] = {
     "arc": (Level(2.5, 2, 16), Level(1.25, 4, 16), Level(0.625, 8, 8)),
     "pinch": (
-        Level(2.5, 2, 16),
-        Level(1.25, 4, 16),
-        Level(0.625, 8, 16),
-        Level(0.3125, 16, 8),
+        Level(2.5, 2, 64),
+        Level(1.25, 4, 64),
+        Level(0.625, 8, 32),
+        Level(0.3125, 16, 32),
         Level(0.15625, 32, 8),
     ),
     "joint": (Level(2.5, 2, 8), Level(1.25, 4, 8), Level(0.625, 8, 4)),

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 Array = NDArray[np.float64]
-VARIANTS = 1  # format of the data set
+VARIANTS = 2  # format of the data set
 STEPS = {
     "Lstar": 0.05,
     "t": 0.002,
