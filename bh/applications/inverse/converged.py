@@ -53,6 +53,7 @@ class Converged:
         limits: Mapping[str, Limit] | None = None,
         same: Converged | None = None,
         varied: VariantData | None = None,
+        level: int | None = None,
     ) -> None:
         """Take functions "arc" (rate of its motion), "end", "pinch" and "joint" of the curvatures.
 
@@ -62,11 +63,12 @@ class Converged:
             limits: what they are limits of, with error bars; None where they are those of one mesh.
             same: the model of one mesh, on which whole strips are simulated.
             varied: pieces of strips that are made differently; None where these are not known.
+            level: of meshes that the functions are of, from 0 (`pieces.LEVELS`); None in the limit.
         """
         self.setting, self.domain = setting, Domain(k0=LARGEST, fold=setting.fold)
         self.mesh = LEVELS["pinch"][STRIP]
         self._series, self._limits, self._same = series, limits or {}, same or self
-        self._varied = varied
+        self._varied, self._level = varied, level
         self.has_variants = varied is not None and varied.setting == setting
 
     @classmethod
@@ -324,7 +326,7 @@ class Converged:
         data = self._variants()
 
         def one(name: str, sign: int) -> Converged:
-            return Converged(data.series(name, sign), variants(self.setting)[name, sign])
+            return Converged(data.series(name, sign, self._level), variants(self.setting)[name, sign])
 
         return {name: (one(name, -1), one(name, 1)) for name in STEPS}
 
@@ -354,15 +356,17 @@ class Converged:
         Raises:
             DesignError: the data set of the variants is of another setting.
         """
-        return Converged(self._variants().pieces.series(number), self.setting, varied=self._varied)
+        return Converged(
+            self._variants().pieces.series(number), self.setting, varied=self._varied, level=number
+        )
 
     @cached_property
     def _slopes(self) -> dict[str, dict[str, Series]]:
-        """What each function changes by with one unit of each thing, on the coarsest level of meshes."""
+        """What each function changes by with one unit of each thing."""
         data = self._variants()
         found: dict[str, dict[str, Series]] = {}
         for thing, step in STEPS.items():
-            down, up = (data.series(thing, sign) for sign in (-1, 1))
+            down, up = (data.series(thing, sign, self._level) for sign in (-1, 1))
             found[thing] = {
                 name: (up[name] + down[name].times(-1.0)).times(0.5 / step) for name in self._series
             }

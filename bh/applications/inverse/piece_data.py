@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -35,10 +35,12 @@ class PieceData:
     Attributes:
         data: of `bh.sweep.segments.build_pieces`.
         other: pieces to take where `data` has none.
+        levels: meshes of each kind, coarse first, and the curvatures that the data have of them.
     """
 
     data: Dataset
     other: PieceData | None = None
+    levels: Mapping[Kind, tuple[Level, ...]] = field(default_factory=lambda: LEVELS)
 
     @cached_property
     def rows(self) -> dict[tuple[str, int, float, float], tuple[Array, Array, Array]]:
@@ -77,14 +79,15 @@ class PieceData:
     @cached_property
     def limits(self) -> dict[str, Limit]:
         """Limits of the same functions; what lies between arcs is read with the limit of the arcs."""
-        arcs = Limit.of([self._arcs(i) for i in range(len(LEVELS["arc"]))])
+        arcs = Limit.of([self._arcs(i) for i in range(len(self.levels["arc"]))])
         found = {"arc": arcs}
-        for name, kind, values in (
+        kinds: tuple[tuple[str, Kind, Callable[[int, Arc], Array]], ...] = (
             ("end", "arc", self._ends),
             ("pinch", "pinch", self._pinches),
             ("joint", "joint", self._joints),
-        ):
-            count = len(LEVELS[kind])  # type: ignore[index]
+        )
+        for name, kind, values in kinds:
+            count = len(self.levels[kind])
             found[name] = Limit.of([values(i, going(arcs.value)) for i in range(count)])
         return found
 
@@ -94,7 +97,7 @@ class PieceData:
         Args:
             count: of the levels, 3 or more.
         """
-        arcs = Limit.of([self._arcs(i) for i in range(len(LEVELS["arc"]))])
+        arcs = Limit.of([self._arcs(i) for i in range(len(self.levels["arc"]))])
         return Limit.of([self._pinches(i, going(arcs.value)) for i in range(count)])
 
     def _halved(self, level: Level, value: Callable[[float], Array]) -> Array:
@@ -104,7 +107,7 @@ class PieceData:
         return np.concatenate((half[:0:-1] * ACROSS, half))
 
     def _arcs(self, number: int) -> Array:
-        level = LEVELS["arc"][number]
+        level = self.levels["arc"][number]
 
         def rate(k0: float) -> Array:
             _, across, to = self._row("arc", level, k0, k0)
@@ -113,7 +116,7 @@ class PieceData:
         return self._halved(level, rate)
 
     def _ends(self, number: int, arc: Arc) -> Array:
-        level = LEVELS["arc"][number]
+        level = self.levels["arc"][number]
 
         def end(k0: float) -> Array:
             first, _, to = self._row("arc", level, k0, k0)
@@ -122,7 +125,7 @@ class PieceData:
         return self._halved(level, end)
 
     def _pinches(self, number: int, arc: Arc) -> Array:
-        level = LEVELS["pinch"][number]
+        level = self.levels["pinch"][number]
 
         def pinch(k0: float) -> Array:
             _, across, to = self._row("pinch", level, k0, k0)
@@ -136,7 +139,7 @@ class PieceData:
 
         A joint of equal ones is an arc: it is no motion in the limit, and on a mesh as far off as its neighbours.
         """
-        level = LEVELS["joint"][number]
+        level = self.levels["joint"][number]
         k0 = curvatures(level.degree)
         last = len(k0) - 1
         found = np.zeros((len(k0), len(k0), 6))

@@ -1,8 +1,9 @@
 """Pieces of strips that are made a little differently, and pinches that are not closed all the way.
 
 What a strip does when one thing about it is off (L*, thickness, zone, pinch and fold angle) is the difference of two
-chains of pieces, simulated on the coarsest level of meshes: differences of ends hardly depend on the mesh, and a chain
-of pieces takes no time. So movements are known of thousands of designs, where whole strips are simulated for one.
+chains of pieces in the limit of fine meshes: on the coarsest level an end moves by a quarter less with the pinch angle.
+A chain of pieces takes no time, so movements are known of thousands of designs, where whole strips are simulated for
+one.
 
 Pinches that are closed by a part of the way are pieces too, at Chebyshev points of that part, on levels of meshes with
 a limit and an error bar as the others.
@@ -38,6 +39,10 @@ STEPS = {
 LOCAL = ("zone", "pinch")  # change pinches only
 PARTS = 5  # Chebyshev points of the part of the way that a pinch is closed, both ends included
 CLOSING = 3  # levels of meshes of pinches that are closed by a part of the way
+MOVING: dict[Kind, tuple[Level, ...]] = {  # of variants: differences of two of them need fewer curvatures
+    **LEVELS,
+    "pinch": tuple(replace(level, degree=16) for level in LEVELS["pinch"][:3]),
+}
 
 
 def parts() -> Array:
@@ -74,8 +79,10 @@ def table(setting: Setting) -> dict[str, list[float | int | str]]:
         rows.extend((kind, *pair, level.edge, level.rows, *fields) for pair in simulated(kind, level))
 
     for (name, _), made in variants(setting).items():
-        for kind in ("pinch",) if name in LOCAL else get_args(Kind):
-            add(kind, LEVELS[kind][0], made)
+        kinds: tuple[Kind, ...] = ("pinch",) if name in LOCAL else get_args(Kind)
+        for kind in kinds:
+            for level in MOVING[kind]:
+                add(kind, level, made)
     for part in parts()[1:-1]:
         for level in LEVELS["pinch"][:CLOSING]:
             add("pinch", level, closed(setting, float(part)))
@@ -108,24 +115,28 @@ class VariantData:
     pieces: PieceData
     setting: Setting
 
-    def _of(self, made: Setting, local: bool) -> PieceData:
+    def _of(self, made: Setting, local: bool, levels: Mapping[Kind, tuple[Level, ...]] = LEVELS) -> PieceData:
         fits = np.ones(self.data.sizes["point"], dtype=bool)
         for name in VARIED:
             fits &= np.abs(self.data[column(name)].values - getattr(made, name)) < 1e-9
-        return PieceData(self.data.isel(point=np.flatnonzero(fits)), self.pieces if local else None)
+        return PieceData(self.data.isel(point=np.flatnonzero(fits)), self.pieces if local else None, levels)
 
-    def series(self, name: str, sign: int) -> Mapping[str, Series]:
-        """Functions arc, end, pinch and joint of strips that are made differently, on the coarsest level of meshes.
+    def series(self, name: str, sign: int, level: int | None = None) -> Mapping[str, Series]:
+        """Functions arc, end, pinch and joint of strips that are made differently.
 
         Args:
             name: of the field that is varied.
             sign: of its step, 1 or -1.
+            level: of meshes, from 0; None for the limit of fine ones.
 
         Raises:
             KeyError: the data set has no such pieces.
             ValueError: a piece could not be simulated.
         """
-        return self._of(variants(self.setting)[name, sign], name in LOCAL).series(0)
+        read = self._of(variants(self.setting)[name, sign], name in LOCAL, MOVING)
+        if level is not None:
+            return read.series(level)
+        return {name: limit.value for name, limit in read.limits.items()}
 
     @cached_property
     def closing(self) -> tuple[Limit, ...]:
