@@ -319,7 +319,11 @@ def test_a_zone_is_no_longer_than_its_segment() -> None:
 @pytest.mark.parametrize(
     ("wants", "told"),
     [
-        (Wants.of((0.0, 0.0, 50.0)), r"the nearest ends \d+(\.\d+)? mm away"),
+        (
+            Wants.of((0.0, 0.0, 50.0)),
+            r"no crease of one segment .*the nearest ends \d+(\.\d+)? mm away, at \(.*, .*, .*\)",
+        ),
+        (Wants.of((5000.0, 0.0, 0.0)), r"the nearest ends 4,700 mm away, at \(300, 0, 0\)"),
         (Wants.of((100.0, 60.0, -3.0), tangent=(-1.0, 0.0, 0.0)), r"mm away, \d+(\.\d+)? degrees off"),
         (
             Wants.of((100.0, 60.0, -3.0), keep_out=[[2.0, -30.0, -30.0, 20.0, 30.0, 30.0]]),
@@ -332,6 +336,12 @@ def test_what_cannot_be_had(wants: Wants, told: str) -> None:
     with pytest.raises(DesignError, match=told) as error:
         Reach(most=1)(wants)
     assert "\n" not in str(error.value)
+
+
+def test_a_tolerance_below_the_error_bar_is_told() -> None:
+    """The model is not as sure as that, so what is asked for cannot be promised."""
+    with pytest.raises(DesignError, match=r"with an error bar of 0\.\d+ mm: allow more than that"):
+        Reach(most=2, tolerance=0.01)((-80.0, 100.0, -5.0))
 
 
 def test_blocks_of_the_case_are_a_part_at_random() -> None:

@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.applications.inverse.simulate import Simulated
 from bh.applications.inverse.transforms import angles
+from verification.studies.ch6.two_models_maps import Maps
 from verification.studies.ch6.two_models_targets import CONVERGING, LEVELS, SOURCE, Aimed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from verification.studies.ch6.two_models import Maps
 
 Array = NDArray[np.float64]
 TITLES = {SOURCE: "source's model", CONVERGING: "model that converges", "shell": "shell"}
@@ -34,6 +33,7 @@ class Shown:
     Attributes:
         maps: single segments, by formulation.
         strips: examples of them by formulation.
+        limits: (3,) ends of them in the limit of fine meshes, mm.
         named: of the examples: curvature before folding, 1/mm, and length, mm.
         ends: of one crease pinched in all ways, by its segments and by formulation, (2^n, 3), mm.
         points: that single segments are to reach, mm.
@@ -43,6 +43,7 @@ class Shown:
 
     maps: Mapping[str, Maps]
     strips: Mapping[str, Sequence[Simulated]]
+    limits: Sequence[Array]
     named: Sequence[tuple[float, float]]
     ends: Mapping[int, Mapping[str, Array]]
     points: Sequence[tuple[float, float, float]]
@@ -51,8 +52,8 @@ class Shown:
 
 
 CAPTIONS = {
-    "shapes": "Fig. 6.8 (b), 6.9 (b): three pinched segments from above and from the side. Neither model was made with "
-    "the shell (dotted).",
+    "shapes": "Fig. 6.8 (b), 6.9 (b): three pinched segments from above and from the side. The converging "
+    "formulation and the shell have 4 rows a panel here; crosses are the limit of fine meshes, which designs use.",
     "pinched": "Fig. 6.8 (a), 6.9 (a): ends and angles of pinched segments by both models, and what changes.",
     "folded": "Fig. 6.5 (a), 6.6 (a): the same of folded segments. The source has a closed form; a sheet folds a "
     "little less than that, and its free ends bow.",
@@ -87,10 +88,12 @@ def draw(folder: Path, shown: Shown) -> list[dict[str, str]]:
     return found
 
 
-def _figure(width: float, height: float) -> Figure:
+def _figure(width: float, height: float, layout: Literal["constrained", "tight"] = "tight") -> Figure:
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return Figure(
+        figsize=(width, height), layout=layout
+    )  # "tight" is faster, but knows no colour bar of a whole row
 
 
 def _shapes(shown: Shown) -> Figure:
@@ -104,6 +107,10 @@ def _shapes(shown: Shown) -> Figure:
                 axes[row, i].plot(
                     crease[:, 0], crease[:, other], STYLES[name], label=TITLES[name], linewidth=1.8
                 )
+        for row, other in enumerate((1, 2)):
+            axes[row, i].plot(
+                shown.limits[i][0], shown.limits[i][other], "C0x", label="its limit of fine meshes"
+            )
         axes[0, i].set(title=f"k0 = {k0:g} /mm, {length:g} mm", ylabel="y, mm", aspect="equal")
         axes[0, i].set_aspect("equal", adjustable="datalim")
         axes[1, i].set(xlabel="x, mm", ylabel="z, mm")
@@ -191,7 +198,7 @@ def _objective(shown: Shown) -> Figure:
         maps = shown.maps[name]
         for j, point in enumerate(shown.points):
             far = np.linalg.norm(maps.pinched - np.array(point), axis=-1)
-            _contours(figure, axes[i, j], maps, far, np.linspace(0.0, 250.0, 26), "viridis")
+            _contours(figure, axes[i, j], maps, far, np.linspace(0.0, float(np.nanmax(far)), 26), "viridis")
             found = shown.minima[name][j]
             axes[i, j].plot(found[:, 0], found[:, 1], "rx", clip_on=False)
             axes[i, j].set_title(f"{point}: {TITLES[name]}", fontsize="small")
@@ -201,7 +208,7 @@ def _objective(shown: Shown) -> Figure:
 
 def _targets(shown: Shown) -> Figure:
     """Misses of the source's designs, and segments that are enough without a pinch, one map for each z."""
-    figure = _figure(15.0, 5.0)
+    figure = _figure(15.0, 5.0, "constrained")
     axes = figure.subplots(2, len(LEVELS), sharex=True, sharey=True)
     x = sorted({a.target[0] for a in shown.aimed})
     y = sorted({a.target[1] for a in shown.aimed})

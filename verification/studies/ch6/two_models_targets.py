@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from bh.applications.inverse.descent import descend
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.models import Name
 from bh.applications.inverse.problems import Design
 from bh.applications.inverse.reach import Reach, library
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Swept
+from bh.applications.inverse.simulate import simulate
 from bh.applications.inverse.wants import ReachAll, Wants
 from verification.framework.checks import CaseResult
 
@@ -28,9 +30,11 @@ SOURCE, CONVERGING = "bars-and-hinges", "consistent"  # what records call the tw
 NAMES: dict[str, Name] = {SOURCE: "source", CONVERGING: "converged"}
 LEVELS = (-10.0, -5.0, 0.0, 5.0, 10.0)  # mm, z of the targets
 NEAR = 8  # designs without a pinch that are polished for a target
+STEPS = 8  # of their descent: nearer than a micrometre, or not there
 MOST = 4  # segments
 WITHIN = 1.0  # mm
 SIMULATED = 3  # of the strips without a pinch
+JUDGE = (1.25, 4)  # of the shell: mm along the crease, rows a panel
 SAID = "source 6.4.3, Fig. 6.18"
 
 
@@ -139,6 +143,17 @@ def _without(result: CaseResult, forward: Forward, off: Sequence[Aimed]) -> None
     creases = [Swept().crease(forward, d.k0, d.length, d.pinched)[0] for _, d in there]
     says = "creases without a pinch to targets off the plane, off their own plane, largest"
     result.check(says, max(off_plane(c) for c in creases), unit="mm", params=params)
+    shortest, design = min(there, key=lambda pair: pair[1].total)
+    judge = replace(forward.setting, edge=JUDGE[0], rows=JUDGE[1], formulation="shell")
+    result.check(
+        "strip without a pinch by the shell, off its target off the plane",
+        np.linalg.norm(simulate(*design.lists(), judge).t - np.array(shortest.target)),
+        unit="mm",
+        reference=0.0,
+        source="the shell",
+        tolerance=WITHIN,
+        params={"formulation": "shell", "target": list(shortest.target), "total": round(design.total)},
+    )
     for each, design in there[:: max(1, len(there) // SIMULATED)][:SIMULATED]:
         landing = forward.land(*design.lists())
         result.check(
@@ -175,12 +190,17 @@ def _aim(models: Mapping[str, Forward], target: Target) -> Aimed:
 
 
 @cache
-def _unpinched(n: int, name: Name) -> tuple[Array, cKDTree]:
-    """Variables (N, 2 n) of random designs of n segments, and the tree of their ends without a pinch."""
+def _unpinched(n: int, name: Name) -> tuple[Array, cKDTree, float]:
+    """Random designs of n segments that are not pinched.
+
+    Returns:
+        variables (N, 2 n), the tree of their ends, and how far the farthest end is off the plane, mm.
+    """
     book = library(n, 1, name)
     x = book.designs[0]
     k0, length = book.problem(np.zeros(3)).split(x)
-    return x, cKDTree(book.surrogate.unpinched(k0, length)[0][..., -1, :])
+    ends = book.surrogate.unpinched(k0, length)[0][..., -1, :]
+    return x, cKDTree(ends), float(np.abs(ends[:, 2]).max())
 
 
 def without(name: str, target: Target) -> Design | None:
@@ -192,12 +212,14 @@ def without(name: str, target: Target) -> Design | None:
     """
     point = np.array(target)
     for n in range(1, MOST + 1):
-        x, tree = _unpinched(n, NAMES[name])
+        x, tree, high = _unpinched(n, NAMES[name])
+        if abs(target[2]) > high + WITHIN:
+            continue
         near = x[np.atleast_1d(tree.query(point, k=NEAR)[1])]
         off: Bools = np.zeros((NEAR, n), dtype=bool)
         book = library(n, 1, NAMES[name])
         problem = ReachAll(book.surrogate, n, book.rules, point, Wants.of(point), np.zeros(1))
-        found = problem.polished(near, off)
+        found = descend(problem, near, off, STEPS)
         missed = np.linalg.norm(problem.bare(found, off), axis=1)
         good = np.flatnonzero((missed <= WITHIN) & (problem.violation(found, off) <= 0.0))
         if len(good):
