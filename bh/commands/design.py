@@ -53,6 +53,7 @@ Array = NDArray[np.float64]
 Stopping = Annotated[list[Number], Field(min_length=4, max_length=5)]
 Box = Annotated[list[Number], Field(min_length=6, max_length=6)]
 SPREADS, PROBABILITY = Spreads(), 0.95
+CLEARS, YES_OR_NO = "clears itself in space", "1 yes, 0 no"
 
 
 class TargetTable(Table):
@@ -219,7 +220,7 @@ def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answ
         "distance by interpolation": (found.missed, "mm"),
         "distance of the simulated strip": (found.missed_simulated, "mm"),
         "its error bar": (found.bar, "mm"),
-        "clears itself in space": (float(found.clear), "1 yes, 0 no"),
+        CLEARS: (float(found.clear), YES_OR_NO),
     }
     if wants.stops:  # the distances above are the largest ones of all points
         measure["points on the way of the pinch"] = float(len(wants.stops)), "met, too"
@@ -433,7 +434,10 @@ def design(
             state = "pinched" if row["pinched"] else "not pinched"
             say(f"segment: k0 {row['k0']:+.6f} /mm, length {row['length']:.2f} mm, {state}")
         for name, (value, unit) in answer.measure.items():
-            say(f"{name}: {value:.4g} {unit}")
+            yes = "yes" if value else "no"
+            say(f"{name}: {yes}" if unit == YES_OR_NO else f"{name}: {value:.4g} {unit}")
+        if not answer.measure.get(CLEARS, (1.0, ""))[0]:
+            say("panels of this strip pass through each other; no design that was found clears itself")
         say(_told(answer.tolerance, answer.region))
         turn = math.degrees(float(np.abs(answer.design.k0 * answer.design.length).sum()))
         say(f"total length {answer.design.total:.1f} mm, the flat crease turns by {turn:.0f} degrees in all")

@@ -13,6 +13,9 @@ from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, Point
 from bh.solvers.system import System
 
+SHORTER = 0.25  # of an increment beyond a target, where its path was lost
+MOST_SHORTER = 4  # times that it is walked anew
+
 
 class Strategy(Protocol):
     """How a step is walked: load control, arc length, or one that chooses."""
@@ -77,35 +80,51 @@ def walk(task: Walk) -> Iterator[Increment]:
 
 
 def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float]) -> Iterator[Increment]:
-    """Increments up to the zero of `goal`; the last one is that state."""
-    here = task.history[-1]
-    left, passed = goal(here), ""
-    for item in items:
+    """Increments up to the zero of `goal`; the last one is that state.
+
+    Where the path from one state to the next, beyond the zero, is lost (they may lie on different branches), it is
+    walked once more from the former in shorter increments. So it is where the state with the zero is not stable, though
+    the strategy is to follow stable ones: a long increment has passed a bifurcation that nothing told of.
+    """
+    points = list(task.history)
+    stable = getattr(task.strategy, "at_bifurcation", None) == "stable"
+    left, passed, shorter, spent = goal(points[-1]), "", 0, 0
+    while (item := next(items, None)) is not None:
         if not item.reached:
             yield item
             return
-        now = goal(item.point)
+        here, now = points[-1], goal(item.point)
         if not item.jumped and left * now < 0.0 and abs(now) > task.tolerance:
             found = locate_zero(task.system, here, item.point, (left, now), goal, task.tolerance)
+            increment = SHORTER * (item.point.lam - here.lam)
+            lost = found is None or (stable and bool(found[0].negative))
+            if lost and shorter < MOST_SHORTER and increment > 0.0:
+                shorter, spent = shorter + 1, spent + item.iterations
+                origin = task.origin or (task.history[-1] if len(points) > len(task.history) else None)
+                items = task.strategy.follow(task.system, points[-3:], increment, origin)
+                continue
             note = "the target lies between two states, but the path to it was lost"
+            iterations = item.iterations + spent
             if found is None:
-                yield Increment(here, Outcome.TARGET_MISSED, item.iterations, math.nan, 0.0, note=note)
+                yield Increment(here, Outcome.TARGET_MISSED, iterations, math.nan, 0.0, note=note)
                 return
-            target, imbalance, spent = found
+            target, imbalance, more = found
             yield replace(
                 item,
                 point=target,
-                iterations=item.iterations + spent,
+                iterations=iterations + more,
                 imbalance=imbalance,
                 critical=(),
                 factorised=None,
             )
             return
-        yield item
+        yield replace(item, iterations=item.iterations + spent) if spent else item
+        points.append(item.point)
+        spent = 0
         if left * now < 0.0:
             passed = f"; a jump at lambda {item.point.lam:.6g} passed it, from {left:+.6g} to {now:+.6g}"
-        here, left = item.point, now
+        left = now
         if abs(now) <= task.tolerance:
             return
     note = f"the target is not met before the end of the step (missed by {left:.6g}{passed})"
-    yield Increment(here, Outcome.TARGET_MISSED, 0, math.nan, 0.0, note=note)
+    yield Increment(points[-1], Outcome.TARGET_MISSED, 0, math.nan, 0.0, note=note)

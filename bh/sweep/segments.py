@@ -255,7 +255,9 @@ def segments(
     from dataclasses import replace
 
     most = Domain().length[0] - 2.0 * BESIDE
-    if not 0.0 < zone <= most:
+    if not zone > 0.0:
+        raise SweepError(f"a zone of {zone:g} mm cannot be; use a length from 1 to {most:g} mm")
+    if zone > most:
         raise SweepError(
             f"a zone of {zone:g} mm is longer than the shortest segment, {Domain().length[0]:g} mm, has room for; "
             f"use {most:g} mm or less"

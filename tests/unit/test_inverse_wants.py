@@ -19,7 +19,7 @@ from bh.applications.inverse.descent import descend
 from bh.applications.inverse.levels import lagrange
 from bh.applications.inverse.models import model
 from bh.applications.inverse.piece_data import PieceData
-from bh.applications.inverse.pieces import CONVERGING, PieceTask
+from bh.applications.inverse.pieces import CONVERGING, LEVELS, PieceTask
 from bh.applications.inverse.problems import Design
 from bh.applications.inverse.reach import Library, Reach
 from bh.applications.inverse.segments import DesignError
@@ -111,7 +111,7 @@ def test_differences_are_those_of_strips(level: int) -> None:
 
 
 def test_differences_are_those_of_fine_meshes() -> None:
-    """By 0.02 rad of the pinch angle: strips move 1.124, 1.309, 1.406, 1.435 mm on 2, 4, 8, 16 rows, 1.445 mm extrapolated."""
+    """By 0.02 rad of the pinch strips move 1.124, 1.309, 1.406, 1.435 mm on 2, 4, 8, 16 rows: extrapolated 1.445."""
     spreads = Spreads(**STEPS, k0=0.0, length=0.0)
     moves = predicted(converged(), K0, [130.0, 120.0], ON, spreads).moves["pinch"]
     assert np.linalg.norm(moves) == pytest.approx(1.445, rel=0.01)
@@ -330,7 +330,11 @@ def test_a_zone_is_no_longer_than_its_segment() -> None:
 @pytest.mark.parametrize(
     ("wants", "told"),
     [
-        (Wants.of((0.0, 0.0, 50.0)), r"the nearest ends \d+(\.\d+)? mm away"),
+        (
+            Wants.of((0.0, 0.0, 50.0)),
+            r"no crease of one segment .*the nearest ends \d+(\.\d+)? mm away, at \(.*, .*, .*\)",
+        ),
+        (Wants.of((5000.0, 0.0, 0.0)), r"the nearest ends 4,700 mm away, at \(300, 0, 0\)"),
         (Wants.of((100.0, 60.0, -3.0), tangent=(-1.0, 0.0, 0.0)), r"mm away, \d+(\.\d+)? degrees off"),
         (
             Wants.of((100.0, 60.0, -3.0), keep_out=[[2.0, -30.0, -30.0, 20.0, 30.0, 30.0]]),
@@ -343,6 +347,12 @@ def test_what_cannot_be_had(wants: Wants, told: str) -> None:
     with pytest.raises(DesignError, match=told) as error:
         Reach(most=1)(wants)
     assert "\n" not in str(error.value)
+
+
+def test_a_tolerance_below_the_error_bar_is_told() -> None:
+    """The model is not as sure as that, so what is asked for cannot be promised."""
+    with pytest.raises(DesignError, match=r"with an error bar of 0\.\d+ mm: allow more than that"):
+        Reach(most=2, tolerance=0.01)((-80.0, 100.0, -5.0))
 
 
 def test_blocks_of_the_case_are_a_part_at_random() -> None:

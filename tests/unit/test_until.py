@@ -16,7 +16,9 @@ from bh import Model, ModelError, Sheet, Until, trace
 from bh.formulations.observables import depth_of, measure
 from bh.formulations.state import State
 from bh.scene.load import parse_scene
-from bh.solvers.walk import Walk, _until
+from bh.solvers.outcome import Outcome
+from bh.solvers.points import Increment
+from bh.solvers.walk import Walk, _until, walk
 
 SHEET = Sheet(E=4000.0, t=0.381)
 FORMULATIONS = ["bars-and-hinges", "consistent"]
@@ -203,3 +205,63 @@ def test_a_jump_over_the_value_is_told() -> None:
     *_, last = _until(task, iter([one]), goal)
     assert last.outcome == "target-missed"
     assert "a jump at lambda 0.5 passed it" in last.note
+
+
+class Steps:
+    """A strategy whose increments are as long as the first one, on a path where lambda is all there is."""
+
+    def __init__(self, at_bifurcation: str = "stable") -> None:
+        self.at_bifurcation = at_bifurcation
+        self.asked: list[float | None] = []
+
+    @staticmethod
+    def at(lam: float, negative: int = 0) -> Any:
+        return SimpleNamespace(lam=lam, negative=negative)
+
+    def follow(self, system: Any, history: Any, increment: Any = None, origin: Any = None) -> Any:
+        self.asked.append(increment)
+        lam, step = history[-1].lam, increment or 0.5
+        while lam < 1.0:
+            lam += step
+            yield Increment(self.at(lam), Outcome.REACHED, 3, 0.0, step)
+
+    def task(self) -> Walk:
+        return Walk(None, self, (self.at(0.0),), goal=lambda p: p.lam - 0.35)  # type: ignore[arg-type]
+
+
+def test_a_target_whose_path_was_lost_is_walked_to_in_shorter_increments(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The two states beside it may lie on different branches; nearer ones do not."""
+
+    def zero(system: Any, a: Any, b: Any, *_: Any) -> Any:
+        return (Steps.at(0.35), 0.0, 2) if b.lam - a.lam < 0.2 else None
+
+    monkeypatch.setattr("bh.solvers.walk.locate_zero", zero)
+    steps = Steps()
+    found = list(walk(steps.task()))
+    assert [each.point.lam for each in found] == pytest.approx([0.125, 0.25, 0.35])
+    assert found[-1].reached
+    assert steps.asked == [None, 0.125]
+    assert [each.iterations for each in found] == [
+        6,
+        3,
+        5,
+    ]  # those of the increment that was lost are counted
+    monkeypatch.setattr("bh.solvers.walk.locate_zero", lambda *_: None)
+    *_, last = walk(Steps().task())
+    assert last.outcome == "target-missed"
+    assert "path to it was lost" in last.note
+
+
+@pytest.mark.parametrize(("at_bifurcation", "found"), [("stable", [0.125, 0.25, 0.35]), ("primary", [0.35])])
+def test_a_target_that_is_not_stable_is_walked_to_in_shorter_increments(
+    at_bifurcation: str, found: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the strategy follows stable branches: a long increment has passed a bifurcation unseen."""
+
+    def zero(system: Any, a: Any, b: Any, *_: Any) -> Any:
+        return Steps.at(0.35, negative=int(b.lam - a.lam > 0.2)), 0.0, 2
+
+    monkeypatch.setattr("bh.solvers.walk.locate_zero", zero)
+    assert [each.point.lam for each in walk(Steps(at_bifurcation).task())] == pytest.approx(found)

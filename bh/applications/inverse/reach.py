@@ -24,7 +24,7 @@ from bh.applications.inverse.models import Name, model
 from bh.applications.inverse.problems import Design, ReachPoint
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule, Swept
-from bh.applications.inverse.sifted import Sifted
+from bh.applications.inverse.sifted import Sifted, Tried
 from bh.applications.inverse.simulate import Landing, Simulated
 from bh.applications.inverse.tolerances import predicted
 from bh.applications.inverse.wants import ReachAll, Wants
@@ -287,11 +287,14 @@ class Reach:
         """Those of some candidates that obey the rules and are near enough by the chain."""
         if not len(x):
             return x, on
-        missed, turned = problem.off(problem.bare(x, on))
+        bare = problem.bare(x, on)
+        missed, turned = problem.off(bare)
         legal = problem.violation(x, on) <= 0.0
         inside = depths(problem.surrogate, problem.wants.keep_out, *problem.split(x), on)
-        sifted.add(missed, turned, legal, np.asarray((inside <= 0.0).all(axis=1)))
+        clear = np.asarray((inside <= 0.0).all(axis=1))
         bars = problem.surrogate.bars(*problem.split(x), on)[0]
+        ends = problem.wants.point + bare[:, :3]
+        sifted.add(Tried(ends, missed, turned, bars, legal, clear), self.tolerance)
         good = legal & (missed <= self.tolerance) & (turned <= self.angle) & (bars <= self.tolerance)
         return x[good], on[good]
 

@@ -21,7 +21,7 @@ from bh.model.sheet import Sheet
 from bh.model.step import Actuation
 from bh.paths.path import Path
 from bh.solving.trace import trace
-from meshes import SheetMesh, parallel_creases, structured
+from meshes import PatternError, SheetMesh, parallel_creases, structured
 
 Array = NDArray[np.float64]
 
@@ -78,8 +78,8 @@ def model(
         setting: sheet, fold and pinch.
 
     Raises:
-        DesignError: lists of different lengths, or a pinched segment that is shorter than the zone of its pinch.
-        PatternError: the flat strip overlaps itself: it cannot be cut from one sheet.
+        DesignError: lists of different lengths, a pinched segment that is shorter than the zone of its pinch, or a
+            flat strip that overlaps itself, so that it cannot be cut from one sheet.
     """
     if not len(k0) == len(lengths) == len(pinched) or not len(k0):
         raise DesignError(
@@ -92,7 +92,14 @@ def model(
             f"make the zone {short:g} mm or less, or the segment longer"
         )
     whole = float(sum(lengths))
-    pattern = parallel_creases(list(k0), list(lengths), setting.width)
+    try:
+        pattern = parallel_creases(list(k0), list(lengths), setting.width)
+    except PatternError as error:
+        turn = math.degrees(sum(abs(k * size) for k, size in zip(k0, lengths, strict=True)))
+        raise DesignError(
+            f"the flat strip meets itself, so it cannot be cut from one sheet: its crease turns by {turn:.0f} degrees in "
+            f"all; make it less curved, or shorter ({error})"
+        ) from error
     along = max(2, round(whole / setting.edge))
     mesh = structured(pattern, along=along, rows=setting.rows, kind=setting.kind)  # type: ignore[arg-type]
     strip = Model(mesh, Sheet(E=setting.E, t=setting.t), formulation=setting.formulation, contact=False)

@@ -158,7 +158,10 @@ class Wants:
 
 
 def _vector(value: ArrayLike, name: str) -> Array:
-    found = np.asarray(value, dtype=float)
+    try:
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
     if found.shape != (3,) or not np.isfinite(found).all():
         raise DesignError(f"{name} {value!r} is no point; give three coordinates in mm")
     return found

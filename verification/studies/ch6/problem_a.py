@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bh.applications.inverse.fit import arc_length, curvature, fit_curve, move_tip
 from bh.applications.inverse.models import model
 from bh.applications.inverse.optimisers import Genetic, Polished
-from bh.applications.inverse.problems import CURVES
+from bh.applications.inverse.pieces import LEVELS
+from bh.applications.inverse.problems import CURVES, Design, resample
 from bh.applications.inverse.simulate import simulate
 from bh.applications.inverse.surrogate import shipped
+from bh.errors import InputError
 from verification.framework.checks import CaseResult, Context, line, plot
 
+Array = NDArray[np.float64]
+SHEET = LEVELS["arc"][1]  # mesh of strips that are folded: 1.25 mm along the crease, 4 rows a panel
 CURVES_IN = "source 6.4.1, Fig. 6.15"
 TIP = "source 6.4.2, Fig. 6.17"
 
@@ -76,8 +82,103 @@ def run(context: Context) -> CaseResult:
         source=CURVES_IN + ": its curvature has the larger slope",
         tolerance=0.0,
     )
+    _sheets(result, context, best, errors)
     _plots(result, errors, best)
     return result
+
+
+def _sheets(
+    result: CaseResult, context: Context, best: dict[str, Any], errors: dict[str, list[float]]
+) -> None:
+    """The same designs folded by the formulation that converges: how near does a sheet come, and what stands?
+
+    The source has a closed form of plane arcs. A sheet opens a little, its ends bow, and where the curvature jumps the
+    crease turns a little out of its plane.
+    """
+    strips: dict[tuple[str, int], Array] = {}
+    found: dict[str, list[float]] = {}
+    for name, fits in best.items():
+        context.tell(f"problem_a: {name}, folded as a sheet")
+        found[name] = []
+        for n, (problem, top) in enumerate(fits, 1):
+            try:
+                crease = folded_crease(problem.design(top.x))
+            except InputError as error:
+                result.notes.append(f"The fit of the {name} with {n} segments is no sheet: {error}.")
+                break
+            strips[name, n] = crease
+            params: dict[str, Any] = {"curve": name, "n": n, "formulation": "consistent"}
+            off = np.linalg.norm(resample(crease[:, :2], problem.samples) - problem.goal, axis=-1)
+            found[name].append(float(off.mean()) / problem.size)
+            says = "mean distance over the length of the curve, folded as a sheet"
+            result.check(says, found[name][-1], source=CURVES_IN, params=params)
+            high = np.abs(crease[:, 2]).max()
+            result.check("crease folded as a sheet, off its plane", high, unit="mm", params=params)
+        _stands(result, name, found[name], errors[name])
+    three = list(zip(found["spiral"][:3], found["cosine"][:3], strict=False))
+    says = "the spiral is fitted worse than the cosine, folded as sheets"
+    both: dict[str, Any] = {"formulation": "consistent", "n": len(three)}
+    worse = bool(three) and all(s > c for s, c in three)
+    result.check(says, worse, reference=1.0, source=CURVES_IN, params=both)
+    result.pictures.append(_drawn(context, best, strips))
+
+
+def folded_crease(design: Design) -> Array:
+    """(k, 3) crease of a strip that is folded by the formulation that converges, mm.
+
+    Raises:
+        DesignError: it cannot be cut from one sheet, or not be folded.
+    """
+    setting = replace(model().setting, edge=SHEET.edge, rows=SHEET.rows)
+    return simulate(*design.lists(), setting).crease()
+
+
+def _stands(result: CaseResult, name: str, found: list[float], plane: list[float]) -> None:
+    """What the source says of a curve, asked of folded sheets, up to the number of segments that can be cut."""
+    params: dict[str, Any] = {"curve": name, "formulation": "consistent"}
+    result.check("fits that can be cut with panels of 5 mm", len(found), params={**params, "of": len(plane)})
+    if len(found) < 2:
+        return
+    says = "errors do not grow with n, folded as sheets"
+    falls = (np.diff(found) <= 0.0).all()
+    result.check(says, falls, reference=1.0, source=CURVES_IN, params={**params, "n": len(found)})
+    says = "two segments have less than a quarter of the error of one, folded as sheets"
+    result.check(says, found[1] < 0.25 * found[0], reference=1.0, source=CURVES_IN, params=params)
+    ratio = found[-1] / plane[len(found) - 1]
+    says = "error of the last fit as a sheet over that of the closed form"
+    result.check(says, ratio, source=CURVES_IN, params={**params, "n": len(found)})
+
+
+def _drawn(context: Context, best: dict[str, Any], strips: dict[tuple[str, int], Array]) -> dict[str, str]:
+    """Fig. 6.15: targets, closed forms and folded sheets of one, two and most segments, side by side."""
+    from matplotlib.figure import Figure
+
+    most = len(next(iter(best.values())))
+    counts = sorted({1, 2, most})
+    figure = Figure(figsize=(4.0 * len(counts), 3.6 * len(best)), layout="constrained")
+    axes = figure.subplots(len(best), len(counts), squeeze=False)
+    for row, (name, fits) in zip(axes, best.items(), strict=True):
+        for ax, n in zip(row, counts, strict=True):
+            problem, top = fits[n - 1]
+            ax.plot(
+                problem.target[:, 0], problem.target[:, 1], "k-", linewidth=3.0, alpha=0.25, label="target"
+            )
+            points = problem.points(top.x[None])[0]
+            ax.plot(points[:, 0], points[:, 1], "C1-", label="closed form (source)")
+            crease = strips.get((name, n))
+            if crease is not None:
+                ax.plot(crease[:, 0], crease[:, 1], "C0--", label="folded as a sheet")
+            said = "" if crease is not None else ": no sheet"
+            ax.set_title(f"{name}, n = {n}{said}", fontsize="small")
+            ax.set_aspect("equal", adjustable="datalim")
+    axes[0, 0].legend(fontsize="small")
+    context.folder.mkdir(parents=True, exist_ok=True)
+    figure.savefig(context.folder / "problem_a_sheets.png", dpi=90)
+    return {
+        "file": "problem_a_sheets.png",
+        "alt": "targets, closed forms and folded sheets",
+        "caption": "Fig. 6.15: fits by the source's closed form, and the same creases folded as sheets.",
+    }
 
 
 def _plots(result: CaseResult, errors: dict[str, list[float]], best: dict[str, Any]) -> None:
