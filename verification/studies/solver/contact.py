@@ -1,4 +1,4 @@
-"""Case `contact`: strips on a cylinder and each other, a ring on itself, layers, and random sheets whose panels meet.
+"""Case `contact`: strips on a cylinder and each other, a ring, layers, friction, moulds, sheets whose panels meet.
 
 The strip lies on two supports and is pressed in its middle: force and lift-off by the elastica. Stacks are as high as
 their sheets are thick. Scenes are stored one
@@ -21,8 +21,10 @@ from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context
 from verification.framework.random_scenes import part_of, played
 from verification.studies.solver.contact_layers import crushing, layers
+from verification.studies.solver.contact_more import more
 from verification.studies.solver.contact_scenes import SEED, Row, play
 from verification.studies.solver.contact_strips import met
+from verification.studies.solver.contact_uses import uses
 from verification.theory.wrapped import wrapped_by
 
 CASE = "contact"
@@ -198,6 +200,8 @@ def run(context: Context) -> CaseResult:
     layers(result)
     if not context.quick:
         crushing(result)
+    more(result, context)
+    uses(result, context)
     numbers = part_of(PART, QUICK if context.quick else SCENES, SCENES)
     known = played(context, CASE, RUNS, numbers, SCENES, play)
     meeting(result, [Row(**{**row, "told": tuple(row["told"])}) for row in known])
