@@ -18,6 +18,7 @@ from meshes.pattern import Crease, CreasePattern
 from meshes.ruled import ruled
 from meshes.structured import structured
 from meshes.unstructured import unstructured
+from meshes.wide import wide_creases
 
 __all__ = [
     "Arc",
@@ -45,4 +46,5 @@ __all__ = [
     "structured",
     "two_arcs",
     "unstructured",
+    "wide_creases",
 ]

@@ -260,6 +260,10 @@ class SheetMesh:
             MeshError: there is no such crease; the message lists those there are.
         """
         pairs = self.edge_sets.get(f"crease:{crease}")
+        if pairs is None and f"strip:{crease}" in self.edge_sets:
+            raise MeshError(
+                f"crease '{crease}' is a strip, not a line: fold it by its rest angle, or hold or push the panels"
+            )
         if pairs is None:
             names = ", ".join(self.creases) or "none (the sheet has no crease)"
             raise MeshError(f"the sheet has no crease '{crease}'; its creases: {names}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bh.analysis.contact import Contact
 from bh.analysis.yielding import Yielding
 from bh.formulations.stress import Extreme
+from bh.model.wide_crease import folding
 from bh.paths.path import Path as Trace
 from bh.scene.load import Scene
 
@@ -22,7 +23,7 @@ def result(
     """
     model = path.model
     mesh, last = model.mesh, path[-1]
-    folds = {crease: last.fold_angle(crease) for crease in mesh.creases}
+    folds = {crease: last.fold_angle(crease) for crease in folding(mesh)}
     steps = []
     for number in range(len(model.steps)):
         records = [record for record in path.records if record.step == number]

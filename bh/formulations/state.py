@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.stress import Resultants, Stress, stress_of
 from bh.loading.load_step import crease_hinges
+from bh.model.wide_crease import strip_fold, wide_names
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
@@ -121,9 +122,13 @@ class State:
     def fold_angle(self, crease: str) -> Array:
         """Fold angles pi - phi along a crease, one an edge in order, rad; mountain positive.
 
+        Of a wide crease the angle between the panels on both sides of the strip, one an edge of its left line.
+
         Returns:
             (edges,) in order along the crease.
         """
+        if crease in wide_names(self.mesh):
+            return strip_fold(self.mesh, crease, self.stress().curvature)
         return np.pi - self.dihedral(crease)
 
     def crease_moment(self, crease: str) -> Array:

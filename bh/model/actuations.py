@@ -19,11 +19,13 @@ from bh.errors import ModelError
 from bh.model.mould import check_friction
 from bh.model.step import Actuation, Body, StepBuilder
 from bh.model.supports import AXES, select
+from bh.model.wide_crease import fold_strips, wide_names
 from meshes.quantities import Typed, degrees_meant, take_units
 
 Array = NDArray[np.float64]
 Angles = float | Sequence[float]
 Given = Typed | Sequence[Typed]
+FOLDS = ("to", "by", "rest", "Lstar", "stiffness")
 
 
 @dataclass(frozen=True)
@@ -120,7 +122,7 @@ class Fold(Actuation):
 
     def prepare(self, builder: StepBuilder) -> None:
         """Ask for the spring before the first step."""
-        if self._spring:
+        if self._spring and self.crease not in wide_names(builder.mesh):
             builder.spring(builder.creases(self.crease)[0], self.Lstar, self.stiffness)
 
     def apply(self, builder: StepBuilder) -> None:
@@ -129,6 +131,9 @@ class Fold(Actuation):
         Raises:
             ModelError: the angle leaves the range from 0 to 2 pi, or a list of angles does not fit the crease.
         """
+        given = [key for key in FOLDS if getattr(self, key) is not None]
+        if fold_strips(builder, self.crease, given, self.rest):
+            return
         hinges, sense, drawn = builder.creases(self.crease)
         angle = self._target(sense, drawn)
         if self.rest is not None or self._spring:

@@ -21,6 +21,7 @@ from bh.model.springs import GroundSpring
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
+from bh.model.wide_crease import strip_sheet
 from bh.model.zones import Sections, SheetZone, changed, sections
 from bh.runtime.consent import said
 from meshes import SheetMesh
@@ -271,6 +272,32 @@ class Model:
         """
         made = changed(self.sheet if sheet is None else sheet, stiff, **values)
         return replace(self, zones=(*self.zones, SheetZone(where, made)))
+
+    def wide_crease(
+        self,
+        name: str,
+        Lstar: float | str | None = None,
+        stiffness: float | str | None = None,
+        sheet: Sheet | None = None,
+        stiff: float = 1.0,
+        **values: float | str | None,
+    ) -> Model:
+        """Say what the strip of a wide crease (`meshes.wide_creases`) is made of; arguments of `bh.SheetZone` beside.
+
+        Args:
+            name: of the crease.
+            Lstar: of the sharp crease that it stands for, mm: the sheet's material, as thin as it takes.
+            stiffness: the same, N mm / (mm rad).
+            sheet: the strip's material and thickness.
+            stiff: factor of the sheet's moduli.
+            **values: of `bh.Sheet`, such as t = 0.1.
+
+        Raises:
+            ModelError: there is no such strip, or it is told twice or not at all; one line.
+        """
+        if sheet is None:
+            sheet = strip_sheet(self.mesh, name, self.sheet, Lstar, stiffness, stiff, **values)
+        return replace(self, zones=(*self.zones, SheetZone(f"strip:{name}", sheet)))
 
     def step(
         self,

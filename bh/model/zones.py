@@ -16,12 +16,14 @@ from bh.model.laminate import laminate
 from bh.model.sheet import Sheet
 from meshes import SheetMesh
 from meshes.topology import Ints
+from meshes.wide import SIDES, STRIP
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Where = str | tuple[str, ...] | tuple[tuple[float, float], ...]
 WAYS = (
-    '"face:X,Y" (the face around a point, mm), "inside:PLACE" or "layer:NAME" (what closed lines enclose), "all", '
+    '"face:X,Y" (the face around a point, mm), "inside:PLACE" or "layer:NAME" (what closed lines enclose), '
+    '"strip:CREASE" (a wide crease), "all", '
     "a list of these, or a polygon [[x, y], ...]"
 )
 STIFFER = ("E", "E2", "G12")
@@ -66,8 +68,8 @@ class SheetZone:
     Attributes:
         where: "face:X,Y", the face of the drawing around a point, as creases and lines of the kind flat bound it (mm);
             "inside:PLACE", what the closed lines of a place such as "crease:f1" enclose; "layer:NAME", the same of the
-            flat lines of a layer of the drawing; "all"; several of these; or the corners of a polygon, (k, 2), mm: the
-            triangles whose middle lies in it.
+            flat lines of a layer of the drawing; "strip:NAME", a wide crease; "all"; several of these; or the corners
+            of a polygon, (k, 2), mm: the triangles whose middle lies in it.
         sheet: its material and thickness.
     """
 
@@ -123,7 +125,7 @@ def sections(mesh: SheetMesh, sheet: Sheet, zones: tuple[SheetZone, ...]) -> Sec
     Args:
         mesh: of the sheet.
         sheet: where there is no zone.
-        zones: that do not overlap.
+        zones: that do not overlap; strips of wide creases are taken out of the others.
 
     Raises:
         ModelError: a zone that has no triangle, or two that share one; one line.
@@ -134,7 +136,7 @@ def sections(mesh: SheetMesh, sheet: Sheet, zones: tuple[SheetZone, ...]) -> Sec
     for number, zone in enumerate(zones, 1):
         inside = triangles_in(mesh, zone.where, f"zone {number}")
         twice = np.flatnonzero(inside & (of > 0))
-        if len(twice):
+        if len(twice) and not str(zone.where).startswith(STRIP):
             x, y, _ = mesh.points[mesh.triangles[twice[0]]].mean(axis=0)
             raise ModelError(
                 f"zones {of[twice[0]]} and {number} overlap at ({x:.4g}, {y:.4g}) mm; let every place be in one"
@@ -178,6 +180,8 @@ def _named(mesh: SheetMesh, where: str, what: str) -> Bools:
         return _face(mesh, where, rest, what)
     if kind == "inside":
         return _enclosed(mesh, rest, what)
+    if kind == STRIP[:-1]:
+        return _strip(mesh, rest, what)
     if kind == "layer":
         layers = [name.removeprefix("layer:") for name in mesh.edge_sets if name.startswith("layer:")]
         if rest not in layers:
@@ -224,6 +228,23 @@ def _enclosed(mesh: SheetMesh, place: str, what: str) -> Bools:
     if not inside.any():
         raise ModelError(f"{what}: the lines '{place}' enclose nothing; close them, or name a face")
     return np.asarray(inside)
+
+
+def _strip(mesh: SheetMesh, crease: str, what: str) -> Bools:
+    """Triangles between the two lines of a wide crease: those at one line on the side of the other, and all around."""
+    import shapely
+
+    if STRIP + crease not in mesh.edge_sets:
+        known = ", ".join(name for name in mesh.edge_sets if name.startswith(STRIP)) or "none"
+        raise ModelError(f"{what}: the sheet has no wide crease '{crease}'; it has {known}")
+    topology = mesh.topology
+    pairs = [mesh.edge_sets[f"crease:{crease}-{side}"] for side in SIDES]
+    at = topology.edge_triangles[topology.find_edges(pairs[0])]
+    other = shapely.LineString(mesh.points[np.append(pairs[1][:, 0], pairs[1][-1, 1]), :2])
+    middle = mesh.points[mesh.triangles[at]].mean(axis=2)[..., :2]
+    near = shapely.distance(other, shapely.points(middle)).argmin(axis=1)
+    label = _pieces(mesh, np.vstack(pairs))
+    return np.isin(label, label[at[np.arange(len(at)), near]])
 
 
 def _pieces(mesh: SheetMesh, pairs: Ints) -> Ints:

@@ -11,6 +11,7 @@ from bh.scene.moving import MoveTable
 from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import Table
 from bh.scene.sheets import ZoneTable
+from bh.scene.wide_creases import WideCreaseTable
 
 Schema = dict[str, object]
 
@@ -52,6 +53,7 @@ def schema() -> Schema:
     steps["move"] = _table(found, MoveTable)
     support: Schema = {"anyOf": [_table(found, tables.SupportTable), OWN]}
     steps |= {"support": _one_or_more(support), "hold": PLACES, "release": PLACES}
+    crease = {"anyOf": _tables(found, (tables.CreaseTable, WideCreaseTable))}
     scene = {
         "pattern": {"anyOf": [*_tables(found, patterns), OWN]},
         **{name: _table(found, kind) for name, kind in SINGLE.items()},
@@ -66,7 +68,7 @@ def schema() -> Schema:
         },
         "friction": {"type": "number", "minimum": 0},
         "symmetry": {"anyOf": [{"enum": ["x", "y"]}, VECTOR]},
-        "creases": {"type": "object", "additionalProperties": _table(found, tables.CreaseTable)},
+        "creases": {"type": "object", "additionalProperties": crease},
         "steps": {
             "type": "array",
             "minItems": 1,

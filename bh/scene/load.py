@@ -24,6 +24,7 @@ from bh.model.serialise import ACTUATIONS as MAKERS
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, select
 from bh.model.until import Until
+from bh.model.wide_crease import wide_names
 from bh.scene.bodies import BODIES, body
 from bh.scene.changes import set_keys
 from bh.scene.contact import check_friction, contact_of, friction_of
@@ -56,6 +57,7 @@ from bh.scene.tables import (
 )
 from bh.scene.toml_text import read_toml, toml_bytes, waits
 from bh.scene.wanted_accuracy import wanted_accuracy
+from bh.scene.wide_creases import strips_of, wide_tables
 from bh.solvers.settling import Settling
 from bh.solvers.walk import Strategy
 from meshes.io.files import refuse_others
@@ -227,14 +229,17 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     creases = as_table(data.get("creases", {}), "creases")
     asked = [_steps(item, f"steps[{i}]", folder) for i, item in enumerate(steps)]
     numbers = [i for i, legs in enumerate(asked) for _ in legs]
-    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data, sheet.t)
+    wide = wide_tables(creases)
+    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data, sheet.t, wide)
     model = Model(
         mesh=not_flat(data, drawn.mesh),
         sheet=sheet,
-        zones=zones,
+        zones=(*zones, *strips_of(drawn.mesh, wide, sheet)),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(step for legs in asked for step in legs),
-        creases={crease: _crease(item, f"creases.{crease}") for crease, item in creases.items()},
+        creases={
+            name: _crease(item, f"creases.{name}") for name, item in creases.items() if name not in wide
+        },
         formulation=name,
         hinge_lock=how.hinge_lock,
         contact=contact_of(data.get("contact", "auto")),
@@ -404,7 +409,7 @@ def _check_names(model: Model, numbers: Sequence[int]) -> None:
         for item in asked.actuations:
             key = type(item).__name__.lower()
             crease = getattr(item, "crease", "all")
-            if crease != "all":
+            if crease != "all" and not (key == "fold" and crease in wide_names(mesh)):
                 with within(f"steps[{i}].{key}.crease"):
                     mesh.crease_edges(crease)
             if isinstance(item, Force | Displace | Tether | Couple):

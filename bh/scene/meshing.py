@@ -11,12 +11,14 @@ from bh.model.plugins import made
 from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import as_table, inside, nearest, read_table, shown, within, without
 from bh.scene.tables import DrawnTable, GmshTable, MeshTable
+from bh.scene.wide_creases import widened
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.choices import first_mesh
 
 if TYPE_CHECKING:
     from meshes.io.drawing import DrawingOptions
 
+WideCreases = dict[str, dict[str, object]]
 ROOM = 1.03  # thicknesses between layers that are untangled: they press on each other up to 1.005
 
 
@@ -38,7 +40,12 @@ class Drawn:
 
 
 def mesh_of(
-    pattern: object, mesh: object, folder: Path, anew: bool = False, thickness: float | None = None
+    pattern: object,
+    mesh: object,
+    folder: Path,
+    anew: bool = False,
+    thickness: float | None = None,
+    wide: WideCreases | None = None,
 ) -> Drawn:
     """The meshed sheet of a scene, and what it was made from.
 
@@ -47,6 +54,7 @@ def mesh_of(
         mesh: table [mesh], or None for a coarse one that only shows the places (the mesh is chosen by the run).
         folder: where files that these name are looked for.
         anew: without a table [mesh], the faces of a FOLD file are not the mesh, but a coarse one of its pattern.
+        wide: tables of creases that are strips.
         thickness: of the sheet, mm, that layers of a folded form are moved apart by; None where it is not known.
 
     Raises:
@@ -55,8 +63,8 @@ def mesh_of(
     """
     table = as_table(pattern, "pattern")
     if "file" in table:
-        return _mesh_from_file(table, mesh, folder, anew, thickness)
-    drawn = _drawn(table)
+        return _mesh_from_file(table, mesh, folder, anew, thickness, wide or {})
+    drawn = widened(_drawn(table), wide or {})
     if mesh is None:
         with within("pattern"):
             return Drawn(first_mesh(drawn), drawn)
@@ -120,7 +128,12 @@ def _mesh_table(table: dict[str, object]) -> MeshTable | GmshTable | DrawnTable:
 
 
 def _mesh_from_file(
-    table: dict[str, object], mesh: object, folder: Path, anew: bool, thickness: float | None
+    table: dict[str, object],
+    mesh: object,
+    folder: Path,
+    anew: bool,
+    thickness: float | None,
+    wide: WideCreases,
 ) -> Drawn:
     from meshes.io import read_drawn, read_fold, read_pattern
     from meshes.io.drawing import PATTERNS
@@ -150,6 +163,11 @@ def _mesh_from_file(
     }
     how = None if mesh is None else _mesh_table(as_table(mesh, "mesh"))
     own_faces = isinstance(how, DrawnTable) or (mesh is None and not anew)
+    if wide and (isinstance(how, DrawnTable) or (suffix == ".fold" and own_faces)):
+        raise SceneError(
+            f"creases.{next(iter(wide))}.width: a wide crease changes the faces of the drawing; give [mesh] kind = "
+            '"gmsh" with size'
+        )
     with within("pattern.file"):
         if suffix == ".fold" and own_faces and given.sheet is None:
             apart = _layers_apart(given.untangle, thickness)
@@ -159,6 +177,8 @@ def _mesh_from_file(
         if isinstance(how, DrawnTable) or (suffix == ".fold" and own_faces):
             return Drawn(read_drawn(file, **options), None, file, options)
         drawn = read_pattern(file, **options)
+    drawn = widened(drawn, wide)
+    with within("pattern.file"):
         if how is None:
             return Drawn(first_mesh(drawn), drawn, file, options)
     return Drawn(_meshed(drawn, how), drawn, file, options)

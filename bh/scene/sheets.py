@@ -16,10 +16,9 @@ OTHER_NAMES = {"E1": "E", "nu12": "nu"}
 OF_A_GRAIN = ("E2", "G12", "grain", "strength2", "shear_strength")
 
 
-class ZoneTable(SheetTable):
-    """A part of the sheet that is made of something else; what is left out is that of the sheet."""
+class OtherSheetTable(SheetTable):
+    """What a part of the sheet is made of; what is left out is that of the sheet."""
 
-    where: Region = Field(description=REGION)
     stiff: Positive = Field(
         1.0, description="a factor of the moduli, a positive number; 1000 is as good as rigid"
     )
@@ -28,6 +27,12 @@ class ZoneTable(SheetTable):
         """Check that nothing is given by two names; the moduli may be left out."""
         if self.plies is not None or self.material is not None or self.E is not None or self.E1 is not None:
             super().names()
+
+
+class ZoneTable(OtherSheetTable):
+    """A part of the sheet that is made of something else."""
+
+    where: Region = Field(description=REGION)
 
 
 def sheet_of(data: object) -> Sheet:
@@ -73,10 +78,20 @@ def zones_of(data: list[object], sheet: Sheet) -> tuple[SheetZone, ...]:
     Raises:
         SceneError: keys or values that cannot be; one line.
     """
-    return tuple(_zone(item, sheet, f"zones[{i}]") for i, item in enumerate(data))
+    return tuple(zone_of(item, sheet, f"zones[{i}]") for i, item in enumerate(data))
 
 
-def _zone(item: object, sheet: Sheet, at: str) -> SheetZone:
+def zone_of(item: object, sheet: Sheet, at: str) -> SheetZone:
+    """One zone.
+
+    Args:
+        item: its table.
+        sheet: of the scene.
+        at: where the table stands, for messages.
+
+    Raises:
+        SceneError: keys or values that cannot be; one line.
+    """
     table = read_table(ZoneTable, item, at)
     if table.material is not None:
         made = _of_material(table, at)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bh.scene import bodies as scene_bodies
-from bh.scene import crease_tables, loads, moving
+from bh.scene import crease_tables, loads, moving, wide_creases
 from bh.scene import patterns as scene_patterns
 from bh.scene import reading as scene_tables
 from bh.scene import sheets as scene_sheets
@@ -36,6 +36,7 @@ TABLES: dict[str, type[scene_tables.Table]] = {
     "model": schema.ModelTable,
     "supports": schema.SupportTable,
     "creases.NAME": schema.CreaseTable,
+    "creases.NAME, wide": wide_creases.WideCreaseTable,
     "steps: fold": schema.FoldTable,
     "steps: pinch": schema.PinchTable,
     "steps: moment": schema.MomentTable,
@@ -96,10 +97,15 @@ def test_nothing_is_left_out() -> None:
             | vars(scene_sheets)
             | vars(loads)
             | vars(moving)
+            | vars(wide_creases)
         ).values()
         if isinstance(kind, type) and issubclass(kind, scene_tables.Table)
     }
-    assert set(TABLES.values()) == every - {scene_tables.Table, scene_patterns.PatternTable}
+    assert set(TABLES.values()) == every - {
+        scene_tables.Table,
+        scene_patterns.PatternTable,
+        scene_sheets.OtherSheetTable,
+    }
     named = {title.split(",")[0].split(":")[0].split(".")[0] for title in TABLES}
     assert {name.split(" by ")[0].split(" as ")[0] for name in named} == set(SECTIONS) - {
         "symmetry",

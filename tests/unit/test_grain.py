@@ -22,26 +22,17 @@ from bh.mechanics.consistent.formulation import Consistent
 from bh.model.serialise import describe, rebuild
 from bh.scene.load import parse_scene
 from meshes import SheetMesh
+from verification.studies.solver import real_sheets
 from verification.studies.solver.derivatives import differences, prediction_ratio
 from verification.studies.solver.patch_tests import distorted
+from verification.studies.solver.real_sheets import CARD, card
+from verification.theory import orthotropic
 
-CARD: dict[str, Any] = {"E1": 6000.0, "E2": 2600.0, "G12": 1500.0, "nu12": 0.35, "t": 0.3}
 ANGLES = (0.0, 30.0, 45.0, 90.0, -60.0)
 
 
-def card(degrees: float, **other: float) -> Sheet:
-    return Sheet.orthotropic(**{**CARD, **other}, grain=f"{degrees}deg")
-
-
 def off_axis(degrees: float) -> tuple[float, float, float]:
-    """Compliances S11, S16 and S66 in the axes of the drawing, 1 / MPa."""
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    along, across = 1.0 / CARD["E1"], 1.0 / CARD["E2"]
-    mixed, shear = -CARD["nu12"] / CARD["E1"], 1.0 / CARD["G12"]
-    s11 = along * c**4 + (2.0 * mixed + shear) * s**2 * c**2 + across * s**4
-    s16 = (2.0 * along - 2.0 * mixed - shear) * s * c**3 - (2.0 * across - 2.0 * mixed - shear) * s**3 * c
-    s66 = 2.0 * (2.0 * along + 2.0 * across - 4.0 * mixed - shear) * s**2 * c**2 + shear * (s**4 + c**4)
-    return s11, s16, s66
+    return orthotropic.off_axis(CARD, degrees)
 
 
 def sector(along: int = 8, rows: int = 2, kind: Any = "staggered", turn: float = 0.0) -> SheetMesh:
@@ -83,14 +74,8 @@ def test_pulled_strip(name: str, degrees: float) -> None:
 @pytest.mark.parametrize("degrees", [0.0, 45.0, 70.0])
 def test_twisted_plate(name: str, degrees: float) -> None:
     """A plate on three corners, loaded at the fourth: M_xy = P / 2 all over, w = 3 P a b S66 / t^3."""
-    a, b, load = 30.0, 20.0, 1e-6
-    mesh = meshes.structured(meshes.strip(a, b), along=4, rows=2)
-    model = Model(mesh, card(degrees), formulation=name).support("rigid-body")
-    for corner in ("inner-start", "inner-end", "outer-start"):
-        model = model.support(f"corner:{corner}", "z")
-    path = bh.trace(model.force("corner:outer-end", total=(0.0, 0.0, load)))
-    exact = 3.0 * load * a * b * off_axis(degrees)[2] / CARD["t"] ** 3
-    assert path[-1].points[mesh.nodes("corner:outer-end"), 2] == pytest.approx(exact, rel=1e-6)
+    exact = orthotropic.twisted(CARD, *real_sheets.TWISTED, real_sheets.CORNER, degrees)
+    assert real_sheets.twisted(degrees, name, 4) == pytest.approx(exact, rel=1e-6)
 
 
 @pytest.mark.parametrize("degrees", [0.0, 45.0, 90.0])

@@ -72,6 +72,7 @@ STUDIES = (
     Study("eigenvalues", "solver"),
     Study("loads", "solver"),
     Study("actuated", "solver", seconds=8),
+    Study("real_sheets", "solver", seconds=30),
     Study("bifurcations", "solver", seconds=150),
     Study("published", "solver", seconds=250),
     Study("cones", "solver", long=True),

@@ -69,7 +69,7 @@ def sheet_elements(
     mesh, sheet = model.mesh, model.sheet
     if model.zones:
         raise ModelError(
-            "bars and hinges are of one sheet all over; fold a sheet with zones by 'consistent' or 'shell'"
+            "bars and hinges are of one sheet all over; fold one with zones or wide creases by 'consistent' or 'shell'"
         )
     if load_step.growth is not None:
         raise ModelError(

@@ -6,21 +6,17 @@ Tolerances were set before the first run: 1 % on the finest mesh of each formula
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 import bh
 import meshes
-from verification.framework.checks import CaseResult, Context, Cost, line, plot
+from verification.framework.checks import CaseResult, Context
+from verification.studies.solver.closed_forms import KINDS, Problem, judge
 from verification.theory import actuated as theory
 
 CASE = "actuated"
 TOLERANCE, QUICK_TOLERANCE = 0.01, 0.04
-LEVELS = {"consistent": (8, 16, 32), "shell": (8, 16)}  # cells along
-KINDS = {"consistent": "alternating", "shell": "mirrored"}
 LONG, WIDE, SIDE = 60.0, 10.0, 20.0  # of the strip and the square, mm
 STEEL, BRASS = (200000.0, 0.1, 1.2e-5), (100000.0, 0.2, 1.9e-5)  # E, t, expansion
 HEAT = 20.0
@@ -29,17 +25,6 @@ SWELL = (-1e-7, 3e-5)
 PLY = 0.125  # mm
 RADIUS = 20.0  # of the cylinder, mm
 BOWL = 1e-5  # 1 / mm
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A sheet and a figure of it; `found` by a formulation with a number of cells along the sheet."""
-
-    name: str
-    source: str
-    unit: str
-    exact: float
-    found: Callable[[str, int], float]
 
 
 def problems() -> tuple[Problem, ...]:
@@ -117,30 +102,8 @@ def run(context: Context) -> CaseResult:
         "Do zones, laminates and strains at rest come out as closed forms say?",
         "closed forms",
     )
-    levels = {name: each[:-1] if context.quick else each for name, each in LEVELS.items()}
     for problem in problems():
-        series = []
-        for formulation, cells in levels.items():
-            errors = []
-            for along in cells:
-                began = time.perf_counter()
-                value = problem.found(formulation, along)
-                allowed = QUICK_TOLERANCE if context.quick else TOLERANCE
-                result.check(
-                    problem.name,
-                    value,
-                    unit=problem.unit,
-                    reference=problem.exact,
-                    source=problem.source,
-                    tolerance=allowed if along == cells[-1] else None,
-                    params={"formulation": formulation, "along": along},
-                    path=Cost(wall_time_s=time.perf_counter() - began),
-                )
-                errors.append(100.0 * abs(value / problem.exact - 1.0))
-            series.append(line(formulation, [float(each) for each in cells], errors))
-        about = f"{problem.name} against {problem.source}."
-        name = "actuated-" + "".join(c if c.isalnum() else "-" for c in problem.name)
-        result.plots.append(plot(name, problem.name, "cells along", "error, %", series, about, log="xy"))
+        judge(result, CASE, problem, context.quick, (TOLERANCE, QUICK_TOLERANCE))
     result.notes.append(
         "The bimetal strip and [0/90] are those of lamination theory; both metals have one nu, so that a plate has the "
         "curvature of Timoshenko's strip."

@@ -1,0 +1,207 @@
+"""Creases that are strips: their lines, closed forms, the sharp limit in both formulations, scenes, and bad input."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bh
+import meshes
+from bh.model.serialise import describe, rebuild
+from bh.scene.load import parse_scene
+from meshes.curves import Arc, Line, Polyline, sample
+
+SHEET = bh.Sheet(E=4000.0, nu=0.3, t=0.2)
+SECTOR = meshes.annulus_sector(100.0, 10.0, 0.6)
+SCENE = """
+[pattern]
+kind = "annulus_sector"
+radius = 100.0
+width = 10.0
+angle = 0.6
+[sheet]
+E = 4000.0
+nu = 0.3
+t = 0.2
+[mesh]
+kind = "alternating"
+along = 12
+rows = 2
+[creases.crease]
+width = "1.5mm"
+Lstar = 20
+[[steps]]
+fold = { crease = "crease", rest = "2.1rad" }
+"""
+
+
+def mesh_of(
+    pattern: meshes.CreasePattern, along: int, rows: int, kind: Any = "alternating"
+) -> meshes.SheetMesh:
+    return meshes.structured(pattern, along=along, rows=rows, kind=kind)
+
+
+def test_lines_beside_curves() -> None:
+    """Lines and arcs stay exact; other curves are offset to their own distance, and all end on the outline."""
+    flat = meshes.wide_creases(meshes.strip(60.0, 20.0, [10.0]), "1mm")
+    assert [c.curve for c in flat.creases] == [Line((0.0, 9.5), (60.0, 9.5)), Line((0.0, 10.5), (60.0, 10.5))]
+    arcs = [c.curve for c in meshes.wide_creases(SECTOR, 2.0).creases]
+    assert [arc.radius for arc in arcs if isinstance(arc, Arc)] == [99.0, 101.0]
+    wave = meshes.wide_creases(meshes.sine_tessellation(creases=2), {"crease-2": 1.5})
+    assert [c.name for c in wave.creases] == ["crease-1", "crease-2-right", "crease-2-left"]
+    import shapely
+
+    middle = shapely.LineString(sample(meshes.sine_tessellation(creases=2).creases[1].curve))
+    for crease in wave.creases[1:]:
+        assert isinstance(crease.curve, Polyline)
+        inner = crease.curve.vertices[5:-5]
+        assert np.allclose(shapely.distance(middle, shapely.points(inner)), 0.75, atol=1e-4)
+        assert np.allclose(crease.curve.vertices[[0, -1], 0], [0.0, 100.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "width", "area"),
+    [
+        (meshes.strip(60.0, 30.0, [10.0, 20.0]), 2.0, 120.0),
+        (meshes.full_annulus(50.0, 10.0), 2.0, 200.0 * math.pi),
+        (meshes.sine_tessellation(creases=2), 1.5, None),
+    ],
+)
+def test_strips_in_meshes_of_all_kinds(
+    pattern: meshes.CreasePattern, width: float, area: float | None
+) -> None:
+    name = pattern.creases[0].name
+    wide = meshes.wide_creases(pattern, width)
+    for mesh in (mesh_of(wide, 64, 1), meshes.unstructured(wide, size=3.0)):
+        model = bh.Model(mesh, SHEET).wide_crease(name, t=0.1)
+        of = model.sections.of
+        assert of is not None
+        length = pattern.creases[0].curve.length
+        assert mesh.areas[of == 1].sum() == pytest.approx(area or width * length, rel=0.01)
+        assert rebuild(*describe(model)).zones == model.zones
+
+
+def cantilever(formulation: str, width: float, k: float, load: float) -> tuple[float, float]:
+    """Rise of the end of a clamped strip whose middle is a crease of that width (0: sharp), and its closed form, mm."""
+    pattern = meshes.strip(20.0, 40.0, [20.0])
+    flat = bh.Sheet(E=4000.0, nu=0.0, t=0.2)
+    along, rows, kind = (8, 8, "alternating") if formulation == "consistent" else (4, 4, "mirrored")
+    mesh = mesh_of(meshes.wide_creases(pattern, width) if width else pattern, along, rows, kind)
+    model = bh.Model(mesh, flat, formulation=formulation).support("edge:inner", "xyz", clamp=True)
+    model = model.wide_crease("crease", stiffness=k) if width else model.crease("crease", stiffness=k)
+    state = bh.trace(
+        model.step(bh.LineForce("edge:outer", (0.0, 0.0, load))), estimate=False, neighbours=False
+    )[-1]
+    D, a = flat.bending_stiffness(), 20.0
+    within = (width**3 / 12.0 + width * a**2) / width / k if width else a**2 / k
+    return float(state.displacement("edge:outer")[:, 2].mean()), load * (within + (2.0 * a) ** 3 / (3.0 * D))
+
+
+@pytest.mark.parametrize(("formulation", "tolerance"), [("consistent", 5e-3), ("shell", 1e-4)])
+def test_closed_form_and_the_sharp_limit(formulation: str, tolerance: float) -> None:
+    """The strip turns by M / k and the sheet's own share: off the sharp crease by w^2 / (12 a^2) only, order 2."""
+    k, load = 0.2, 1e-7
+    for width in (4.0, 0.0):
+        found, exact = cantilever(formulation, width, k, load)
+        assert found == pytest.approx(exact, rel=tolerance)
+    wide, half, sharp = (cantilever(formulation, width, k, load)[1] for width in (4.0, 2.0, 0.0))
+    assert (wide - sharp) / (half - sharp) == pytest.approx(4.0, rel=1e-6)
+
+
+def folded(formulation: str, width: float, along: int, rows: int, kind: str) -> bh.State:
+    mesh = mesh_of(meshes.wide_creases(SECTOR, width) if width else SECTOR, along, rows, kind)
+    model = bh.Model(mesh, SHEET, formulation=formulation)
+    if width:
+        model = model.wide_crease("crease", Lstar=20.0).fold("crease", rest=math.pi - 1.0)
+    else:
+        model = model.fold("crease", rest=math.pi - 1.0, Lstar=20.0)
+    return bh.trace(model, estimate=False, neighbours=False).require()[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("formulation", "along", "rows", "kind"),
+    [("consistent", 64, 4, "alternating"), ("shell", 24, 2, "mirrored")],
+)
+def test_curved_crease_goes_to_the_sharp_one(formulation: str, along: int, rows: int, kind: str) -> None:
+    """Fold angles at a rate of 1.5 or more, energies to 5 % at half a millimetre; a mountain stays a mountain."""
+    sharp, *wide = (folded(formulation, width, along, rows, kind) for width in (0.0, 2.0, 1.0, 0.5))
+    off = [sharp.fold_angle("crease").mean() - state.fold_angle("crease").mean() for state in wide]
+    assert 0.0 < off[2] < off[1] < off[0] < 0.03
+    assert math.log2(off[0] / off[1]) > 1.5
+    assert wide[2].energy.total == pytest.approx(sharp.energy.total, rel=0.05)
+    assert wide[0].energy.total > 1.5 * sharp.energy.total  # a wide strip of a curved crease has to stretch
+
+
+@pytest.mark.slow
+def test_both_formulations_of_a_wide_crease() -> None:
+    one = folded("consistent", 1.0, 96, 8, "alternating")
+    two = folded("shell", 1.0, 48, 2, "mirrored")
+    assert one.energy.total == pytest.approx(two.energy.total, rel=0.02)
+    assert one.fold_angle("crease").mean() == pytest.approx(two.fold_angle("crease").mean(), rel=1e-3)
+
+
+def test_scene(tmp_path: Path) -> None:
+    scene = parse_scene(SCENE)
+    assert scene.model.zones[0].where == "strip:crease"
+    every = parse_scene(SCENE.replace("creases.crease", "creases.all"))
+    assert every.model.zones == scene.model.zones
+    made = parse_scene(SCENE.replace("Lstar = 20", "stiff = 0.1"))
+    assert abs(made.model.zones[0].sheet.E - 400.0) < 1e-9
+    state = bh.trace(scene.model, estimate=False, neighbours=False)[-1]
+    assert state.fold_angle("crease").mean() == pytest.approx(math.pi - 2.1, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('width = "1.5mm"', "width = -1", "creases.crease.width = -1 cannot be"),
+        ('width = "1.5mm"', 'width = "1.5kg"', "creases.crease.width"),
+        ('width = "1.5mm"', "width = 30", "is 30 mm wide and leaves the sheet"),
+        ("Lstar = 20", "Lstar = 20\nt = 0.1", "has Lstar and t, which say the same"),
+        ("Lstar = 20", "", "needs Lstar or stiffness, or what its strip is made of"),
+        ("Lstar = 20", "Lstar = 20\nrest = 2", "unknown key creases.crease.rest"),
+        ("creases.crease", "creases.cease", "did you mean 'crease'"),
+        ("rest =", "to =", "is a strip and has no line whose angle could be imposed: give rest"),
+        (
+            'fold = { crease = "crease", rest = "2.1rad" }',
+            'pinch = { crease = "crease" }',
+            "is a strip, not a line",
+        ),
+        (
+            "[mesh]",
+            '[model]\nformulation = "bars-and-hinges"\n[mesh]',
+            "zones or wide creases by 'consistent' or",
+        ),
+    ],
+)
+def test_bad_input_is_one_line(old: str, new: str, said: str) -> None:
+    with pytest.raises(bh.InputError, match=said) as caught:
+        bh.trace(parse_scene(SCENE.replace(old, new)).model)
+    assert "\n" not in str(caught.value)
+
+
+def test_patterns_that_cannot() -> None:
+    cross = meshes.CreasePattern(
+        rings=(np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]]),),
+        creases=(
+            meshes.Crease("a", Line((0.0, 10.0), (20.0, 10.0))),
+            meshes.Crease("b", Line((10.0, 10.0), (10.0, 20.0))),
+        ),
+    )
+    tight = meshes.strip(20.0, 20.0, [10.0])
+    cases: tuple[tuple[meshes.CreasePattern, Any, str], ...] = (
+        (cross, {"a": 1.0}, "crease 'a' is 1 mm wide and meets crease 'b'"),
+        (cross, {"b": 1.0}, r"crease 'b' ends at \(10, 10\) inside the sheet"),
+        (tight, {"crease": "nan"}, "nan"),
+        (tight, {"no": 1.0}, "no single crease 'no'"),
+        (meshes.strip(60.0, 30.0, [14.0, 16.0]), 3.0, "meets crease"),
+        (meshes.full_annulus(5.0, 4.9), 11.0, "turns on less than half its width"),
+    )
+    for pattern, width, said in cases:
+        with pytest.raises(bh.InputError, match=said):
+            meshes.wide_creases(pattern, width)
