@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bh.solvers.hindrance import clear_guess
 from bh.solvers.load_control import LoadControl, jump
 from bh.solvers.modes import lowest_mode
 from bh.solvers.newton import Solution
@@ -131,7 +132,7 @@ class March:
 
     def _solve(self, lam: float, patient: bool) -> Generator[Array, None, Solution]:
         """A state at `lam` near the last ones; `patient` goes downhill where full steps do not converge."""
-        q, forces = extrapolate(self.points, lam)
+        q, forces = clear_guess(self.system, self.here, lam, extrapolate(self.points, lam), None)
         found = yield from self._newton.full_steps(self.system, q, lam, forces)
         if found.converged or not patient:
             return found

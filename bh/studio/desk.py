@@ -15,6 +15,7 @@ import bh.studio.messages as asked
 from bh.analysis.contact import self_contact
 from bh.errors import InputError
 from bh.live import Controls, Session, held
+from bh.live.holding import chains
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
 from bh.solving.trace import trace
@@ -58,10 +59,10 @@ class Desk:
             controls: as it was handled before; None for flat.
         """
         model = sheet.model if sheet.model.supports else held(sheet.model)
-        self.sheet = replace(sheet, model=model)
-        self.session = Session(model, settles=sheet.settles)
+        session = Session(model, settles=sheet.settles)
         if controls is not None:
-            self.session.ask(controls)
+            session.ask(controls)
+        self.sheet, self.session = replace(sheet, model=model), session
         self.frame = self.session.update(0.0)
         self._finer = None  # it is of another sheet
         give_back()
@@ -119,6 +120,10 @@ class Desk:
                 self.put(of_library(name, self.material, values))
             case asked.Spring(crease=crease, Lstar=Lstar):
                 self.put(self.sheet.sprung(crease, Lstar), self.session.wanted)
+            case asked.Crease(crease=crease, kind=kind):
+                self._turn(self.sheet.turned(crease, kind))
+            case asked.Contact(on=on):
+                self.put(self.sheet.stopping(on), self.session.wanted)
             case asked.Hold(node=node, on=on):
                 self._hold(node, on)
             case asked.Material():
@@ -172,6 +177,16 @@ class Desk:
         model = replace(model, supports=other)
         model = model.support([node], "xyz") if on else model
         self.put(replace(self.sheet, model=model), self.session.wanted)
+
+    def _turn(self, sheet: LiveSheet) -> None:
+        """The same handling of other kinds of creases; one that was flat goes as far as the others have gone."""
+        wanted = self.session.wanted
+        parts = [angle / sheet.full[name] for name, angle in wanted.folds.items()]
+        gone = float(np.median(parts)) if parts else 0.0
+        folded = [name for name, kind in sheet.model.mesh.folds.items() if kind != "flat"]
+        names = chains(sheet.model.mesh, folded)
+        folds = {name: wanted.folds.get(name, gone * sheet.full[name]) for name in names}
+        self.put(sheet, replace(wanted, folds=folds))
 
     def _change(self, message: asked.Material) -> None:
         now = self.sheet.model.sheet

@@ -54,6 +54,21 @@ class Spring(Message):
     Lstar: Positive | None = None
 
 
+class Crease(Message):
+    """A crease to another kind: what it is drawn as, from now on."""
+
+    do: Literal["crease"]
+    crease: str
+    kind: Literal["mountain", "valley", "flat"]
+
+
+class Contact(Message):
+    """Panels stop each other, or pass through each other."""
+
+    do: Literal["contact"]
+    on: bool
+
+
 class Film(Message):
     """Pictures of the folded sheet, as JPEG or PNG, to a GIF or an MP4."""
 
@@ -144,6 +159,8 @@ Asked = (
     Open
     | Pattern
     | Spring
+    | Crease
+    | Contact
     | Film
     | Fold
     | Percent

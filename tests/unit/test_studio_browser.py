@@ -23,6 +23,10 @@ from tests.unit.browsers import needs_browser
 pytestmark = needs_browser
 PATIENCE = 30_000  # ms
 DATA = Path(__file__).resolve().parents[1] / "data"
+MIDDLE = """(name) => {
+  const box = document.querySelector(`#flat g[data-crease=${name}] .hit`).getBoundingClientRect();
+  return [box.left + box.width / 2, box.top + box.height / 2];
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -221,7 +225,9 @@ def test_the_sheet_that_is_turned_is_seen_refined_again(window: Visit) -> None:
     page.mouse.move(box["x"] + 60, box["y"] + 30, steps=3)
     page.mouse.up()
     assert page.evaluate("studio.refined")
-    assert np.linalg.norm(np.subtract(page.evaluate("studio.place(12)"), before)) > 5.0  # pixels: it was turned
+    assert (
+        np.linalg.norm(np.subtract(page.evaluate("studio.place(12)"), before)) > 5.0
+    )  # pixels: it was turned
     assert window.told == []
 
 
@@ -336,6 +342,31 @@ def test_a_crease_lights_up_and_a_dot_holds(window: Visit) -> None:
     page.locator("#flat circle:not(.held)").first.focus()
     page.keyboard.press("Space")
     page.wait_for_function(f"studio.sheet.held.length === {held + 1}")
+
+
+def test_kinds_of_creases_and_contact_are_changed(window: Visit) -> None:
+    """By a click and a choice, by a key, and by the box: the crease goes the other way, panels stop each other."""
+    page = window.page
+    page.locator("#library").select_option("strip")
+    page.wait_for_function("studio.sheet.name === 'strip'")
+    page.locator("#percent").fill("20")
+    window.rests("Object.values(head.asked)[0] > 0.5")
+    page.mouse.click(*page.evaluate(MIDDLE, "crease-2"))  # a straight line has no box to click
+    assert page.evaluate("document.activeElement.dataset.crease") == "crease-2"
+    assert page.locator("#kind").input_value() == "valley"
+    page.locator("#kind").select_option("flat")
+    window.rests("Object.keys(head.folds).length === 1")
+    page.locator("#flat g[data-crease=crease-2]").focus()
+    page.keyboard.press("m")
+    window.rests("Math.abs(head.folds['crease-2'] - 0.2 * Math.PI) < 1e-6")
+    assert page.evaluate("studio.sheet.creases[1].fold") == "mountain"
+    assert page.evaluate("document.activeElement.dataset.crease") == "crease-2"  # it stays where it was
+    assert page.locator("#spring-of").input_value() == "crease-2"
+    page.locator("#contact").check()
+    page.wait_for_function("studio.sheet.contact")
+    window.rests("Object.values(head.asked)[0] > 0.5")
+    assert page.locator("#meets").inner_text() == "stop each other"
+    assert window.told == []
 
 
 def test_colours_have_a_scale_with_a_unit(window: Visit) -> None:

@@ -43,7 +43,7 @@ function again() {
 }
 function remembered(message) {
   if (message.do === "open" || message.do === "pattern") laid = laid.filter((each) => each.do === "material");
-  if (["open", "pattern", "material", "spring", "hold"].includes(message.do)) laid.push(message);
+  if (["open", "pattern", "material", "spring", "hold", "crease", "contact"].includes(message.do)) laid.push(message);
 }
 const before = []; // what is to be done before anything is asked
 export const whenAsked = (done) => before.push(done);

@@ -4,7 +4,7 @@ import { draw, fit, lay, move, seen, vector } from "./view.js";
 import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
 import { badge, finer, hand, refined, seenCoarse } from "./finer.js";
-import { history, numbers, panel, slider } from "./panel.js";
+import { history, numbers, oneCrease, panel, slider } from "./panel.js";
 import { remember, saveFilm, savePicture } from "./record.js";
 
 // ---------------------------------------------------------------- what the server sends
@@ -16,12 +16,14 @@ function answer(message) {
 }
 
 function show(sheet) {
+  const same = now.sheet?.name === sheet.name && now.sheet.points.length === sheet.points.length && now.sheet.points.every((x, i) => x === sheet.points[i]);
   Object.assign(now, { sheet, head: null, points: new Float32Array(sheet.points) });
-  seenCoarse(null); lay(sheet); fit();
+  seenCoarse(null); lay(sheet);
+  if (!same) fit(); // who turned it looks on from there
   flat(choose); panel();
 }
 
-function choose(name) { $("each").open = true; slider(name)?.focus(); }
+function choose(name) { $("each").open = true; oneCrease(name); (slider(name) ?? $("kind")).focus(); }
 
 function frame(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
@@ -52,6 +54,7 @@ $("library").onchange = (e) => { if (e.target.value) ask({ do: "pattern", name: 
 const OWN = { picture: savePicture, film: () => saveFilm("gif"), mp4: () => saveFilm("mp4") };
 $("export").onchange = (e) => { const what = e.target.value; e.target.value = ""; if (OWN[what]) OWN[what](); else if (what) { tell("It is written ..."); ask({ do: "export", what }); } };
 $("spring").onclick = () => ask({ do: "spring", crease: $("spring-of").value, Lstar: Number($("Lstar").value) || null });
+$("contact").onchange = (e) => { tell(e.target.checked ? "It is folded anew from flat, with panels that stop each other ..." : "Panels pass through each other from now on."); ask({ do: "contact", on: e.target.checked }); };
 $("material").onchange = (e) => ask({ do: "material", name: e.target.value });
 $("E").onchange = (e) => ask({ do: "material", E: Number(e.target.value) });
 $("t").onchange = (e) => ask({ do: "material", t: Number(e.target.value) });
