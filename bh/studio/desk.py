@@ -27,7 +27,10 @@ from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
 
 BUDGET = 0.03  # s of an update
 FARTHEST = 10.0  # sizes of the sheet that a hand may be away from it
+REMEMBERED = 200  # strokes that are taken back
 TIDY = 5.0  # s between two times that free memory goes back to the system
+
+Asked = tuple[LiveSheet, Controls, str]
 
 
 class Desk:
@@ -47,6 +50,9 @@ class Desk:
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
         self._tidied = time.monotonic()
         self._news: list[Json] = []
+        self._past: list[Asked] = []  # before every stroke
+        self._undone: list[Asked] = []
+        self._stroke: tuple[object, ...] | None = None
         self.put(sheet or of_library("arc"))
 
     # ------------------------------------------------------------------------------- what is asked
@@ -62,7 +68,8 @@ class Desk:
         session = Session(model, settles=sheet.settles)
         if controls is not None:
             session.ask(controls)
-        self.sheet, self.session = replace(sheet, model=model), session
+        self.sheet = sheet if model is sheet.model else replace(sheet, model=model)
+        self.session = session
         self.frame = self.session.update(0.0)
         self._finer = None  # it is of another sheet
         give_back()
@@ -83,8 +90,30 @@ class Desk:
         Raises:
             InputError: it cannot be done; the desk is as before.
         """
-        if self._laid(message):
-            return [self.describe()]
+        if isinstance(message, asked.Plain):
+            return self._plain(message.do)
+        before = self._asked()
+        answers = [self.describe()] if self._laid(message) else self._done(message)
+        if self._asked() != before:
+            self._remember(message, before)
+        return answers
+
+    def _asked(self) -> Asked:
+        """What lies on the desk and what is asked of it, to go back to."""
+        return self.sheet, self.session.wanted, self.material
+
+    def _remember(self, message: asked.Asked, before: Asked) -> None:
+        """What was asked for before a stroke; its moves after the first are of one change with it."""
+        number = message.stroke if isinstance(message, asked.Move) else None
+        stroke = None if number is None else (message.do, number, *_moved(message))
+        if stroke is None or stroke != self._stroke:
+            self._past.append(before)
+            del self._past[:-REMEMBERED]
+        self._stroke = stroke
+        self._undone.clear()
+
+    def _done(self, message: asked.Asked) -> list[Json]:
+        """Do what leaves the sheet on the desk."""
         match message:
             case asked.Fold(crease=crease, angle=angle):
                 self.session.fold(crease, angle)
@@ -99,8 +128,6 @@ class Desk:
                 self.session.pinch(a, b, gap)
             case asked.LetGo(node=node):
                 self.session.let_go(node)
-            case asked.Plain(do=what):
-                return self._plain(what)
             case asked.Colour(by=by):
                 self._paint(by)
             case asked.Export(what=what):
@@ -135,12 +162,32 @@ class Desk:
     def _plain(self, what: str) -> list[Json]:
         if what == "check":
             return [self._check()]
+        now = self._asked()
         if what == "flatten":
-            self.session.ask(Controls(dict.fromkeys(self.session.creases, 0.0)))
-            self.session.let_go()
-        elif not (self.session.undo() if what == "undo" else self.session.redo()):
+            flat = Controls(dict.fromkeys(self.session.creases, 0.0))
+            if flat != self.session.wanted:
+                self._past.append(now)
+                self._undone.clear()
+                self._ask(flat)
+            return []
+        past, future = (self._past, self._undone) if what == "undo" else (self._undone, self._past)
+        if not past:
             return [line(f"there is nothing to {what}")]
-        return []
+        sheet, wanted, material = past[-1]
+        if sheet is self.sheet:
+            self._ask(wanted)
+        else:
+            self.put(sheet, wanted)
+        self.material = material
+        past.pop()
+        future.append(now)
+        self._stroke = None
+        return [] if sheet is now[0] else [self.describe()]
+
+    def _ask(self, wanted: Controls) -> None:
+        """Ask for controls and nothing else."""
+        self.session.let_go()
+        self.session.ask(wanted)
 
     def _near(self, what: str, away: NDArray[np.float64]) -> None:
         """Refuse a place (mm from the middle of the flat sheet) from which no sheet comes back as it was."""
@@ -327,3 +374,16 @@ class Desk:
 
 def _file(name: str, data: bytes) -> Json:
     return {"kind": "file", "name": name, "data": base64.b64encode(data).decode()}
+
+
+def _moved(message: asked.Asked) -> tuple[object, ...]:
+    """Which slider, point or jaws a message moves."""
+    match message:
+        case asked.Fold(crease=crease):
+            return (crease,)
+        case asked.Pull(node=node):
+            return (node,)
+        case asked.Pinch(a=a, b=b):
+            return a, b
+        case _:
+            return ()

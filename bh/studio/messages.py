@@ -21,6 +21,12 @@ class Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class Move(Message):
+    """A slider or a point that is moved; those of one stroke of a hand, which is a number, are taken back at once."""
+
+    stroke: int | None = None
+
+
 class Open(Message):
     """A drawing that was dropped."""
 
@@ -78,7 +84,7 @@ class Film(Message):
     kind: Literal["gif", "mp4"] = "gif"
 
 
-class Fold(Message):
+class Fold(Move):
     """The fold angle of a crease, rad; "all" for all."""
 
     do: Literal["fold"]
@@ -86,14 +92,14 @@ class Fold(Message):
     angle: Finite
 
 
-class Percent(Message):
+class Percent(Move):
     """Every crease to a part of its way."""
 
     do: Literal["percent"]
     value: Annotated[float, Field(ge=-100.0, le=100.0)]
 
 
-class Pull(Message):
+class Pull(Move):
     """A node to a point, mm."""
 
     do: Literal["pull"]
@@ -101,7 +107,7 @@ class Pull(Message):
     to: Point
 
 
-class Pinch(Message):
+class Pinch(Move):
     """Two nodes to jaws that are a gap apart, mm; without one the jaws touch them where they are."""
 
     do: Literal["pinch"]

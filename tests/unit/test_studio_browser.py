@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
-import threading
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,90 +13,16 @@ import bh
 from bh.scene.load import load_scene
 from bh.studio import server
 from bh.studio.opening import Opened
-from bh.studio.server import Studio
 from bh.studio.sheets import of_library
 from tests.unit.browsers import needs_browser
+from tests.unit.studio_visits import PATIENCE, Visit
 
 pytestmark = needs_browser
-PATIENCE = 30_000  # ms
 DATA = Path(__file__).resolve().parents[1] / "data"
 MIDDLE = """(name) => {
   const box = document.querySelector(`#flat g[data-crease=${name}] .hit`).getBoundingClientRect();
   return [box.left + box.width / 2, box.top + box.height / 2];
 }"""
-
-
-@pytest.fixture(scope="module")
-def address() -> Iterator[str]:
-    """A server in a thread of its own."""
-    found: list[str] = []
-    ready, loop = threading.Event(), asyncio.new_event_loop()
-
-    async def serve() -> None:
-        studio = Studio()
-        site, where = studio.serve()
-        found.append(where)
-        ready.set()
-        try:
-            await asyncio.Event().wait()
-        finally:
-            await studio.close(site)
-
-    def run() -> None:
-        asyncio.set_event_loop(loop)
-        tasks.append(loop.create_task(serve()))
-        try:
-            loop.run_until_complete(tasks[0])
-        except asyncio.CancelledError:
-            loop.close()
-
-    tasks: list[asyncio.Task[None]] = []
-    thread = threading.Thread(target=run, daemon=True)
-    thread.start()
-    assert ready.wait(10.0)
-    yield found[0]
-    loop.call_soon_threadsafe(tasks[0].cancel)
-    thread.join(10.0)
-
-
-class Visit:
-    """A window that is open, and what the browser had to say."""
-
-    def __init__(self, chromium: Any, address: str, width: int = 1400, **options: Any) -> None:
-        """Open it, and wait for the sheet; `bypass_csp` lets the test look into the page."""
-        self.context = chromium.new_context(
-            viewport={"width": width, "height": 820}, bypass_csp=True, accept_downloads=True, **options
-        )
-        self.page = self.context.new_page()
-        self.page.set_default_timeout(PATIENCE)
-        self.told: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda message: self.told.append(f"{message.type}: {message.text}"))
-        self.page.on("pageerror", lambda error: self.told.append(f"error: {error}"))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.finer = 0  # finer meshes that came
-        self.page.on("websocket", lambda socket: socket.on("framereceived", self._heard))
-        self.page.goto(address)
-        self.page.wait_for_function("window.studio?.head")
-
-    def _heard(self, frame: str | bytes) -> None:
-        self.finer += isinstance(frame, bytes) and b'"mesh": {' in frame[:500]
-
-    def rests(self, condition: str = "true") -> None:
-        """Wait until the sheet is in equilibrium with what is asked, and a condition on `head` holds."""
-        self.page.wait_for_function(
-            f"(() => {{ const head = studio.head; return head?.rest && ({condition}); }})()"
-        )
-
-    def points(self) -> np.ndarray[Any, Any]:
-        return np.array(self.page.evaluate("Array.from(studio.points)")).reshape(-1, 3)
-
-
-@pytest.fixture
-def window(chromium: Any, address: str) -> Iterator[Visit]:
-    found = Visit(chromium, address)
-    yield found
-    found.context.close()
 
 
 def test_fold_pull_undo_export(window: Visit, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Kinds of creases and contact, changed under the hand: what is seen, and what a run makes of the scene."""
+"""Kinds of creases, contact and undo: what is seen under the hand, and what a run makes of the scene."""
 
 from __future__ import annotations
 
@@ -124,3 +124,42 @@ def test_a_sheet_that_cannot_be_laid_leaves_the_desk_as_it_was(monkeypatch: pyte
     with pytest.raises(InputError, match="meets itself"):
         take(desk, do="contact", on=True)
     assert (desk.sheet, desk.session) == before
+
+
+def test_a_stroke_is_taken_back_at_once_and_other_changes_too() -> None:
+    """However often the sheet was at rest within it; materials, kinds and other sheets are changes as well."""
+    desk = Desk(of_library("strip"))
+    asked: list[dict[str, float]] = []
+
+    def now() -> dict[str, float]:
+        settled(desk)
+        return dict(desk.session.wanted.folds)
+
+    asked.append(now())
+    for stroke, values in ((1, (5.0, 10.0, 15.0)), (2, (20.0, 12.0))):
+        for value in values:
+            take(desk, do="percent", value=value, stroke=stroke)
+            settled(desk)
+        asked.append(now())
+    take(desk, do="pull", node=0, to=[0.0, 0.0, 3.0], stroke=3)
+    take(desk, do="pull", node=1, to=[0.0, 0.0, 3.0], stroke=3)  # another point is another change
+    take(desk, do="material", name="steel")
+    take(desk, do="crease", crease="crease-2", kind="flat")
+    assert [len(take(desk, do="undo")) for _ in range(4)] == [1, 1, 0, 0]  # sheets are told of
+    assert desk.material == "card"
+    assert desk.sheet.model.sheet.E == of_library("strip").model.sheet.E
+    for before in (asked[2], asked[1], asked[0]):
+        assert now() == before
+        assert not desk.session.wanted.grips
+        told = take(desk, do="undo")
+    assert "nothing to undo" in str(told[0]["text"])
+    for after in asked[1:]:
+        assert not take(desk, do="redo")
+        assert now() == after
+    take(desk, do="pattern", name="arc")
+    (answer,) = take(desk, do="undo")
+    assert answer["name"] == "strip"
+    assert now() == asked[2]
+    take(desk, do="flatten")
+    take(desk, do="undo")
+    assert now() == asked[2]

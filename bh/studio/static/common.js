@@ -45,13 +45,18 @@ function remembered(message) {
   if (message.do === "open" || message.do === "pattern") laid = laid.filter((each) => each.do === "material");
   if (["open", "pattern", "material", "spring", "hold", "crease", "contact"].includes(message.do)) laid.push(message);
 }
+// A stroke: from pointer to pointer, from key to key; what moves in it is taken back by one undo.
+let stroke = 1;
+for (const begins of ["pointerdown", "keydown", "change"]) addEventListener(begins, () => { stroke += 1; }, true);
+const MOVES = ["fold", "percent", "pull", "pinch"];
 const before = []; // what is to be done before anything is asked
 export const whenAsked = (done) => before.push(done);
 export let asked = 0; // messages of this connection; what was computed before the last of them is old
 export function ask(message) {
   for (const done of before) done(message);
   if (socket?.readyState !== WebSocket.OPEN) return;
-  remembered(message); asked += 1; socket.send(JSON.stringify(message));
+  remembered(message); asked += 1;
+  socket.send(JSON.stringify(MOVES.includes(message.do) ? { ...message, stroke } : message));
 }
 
 let quiet = 0;
