@@ -302,8 +302,11 @@ class Desk:
         news, self._news = self._news, []
         return news
 
-    def picture(self) -> bytes:
+    def picture(self, heard: int = 0) -> bytes:
         """The newest frame as it travels.
+
+        Args:
+            heard: messages that have been taken until now; it is handed on.
 
         Returns:
             see `packed`; after the numbers (n, 3) positions, mm, and (n,) values of the colour.
@@ -311,7 +314,13 @@ class Desk:
         frame = self.frame
         chosen = self._colours.get(self._colour)
         values = np.zeros(len(frame.points)) if chosen is None else chosen.values(frame.state)
-        head = {**head_of(frame), "snapped": self._snapped, "left": self.session.left, "top": top_of(values)}
+        head = {
+            **head_of(frame),
+            "snapped": self._snapped,
+            "left": self.session.left,
+            "top": top_of(values),
+            "heard": heard,
+        }
         self._snapped = False
         return packed(head, frame.points, values)
 

@@ -81,14 +81,20 @@ class Visit:
         self.finer += isinstance(frame, bytes) and b'"mesh": {' in frame[:500]
 
     def rests(self, condition: str = "true") -> None:
-        """Wait until the sheet is in equilibrium with what is asked, and a condition on `head` holds."""
-        self.page.wait_for_function(
-            f"""(() => {{
-              const head = studio.head;
-              if (head?.note) throw new Error(`cannot go on: ${{head.note}}`);
-              return head?.rest && ({condition});
-            }})()"""
-        )
+        """Wait until the sheet is in equilibrium with all that was asked, and a condition on `head` holds."""
+        try:
+            self.page.wait_for_function(
+                f"""(() => {{
+                  const head = studio.head;
+                  if (head?.note) throw new Error(`cannot go on: ${{head.note}}`);
+                  return studio.rest && ({condition});
+                }})()"""
+            )
+        except Exception as error:
+            seen = self.page.evaluate(
+                "[document.getElementById('badge').textContent, message.textContent, JSON.stringify(studio.head)]"
+            )
+            raise AssertionError(f"{condition}: {str(error).splitlines()[0]}; {seen}; {self.told}") from error
 
     def points(self) -> np.ndarray[Any, Any]:
         return np.array(self.page.evaluate("Array.from(studio.points)")).reshape(-1, 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,13 @@ from tests.unit.studio_visits import PATIENCE, Visit
 
 pytestmark = needs_browser
 DATA = Path(__file__).resolve().parents[1] / "data"
+PLAYED = """async ([data, type]) => {
+  const video = document.createElement("video"), bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+  await new Promise((done) => {
+    video.onloadeddata = done; video.onerror = done; video.src = URL.createObjectURL(new Blob([bytes], { type }));
+  });
+  return { width: video.videoWidth, error: video.error && video.error.message };
+}"""
 MIDDLE = """(name) => {
   const box = document.querySelector(`#flat g[data-crease=${name}] .hit`).getBoundingClientRect();
   return [box.left + box.width / 2, box.top + box.height / 2];
@@ -173,6 +181,16 @@ def test_a_recording_is_played_and_saved_as_a_film_and_a_picture(window: Visit, 
             colours = found.convert("RGB").getcolors(10**6)
             assert len(colours) > 50  # the sheet is on it
     window.rests("Object.values(head.asked)[0] > 0.9")
+    with page.expect_download() as waiting:  # as the browser writes it
+        page.locator("#export").select_option("mp4")
+    kind = waiting.value.suggested_filename.rsplit(".", 1)[1]
+    assert kind.lower() in page.locator("#export option[value=mp4]").inner_text().lower()
+    waiting.value.save_as(tmp_path / f"film.{kind}")
+    data = (tmp_path / f"film.{kind}").read_bytes()
+    assert data[4:8] == b"ftyp" if kind == "mp4" else data[:4] == b"\x1a\x45\xdf\xa3"
+    shown = page.evaluate(PLAYED, [base64.b64encode(data).decode(), f"video/{kind}"])
+    assert shown["width"] > 300
+    assert shown["error"] is None
     assert window.told == []
 
 

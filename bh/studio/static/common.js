@@ -67,9 +67,11 @@ export function tell(text, stays = false) {
 }
 
 export function save(name, data) {
-  const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+  download(name, new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))]));
+}
+export function download(name, blob) {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([bytes])); link.download = name; link.click();
+  link.href = URL.createObjectURL(blob); link.download = name; link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 export const drawn = () => { if (socket?.readyState === WebSocket.OPEN) socket.send("drawn"); };

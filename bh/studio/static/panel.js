@@ -3,6 +3,7 @@ import { $, ask, degrees, make, now, number, tell } from "./common.js";
 import { light } from "./view.js";
 import { key, panel as pinchPanel, wide } from "./pinch.js";
 import { taken } from "./pull.js";
+import { written } from "./record.js";
 
 const MOST = 200; // sliders of single creases
 export const history = { energy: [], force: [] };
@@ -13,7 +14,7 @@ function options(select, names, chosen, first = "") {
   for (const [value, text] of names) select.append(new Option(text, value, false, value === chosen));
 }
 
-const SAID = { scene: "scene, for bh run", python: "lines of Python", result: "numbers, JSON", picture: "picture, PNG", film: "film of the recording, GIF", mp4: "film of the recording, MP4" };
+const SAID = { scene: "scene, for bh run", python: "lines of Python", result: "numbers, JSON", picture: "picture, PNG", film: "film of the recording, GIF", mp4: `film of the recording, ${(written?.[1] ?? "mp4").toUpperCase().replace("WEBM", "WebM")}` };
 function saves(formats) {
   const select = $("export"), groups = { "What was done": [], "Folded sheet": [], "Flat pattern, to cut": [] };
   for (const name of [...formats, "picture", "film", "mp4"]) groups[name.startsWith("flat.") ? "Flat pattern, to cut" : name.startsWith("folded.") || name in { picture: 1, film: 1, mp4: 1 } ? "Folded sheet" : "What was done"].push(name);
