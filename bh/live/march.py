@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.live.keeping import kept_steps
+from bh.solvers.hindrance import clear_guess
 from bh.solvers.load_control import LoadControl, jump
 from bh.solvers.modes import count_negative, lowest_mode
 from bh.solvers.newton import Newton, Solution
@@ -171,7 +172,7 @@ class March:
 
         One that was found by `quick` steps is not looked at for stability.
         """
-        q, forces = extrapolate(self.points, lam)
+        q, forces = clear_guess(self.system, self.here, lam, extrapolate(self.points, lam), None)
         full = kept_steps if quick else Newton.full_steps
         found = yield from full(self._newton, self.system, q, lam, forces)
         if found.converged or not patient:

@@ -15,6 +15,7 @@ import bh.studio.messages as asked
 from bh.analysis.contact import self_contact
 from bh.errors import InputError
 from bh.live import Controls, Session, held
+from bh.live.holding import chains
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
 from bh.solving.trace import trace
@@ -26,7 +27,10 @@ from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
 
 BUDGET = 0.03  # s of an update
 FARTHEST = 10.0  # sizes of the sheet that a hand may be away from it
+REMEMBERED = 200  # strokes that are taken back
 TIDY = 5.0  # s between two times that free memory goes back to the system
+
+Asked = tuple[LiveSheet, Controls, str]
 
 
 class Desk:
@@ -46,6 +50,9 @@ class Desk:
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
         self._tidied = time.monotonic()
         self._news: list[Json] = []
+        self._past: list[Asked] = []  # before every stroke
+        self._undone: list[Asked] = []
+        self._stroke: tuple[object, ...] | None = None
         self.put(sheet or of_library("arc"))
 
     # ------------------------------------------------------------------------------- what is asked
@@ -58,10 +65,11 @@ class Desk:
             controls: as it was handled before; None for flat.
         """
         model = sheet.model if sheet.model.supports else held(sheet.model)
-        self.sheet = replace(sheet, model=model)
-        self.session = Session(model, settles=sheet.settles)
+        session = Session(model, settles=sheet.settles)
         if controls is not None:
-            self.session.ask(controls)
+            session.ask(controls)
+        self.sheet = sheet if model is sheet.model else replace(sheet, model=model)
+        self.session = session
         self.frame = self.session.update(0.0)
         self._finer = None  # it is of another sheet
         give_back()
@@ -82,8 +90,30 @@ class Desk:
         Raises:
             InputError: it cannot be done; the desk is as before.
         """
-        if self._laid(message):
-            return [self.describe()]
+        if isinstance(message, asked.Plain):
+            return self._plain(message.do)
+        before = self._asked()
+        answers = [self.describe()] if self._laid(message) else self._done(message)
+        if self._asked() != before:
+            self._remember(message, before)
+        return answers
+
+    def _asked(self) -> Asked:
+        """What lies on the desk and what is asked of it, to go back to."""
+        return self.sheet, self.session.wanted, self.material
+
+    def _remember(self, message: asked.Asked, before: Asked) -> None:
+        """What was asked for before a stroke; its moves after the first are of one change with it."""
+        number = message.stroke if isinstance(message, asked.Move) else None
+        stroke = None if number is None else (message.do, number, *_moved(message))
+        if stroke is None or stroke != self._stroke:
+            self._past.append(before)
+            del self._past[:-REMEMBERED]
+        self._stroke = stroke
+        self._undone.clear()
+
+    def _done(self, message: asked.Asked) -> list[Json]:
+        """Do what leaves the sheet on the desk."""
         match message:
             case asked.Fold(crease=crease, angle=angle):
                 self.session.fold(crease, angle)
@@ -98,8 +128,6 @@ class Desk:
                 self.session.pinch(a, b, gap)
             case asked.LetGo(node=node):
                 self.session.let_go(node)
-            case asked.Plain(do=what):
-                return self._plain(what)
             case asked.Colour(by=by):
                 self._paint(by)
             case asked.Export(what=what):
@@ -119,6 +147,10 @@ class Desk:
                 self.put(of_library(name, self.material, values))
             case asked.Spring(crease=crease, Lstar=Lstar):
                 self.put(self.sheet.sprung(crease, Lstar), self.session.wanted)
+            case asked.Crease(crease=crease, kind=kind):
+                self._turn(self.sheet.turned(crease, kind))
+            case asked.Contact(on=on):
+                self.put(self.sheet.stopping(on), self.session.wanted)
             case asked.Hold(node=node, on=on):
                 self._hold(node, on)
             case asked.Material():
@@ -130,12 +162,32 @@ class Desk:
     def _plain(self, what: str) -> list[Json]:
         if what == "check":
             return [self._check()]
+        now = self._asked()
         if what == "flatten":
-            self.session.ask(Controls(dict.fromkeys(self.session.creases, 0.0)))
-            self.session.let_go()
-        elif not (self.session.undo() if what == "undo" else self.session.redo()):
+            flat = Controls(dict.fromkeys(self.session.creases, 0.0))
+            if flat != self.session.wanted:
+                self._past.append(now)
+                self._undone.clear()
+                self._ask(flat)
+            return []
+        past, future = (self._past, self._undone) if what == "undo" else (self._undone, self._past)
+        if not past:
             return [line(f"there is nothing to {what}")]
-        return []
+        sheet, wanted, material = past[-1]
+        if sheet is self.sheet:
+            self._ask(wanted)
+        else:
+            self.put(sheet, wanted)
+        self.material = material
+        past.pop()
+        future.append(now)
+        self._stroke = None
+        return [] if sheet is now[0] else [self.describe()]
+
+    def _ask(self, wanted: Controls) -> None:
+        """Ask for controls and nothing else."""
+        self.session.let_go()
+        self.session.ask(wanted)
 
     def _near(self, what: str, away: NDArray[np.float64]) -> None:
         """Refuse a place (mm from the middle of the flat sheet) from which no sheet comes back as it was."""
@@ -172,6 +224,16 @@ class Desk:
         model = replace(model, supports=other)
         model = model.support([node], "xyz") if on else model
         self.put(replace(self.sheet, model=model), self.session.wanted)
+
+    def _turn(self, sheet: LiveSheet) -> None:
+        """The same handling of other kinds of creases; one that was flat goes as far as the others have gone."""
+        wanted = self.session.wanted
+        parts = [angle / sheet.full[name] for name, angle in wanted.folds.items()]
+        gone = float(np.median(parts)) if parts else 0.0
+        folded = [name for name, kind in sheet.model.mesh.folds.items() if kind != "flat"]
+        names = chains(sheet.model.mesh, folded)
+        folds = {name: wanted.folds.get(name, gone * sheet.full[name]) for name in names}
+        self.put(sheet, replace(wanted, folds=folds))
 
     def _change(self, message: asked.Material) -> None:
         now = self.sheet.model.sheet
@@ -240,8 +302,11 @@ class Desk:
         news, self._news = self._news, []
         return news
 
-    def picture(self) -> bytes:
+    def picture(self, heard: int = 0) -> bytes:
         """The newest frame as it travels.
+
+        Args:
+            heard: messages that have been taken until now; it is handed on.
 
         Returns:
             see `packed`; after the numbers (n, 3) positions, mm, and (n,) values of the colour.
@@ -249,7 +314,13 @@ class Desk:
         frame = self.frame
         chosen = self._colours.get(self._colour)
         values = np.zeros(len(frame.points)) if chosen is None else chosen.values(frame.state)
-        head = {**head_of(frame), "snapped": self._snapped, "left": self.session.left, "top": top_of(values)}
+        head = {
+            **head_of(frame),
+            "snapped": self._snapped,
+            "left": self.session.left,
+            "top": top_of(values),
+            "heard": heard,
+        }
         self._snapped = False
         return packed(head, frame.points, values)
 
@@ -312,3 +383,16 @@ class Desk:
 
 def _file(name: str, data: bytes) -> Json:
     return {"kind": "file", "name": name, "data": base64.b64encode(data).decode()}
+
+
+def _moved(message: asked.Asked) -> tuple[object, ...]:
+    """Which slider, point or jaws a message moves."""
+    match message:
+        case asked.Fold(crease=crease):
+            return (crease,)
+        case asked.Pull(node=node):
+            return (node,)
+        case asked.Pinch(a=a, b=b):
+            return a, b
+        case _:
+            return ()

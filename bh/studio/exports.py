@@ -148,6 +148,15 @@ def python_text(sheet: LiveSheet, session: Session) -> str:
         if sheet.tables
         else "model = ...  # the model that was given to the window\n"
     )
+    first = ""
+    turned = {name: session.mesh.folds[name] for name in sheet.drawn} if sheet.tables else {}
+    if turned:
+        first = "from dataclasses import replace\n\n"
+        kinds = ", ".join(f"{quoted(name)}: {quoted(kind)}" for name, kind in turned.items())
+        begin += (
+            f"folds = {{**model.mesh.folds, {kinds}}}  # other kinds of creases than in the drawing\n"
+            "model = replace(model, mesh=replace(model.mesh, folds=folds))\n"
+        )
     pulls = "".join(
         f"session.pull({node}, {grip.to!r}, {grip.stiffness!r})\n"
         for node, grip in session.wanted.grips.items()
@@ -157,7 +166,8 @@ def python_text(sheet: LiveSheet, session: Session) -> str:
         * session.left
     )
     return (
-        f'"""{sheet.name} as it stood in bh studio.{said}"""\n\nimport bh\nfrom bh.live import Session\n\n{begin}'
+        f'"""{sheet.name} as it stood in bh studio.{said}"""\n\n'
+        f"{first}import bh\nfrom bh.live import Session\n\n{begin}"
         f"session = Session(model)\nfor crease, angle in {{{folds}}}.items():\n    session.fold(crease, angle)\n"
         f"{pulls}frame = session.rest()\nprint(frame.state, frame.fold_angles(), frame.forces)\n"
     )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bh.live import Frame, Jaws, Session
+from bh.live.holding import chains
 from bh.scene.folding import MATERIALS
 from bh.studio.colours import Colour
 from bh.studio.exports import FORMATS
@@ -123,8 +124,14 @@ def described(
         colour: that it has.
     """
     mesh, model = session.mesh, sheet.model
+    turns = {*session.creases, *(n for n in chains(mesh, list(mesh.creases)) if mesh.folds.get(n) == "flat")}
     creases = [
-        {**each, "full": sheet.full.get(str(each["name"]), np.pi), "handled": each["name"] in session.creases}
+        {
+            **each,
+            "full": sheet.full.get(str(each["name"]), np.pi),
+            "handled": each["name"] in session.creases,
+            "turns": each["name"] in turns,
+        }
         for each in creases_of(mesh)
     ]
     return {
@@ -140,6 +147,7 @@ def described(
         "springs": {name: law.Lstar for name, law in model.creases.items()},
         "formats": list(FORMATS),
         "formulation": model.formulation,
+        "contact": model.stops_itself,
         "unknowns": session.size,
         "percent": sheet.percent,
         "remarks": list(sheet.remarks),

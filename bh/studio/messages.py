@@ -21,6 +21,12 @@ class Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class Move(Message):
+    """A slider or a point that is moved; those of one stroke of a hand, which is a number, are taken back at once."""
+
+    stroke: int | None = None
+
+
 class Open(Message):
     """A drawing that was dropped."""
 
@@ -54,6 +60,21 @@ class Spring(Message):
     Lstar: Positive | None = None
 
 
+class Crease(Message):
+    """A crease to another kind: what it is drawn as, from now on."""
+
+    do: Literal["crease"]
+    crease: str
+    kind: Literal["mountain", "valley", "flat"]
+
+
+class Contact(Message):
+    """Panels stop each other, or pass through each other."""
+
+    do: Literal["contact"]
+    on: bool
+
+
 class Film(Message):
     """Pictures of the folded sheet, as JPEG or PNG, to a GIF or an MP4."""
 
@@ -63,7 +84,7 @@ class Film(Message):
     kind: Literal["gif", "mp4"] = "gif"
 
 
-class Fold(Message):
+class Fold(Move):
     """The fold angle of a crease, rad; "all" for all."""
 
     do: Literal["fold"]
@@ -71,14 +92,14 @@ class Fold(Message):
     angle: Finite
 
 
-class Percent(Message):
+class Percent(Move):
     """Every crease to a part of its way."""
 
     do: Literal["percent"]
     value: Annotated[float, Field(ge=-100.0, le=100.0)]
 
 
-class Pull(Message):
+class Pull(Move):
     """A node to a point, mm."""
 
     do: Literal["pull"]
@@ -86,7 +107,7 @@ class Pull(Message):
     to: Point
 
 
-class Pinch(Message):
+class Pinch(Move):
     """Two nodes to jaws that are a gap apart, mm; without one the jaws touch them where they are."""
 
     do: Literal["pinch"]
@@ -144,6 +165,8 @@ Asked = (
     Open
     | Pattern
     | Spring
+    | Crease
+    | Contact
     | Film
     | Fold
     | Percent

@@ -77,14 +77,14 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
         if session.left
         else ["# `bh run` ends in it: it was reached along one branch, without a snap."]
     )
-    lines += [
-        "",
+    passing = [
         "contact = false                  # as in the window, where panels pass through each other",
-        "",
     ]
+    stopping = ["contact = " + json.dumps(session.model.contact)]
+    lines += ["", *(stopping if session.model.stops_itself else passing), ""]
     lines += [SETTLING.sub("", sheet.tables)]  # a window keeps to its branch while there is one
     lines += [*_sheet_lines(session), *_support_lines(session), *_crease_lines(session)]
-    folds, pulls = _fold_lines(session), _pull_lines(session)
+    folds, pulls = _fold_lines(sheet, session), _pull_lines(session)
     if session.left:
         held = _pull_lines(session, still=True)
         lines += ["[[steps]]", *folds, *pulls, "", "[[steps]]", *folds, *held, ""]
@@ -126,9 +126,10 @@ def _crease_lines(session: Session) -> list[str]:
     return lines
 
 
-def _fold_lines(session: Session) -> list[str]:
+def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
     rows = []
-    for name, angle in session.wanted.folds.items():
+    for name, wanted in session.wanted.folds.items():
+        angle = sheet.sense(name) * wanted + 0.0  # without -0.0
         spring = _stiffness(session, name)
         rows.append(f"  {{ crease = {quoted(name)}, by = {angle!r}{', ' if spring else ''}{spring} }},")
     return ["fold = [", *rows, "]"]

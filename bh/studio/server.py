@@ -151,6 +151,8 @@ class Window(tornado.websocket.WebSocketHandler):
         self.drawn = asyncio.Event()  # the last frame was shown
         self.tasks: set[asyncio.Task[None]] = set()
         self.heard = 0  # messages
+        self.taken = 0  # of them, and how many the last frame knew of
+        self.told = 0
         self.going = threading.Event()  # nobody has asked for anything since the finer mesh was begun
 
     def check_origin(self, origin: str) -> bool:
@@ -215,7 +217,7 @@ class Window(tornado.websocket.WebSocketHandler):
             return
         await self._say(desk.describe())
         while True:
-            if not desk.busy or not self.queue.empty():
+            if not (desk.busy or self.told != self.taken) or not self.queue.empty():
                 if self.queue.empty():
                     self.going = threading.Event()  # its own, so that one that was ended stays so
                     self.going.set()
@@ -225,7 +227,8 @@ class Window(tornado.websocket.WebSocketHandler):
                     waiting.append(self.queue.get_nowait())
                 for message in newest(waiting):
                     await self._do(desk, message)
-            if desk.busy:
+                self.taken += len(waiting)
+            if desk.busy or self.told != self.taken:
                 try:
                     await run(self.studio.pool, desk.work)
                     for answer in desk.news():
@@ -233,7 +236,8 @@ class Window(tornado.websocket.WebSocketHandler):
                     if desk.busy and not self.drawn.is_set():
                         continue  # it is solved as fast as it goes, and shown as fast as the browser draws
                     await self.drawn.wait()
-                    frame = await run(self.studio.pool, desk.picture)
+                    self.told = self.taken
+                    frame = await run(self.studio.pool, desk.picture, self.told)
                 except Exception as error:  # a sheet that breaks takes its session down, not the server
                     await self._say(_fault(error))
                     desk.put(desk.sheet)

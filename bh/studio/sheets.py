@@ -23,6 +23,7 @@ from bh.scene.folding import MATERIALS, PERCENT, Wish, proposals
 from bh.scene.load import Outputs, Scene, parse_scene
 from bh.solvers.settling import Settling
 from meshes import SheetMesh
+from meshes.pattern import FoldKind
 
 LONGEST = 5_000_000  # bytes of a drawing
 MOST_TRIANGLES = 8000  # of a sheet that is to answer at once
@@ -50,6 +51,7 @@ class LiveSheet:
         drawing: name and bytes of the file that `tables` speak of; None for a pattern of the library.
         percent: of the way that is shown first.
         values: numbers of a pattern of the library that can be chosen, by key.
+        drawn: what creases were drawn as that are folded otherwise, by name.
         settles: its springs move it downhill to rest where a branch ends, as in its scene.
     """
 
@@ -61,6 +63,7 @@ class LiveSheet:
     drawing: tuple[str, bytes] | None = None
     percent: float = PERCENT
     settles: bool = False
+    drawn: Mapping[str, FoldKind] = field(default_factory=dict)
     values: Mapping[str, float | Sequence[float]] = field(default_factory=dict)
 
     def of(self, sheet: Sheet) -> LiveSheet:
@@ -78,6 +81,8 @@ class LiveSheet:
             InputError: there is no such crease.
         """
         folded = [name for name, kind in self.model.mesh.folds.items() if kind != "flat"]
+        if self.model.mesh.folds.get(crease) == "flat":
+            raise InputError(f"crease '{crease}' is flat; make it a mountain or a valley first")
         if crease not in (*folded, "all"):
             raise InputError(f"there is no crease '{crease}'; choose one of {', '.join(folded)}, or all")
         names = folded if crease == "all" else [crease]
@@ -85,6 +90,44 @@ class LiveSheet:
         if Lstar is not None:
             laws.update({name: CreaseLaw(Lstar) for name in names})
         return replace(self, model=replace(self.model, creases=laws))
+
+    def turned(self, crease: str, kind: FoldKind) -> LiveSheet:
+        """With a crease that is folded the other way, or not at all; its new angle counts the way it is then drawn.
+
+        One that was flat is a spring, as the others are, where the first of them is one.
+
+        Args:
+            crease: its name.
+            kind: "mountain", "valley" or "flat".
+
+        Raises:
+            InputError: there is no such crease.
+        """
+        mesh = self.model.mesh
+        if crease not in mesh.creases:
+            raise InputError(f"there is no crease '{crease}'; choose one of {', '.join(mesh.creases)}")
+        before = mesh.folds.get(crease, "flat")
+        drawn = dict(self.drawn)
+        was = drawn.pop(crease, before)
+        if was != kind:
+            drawn[crease] = was
+        laws, full = dict(self.model.creases), dict(self.full)
+        if kind == "flat":
+            laws.pop(crease, None)
+        elif before == "flat" and laws:
+            laws[crease] = next(iter(laws.values()))
+        full[crease] = full.get(crease) or math.pi
+        mesh = replace(mesh, folds={**mesh.folds, crease: kind})
+        return replace(self, model=replace(self.model, mesh=mesh, creases=laws), drawn=drawn, full=full)
+
+    def sense(self, crease: str) -> float:
+        """-1 where a crease is folded against the way that its file has it, which counts in a scene; else 1."""
+        was, now = self.drawn.get(crease), self.model.mesh.folds.get(crease)
+        return -1.0 if was is not None and was != now and (was, now) != ("flat", "mountain") else 1.0
+
+    def stopping(self, on: bool) -> LiveSheet:
+        """With panels that stop each other by their thickness, or pass through each other."""
+        return replace(self, model=replace(self.model, contact="thickness" if on else False))
 
     def bent(self, nu: float) -> LiveSheet:
         """The same faces as panels that bend, in place of bars and hinges.

@@ -15,3 +15,22 @@ def chromium() -> Iterator[Any]:
     """A browser for the tests of a file."""
     with opened() as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """Of a server of `bh studio` for the tests of a file."""
+    from tests.unit.studio_visits import served
+
+    with served() as found:
+        yield found
+
+
+@pytest.fixture
+def window(chromium: Any, address: str) -> Iterator[Any]:
+    """A window of its own; see `Visit`."""
+    from tests.unit.studio_visits import Visit
+
+    found = Visit(chromium, address)
+    yield found
+    found.context.close()

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
-import threading
+import base64
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,86 +14,23 @@ import bh
 from bh.scene.load import load_scene
 from bh.studio import server
 from bh.studio.opening import Opened
-from bh.studio.server import Studio
 from bh.studio.sheets import of_library
 from tests.unit.browsers import needs_browser
+from tests.unit.studio_visits import PATIENCE, Visit
 
 pytestmark = needs_browser
-PATIENCE = 30_000  # ms
 DATA = Path(__file__).resolve().parents[1] / "data"
-
-
-@pytest.fixture(scope="module")
-def address() -> Iterator[str]:
-    """A server in a thread of its own."""
-    found: list[str] = []
-    ready, loop = threading.Event(), asyncio.new_event_loop()
-
-    async def serve() -> None:
-        studio = Studio()
-        site, where = studio.serve()
-        found.append(where)
-        ready.set()
-        try:
-            await asyncio.Event().wait()
-        finally:
-            await studio.close(site)
-
-    def run() -> None:
-        asyncio.set_event_loop(loop)
-        tasks.append(loop.create_task(serve()))
-        try:
-            loop.run_until_complete(tasks[0])
-        except asyncio.CancelledError:
-            loop.close()
-
-    tasks: list[asyncio.Task[None]] = []
-    thread = threading.Thread(target=run, daemon=True)
-    thread.start()
-    assert ready.wait(10.0)
-    yield found[0]
-    loop.call_soon_threadsafe(tasks[0].cancel)
-    thread.join(10.0)
-
-
-class Visit:
-    """A window that is open, and what the browser had to say."""
-
-    def __init__(self, chromium: Any, address: str, width: int = 1400, **options: Any) -> None:
-        """Open it, and wait for the sheet; `bypass_csp` lets the test look into the page."""
-        self.context = chromium.new_context(
-            viewport={"width": width, "height": 820}, bypass_csp=True, accept_downloads=True, **options
-        )
-        self.page = self.context.new_page()
-        self.page.set_default_timeout(PATIENCE)
-        self.told: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda message: self.told.append(f"{message.type}: {message.text}"))
-        self.page.on("pageerror", lambda error: self.told.append(f"error: {error}"))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.finer = 0  # finer meshes that came
-        self.page.on("websocket", lambda socket: socket.on("framereceived", self._heard))
-        self.page.goto(address)
-        self.page.wait_for_function("window.studio?.head")
-
-    def _heard(self, frame: str | bytes) -> None:
-        self.finer += isinstance(frame, bytes) and b'"mesh": {' in frame[:500]
-
-    def rests(self, condition: str = "true") -> None:
-        """Wait until the sheet is in equilibrium with what is asked, and a condition on `head` holds."""
-        self.page.wait_for_function(
-            f"(() => {{ const head = studio.head; return head?.rest && ({condition}); }})()"
-        )
-
-    def points(self) -> np.ndarray[Any, Any]:
-        return np.array(self.page.evaluate("Array.from(studio.points)")).reshape(-1, 3)
-
-
-@pytest.fixture
-def window(chromium: Any, address: str) -> Iterator[Visit]:
-    found = Visit(chromium, address)
-    yield found
-    found.context.close()
+PLAYED = """async ([data, type]) => {
+  const video = document.createElement("video"), bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+  await new Promise((done) => {
+    video.onloadeddata = done; video.onerror = done; video.src = URL.createObjectURL(new Blob([bytes], { type }));
+  });
+  return { width: video.videoWidth, error: video.error && video.error.message };
+}"""
+MIDDLE = """(name) => {
+  const box = document.querySelector(`#flat g[data-crease=${name}] .hit`).getBoundingClientRect();
+  return [box.left + box.width / 2, box.top + box.height / 2];
+}"""
 
 
 def test_fold_pull_undo_export(window: Visit, tmp_path: Path) -> None:
@@ -246,6 +181,16 @@ def test_a_recording_is_played_and_saved_as_a_film_and_a_picture(window: Visit, 
             colours = found.convert("RGB").getcolors(10**6)
             assert len(colours) > 50  # the sheet is on it
     window.rests("Object.values(head.asked)[0] > 0.9")
+    with page.expect_download() as waiting:  # as the browser writes it
+        page.locator("#export").select_option("mp4")
+    kind = waiting.value.suggested_filename.rsplit(".", 1)[1]
+    assert kind.lower() in page.locator("#export option[value=mp4]").inner_text().lower()
+    waiting.value.save_as(tmp_path / f"film.{kind}")
+    data = (tmp_path / f"film.{kind}").read_bytes()
+    assert data[4:8] == b"ftyp" if kind == "mp4" else data[:4] == b"\x1a\x45\xdf\xa3"
+    shown = page.evaluate(PLAYED, [base64.b64encode(data).decode(), f"video/{kind}"])
+    assert shown["width"] > 300
+    assert shown["error"] is None
     assert window.told == []
 
 
@@ -338,6 +283,31 @@ def test_a_crease_lights_up_and_a_dot_holds(window: Visit) -> None:
     page.locator("#flat circle:not(.held)").first.focus()
     page.keyboard.press("Space")
     page.wait_for_function(f"studio.sheet.held.length === {held + 1}")
+
+
+def test_kinds_of_creases_and_contact_are_changed(window: Visit) -> None:
+    """By a click and a choice, by a key, and by the box: the crease goes the other way, panels stop each other."""
+    page = window.page
+    page.locator("#library").select_option("strip")
+    page.wait_for_function("studio.sheet.name === 'strip'")
+    page.locator("#percent").fill("20")
+    window.rests("Object.values(head.asked)[0] > 0.5")
+    page.mouse.click(*page.evaluate(MIDDLE, "crease-2"))  # a straight line has no box to click
+    assert page.evaluate("document.activeElement.dataset.crease") == "crease-2"
+    assert page.locator("#kind").input_value() == "valley"
+    page.locator("#kind").select_option("flat")
+    window.rests("Object.keys(head.folds).length === 1")
+    page.locator("#flat g[data-crease=crease-2]").focus()
+    page.keyboard.press("m")
+    window.rests("Math.abs(head.folds['crease-2'] - 0.2 * Math.PI) < 1e-6")
+    assert page.evaluate("studio.sheet.creases[1].fold") == "mountain"
+    assert page.evaluate("document.activeElement.dataset.crease") == "crease-2"  # it stays where it was
+    assert page.locator("#spring-of").input_value() == "crease-2"
+    page.locator("#contact").check()
+    page.wait_for_function("studio.sheet.contact")
+    window.rests("Object.values(head.asked)[0] > 0.5")
+    assert page.locator("#meets").inner_text() == "stop each other"
+    assert window.told == []
 
 
 def test_colours_have_a_scale_with_a_unit(window: Visit) -> None:

@@ -43,15 +43,20 @@ function again() {
 }
 function remembered(message) {
   if (message.do === "open" || message.do === "pattern") laid = laid.filter((each) => each.do === "material");
-  if (["open", "pattern", "material", "spring", "hold"].includes(message.do)) laid.push(message);
+  if (["open", "pattern", "material", "spring", "hold", "crease", "contact"].includes(message.do)) laid.push(message);
 }
+// A stroke: from pointer to pointer, from key to key; what moves in it is taken back by one undo.
+let stroke = 1;
+for (const begins of ["pointerdown", "keydown", "change"]) addEventListener(begins, () => { stroke += 1; }, true);
+const MOVES = ["fold", "percent", "pull", "pinch"];
 const before = []; // what is to be done before anything is asked
 export const whenAsked = (done) => before.push(done);
 export let asked = 0; // messages of this connection; what was computed before the last of them is old
 export function ask(message) {
   for (const done of before) done(message);
   if (socket?.readyState !== WebSocket.OPEN) return;
-  remembered(message); asked += 1; socket.send(JSON.stringify(message));
+  remembered(message); asked += 1;
+  socket.send(JSON.stringify(MOVES.includes(message.do) ? { ...message, stroke } : message));
 }
 
 let quiet = 0;
@@ -62,9 +67,11 @@ export function tell(text, stays = false) {
 }
 
 export function save(name, data) {
-  const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+  download(name, new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))]));
+}
+export function download(name, blob) {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([bytes])); link.download = name; link.click();
+  link.href = URL.createObjectURL(blob); link.download = name; link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 export const drawn = () => { if (socket?.readyState === WebSocket.OPEN) socket.send("drawn"); };

@@ -38,7 +38,7 @@ export function finer(head, floats) {
     shown = true;
   }
   badge();
-  $("meets").textContent = head.meets ? `pass through each other at ${head.meets} places` : "do not meet";
+  if (!now.sheet.contact) $("meets").textContent = head.meets ? `pass through each other at ${head.meets} places` : "do not meet";
   $("error").textContent = now.error; $("error").title = now.error;
 }
 

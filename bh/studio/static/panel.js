@@ -3,6 +3,7 @@ import { $, ask, degrees, make, now, number, tell } from "./common.js";
 import { light } from "./view.js";
 import { key, panel as pinchPanel, wide } from "./pinch.js";
 import { taken } from "./pull.js";
+import { written } from "./record.js";
 
 const MOST = 200; // sliders of single creases
 export const history = { energy: [], force: [] };
@@ -13,7 +14,7 @@ function options(select, names, chosen, first = "") {
   for (const [value, text] of names) select.append(new Option(text, value, false, value === chosen));
 }
 
-const SAID = { scene: "scene, for bh run", python: "lines of Python", result: "numbers, JSON", picture: "picture, PNG", film: "film of the recording, GIF", mp4: "film of the recording, MP4" };
+const SAID = { scene: "scene, for bh run", python: "lines of Python", result: "numbers, JSON", picture: "picture, PNG", film: "film of the recording, GIF", mp4: `film of the recording, ${(written?.[1] ?? "mp4").toUpperCase().replace("WEBM", "WebM")}` };
 function saves(formats) {
   const select = $("export"), groups = { "What was done": [], "Folded sheet": [], "Flat pattern, to cut": [] };
   for (const name of [...formats, "picture", "film", "mp4"]) groups[name.startsWith("flat.") ? "Flat pattern, to cut" : name.startsWith("folded.") || name in { picture: 1, film: 1, mp4: 1 } ? "Folded sheet" : "What was done"].push(name);
@@ -43,12 +44,23 @@ function values(sheet) {
   }));
 }
 
+// What is said of the crease that is chosen.
+export function oneCrease(name = $("spring-of").value) {
+  $("spring-of").value = name;
+  const crease = now.sheet.creases.find((c) => c.name === name && c.turns), laws = now.sheet.springs;
+  $("kind").disabled = !crease; $("kind").value = crease?.fold ?? "";
+  $("Lstar").value = (crease ? laws[name] : Object.values(laws)[0]) ?? "";
+}
+$("spring-of").onchange = () => oneCrease();
+$("kind").onchange = ({ target }) => ask({ do: "crease", crease: $("spring-of").value, kind: target.value });
+
 export function panel() {
   const { sheet } = now;
   options($("library"), sheet.library.map((n) => [n, n]), "", "choose");
   saves(sheet.formats); values(sheet);
-  options($("spring-of"), [["all", "all"], ...sheet.creases.filter((c) => c.handled).map((c) => [c.name, c.name])], "all");
-  $("Lstar").value = Object.values(sheet.springs)[0] ?? "";
+  const turning = sheet.creases.filter((c) => c.turns), before = $("spring-of").value;
+  options($("spring-of"), [["all", "all"], ...turning.map((c) => [c.name, c.name])], turning.some((c) => c.name === before) ? before : "all");
+  oneCrease(); $("contact").checked = sheet.contact;
   options($("material"), Object.entries(sheet.materials), sheet.material.name);
   options($("colour"), [...Object.entries(sheet.colours).map(([name, [label]]) => [name, label]), ["none", "none"]], sheet.colour);
   $("E").value = sheet.material.E; $("t").value = sheet.material.t;
@@ -82,7 +94,7 @@ export function numbers() {
   const rows = [["Energy", `${number(energy.total)} N mm`], ["of bending", `${number(energy.bending)} N mm`], ["of stretching", `${number(energy.stretching)} N mm`], ["of creases", `${number(energy.folding)} N mm`], ["Stable", head.stable === null ? "not known" : head.stable ? "yes" : "no"], ["Largest strain", `${number(100 * head.strain)} %`], ["Mesh", `${sheet.triangles.length / 3} triangles, ${sheet.formulation}`], ["Error of the energy", ""], ["Panels", ""], ["Solved in", `${head.ms.toFixed(0)} ms`]];
   const names = Object.keys(head.folds);
   for (const name of names.slice(0, 8)) rows.push([`Fold of ${name}`, degrees(head.folds[name])]);
-  $("numbers").replaceChildren(...rows.flatMap(([a, b]) => { const dt = document.createElement("dt"), dd = document.createElement("dd"); dt.textContent = a; dd.textContent = b; if (a.startsWith("Error")) { dd.id = "error"; dd.textContent = "not looked at"; } if (a === "Panels") { dd.id = "meets"; dd.textContent = "not looked at"; } return [dt, dd]; }));
+  $("numbers").replaceChildren(...rows.flatMap(([a, b]) => { const dt = document.createElement("dt"), dd = document.createElement("dd"); dt.textContent = a; dd.textContent = b; if (a.startsWith("Error")) { dd.id = "error"; dd.textContent = "not looked at"; } if (a === "Panels") { dd.id = "meets"; dd.textContent = sheet.contact ? "stop each other" : "not looked at"; } return [dt, dd]; }));
   for (const input of $("sliders").querySelectorAll("input")) {
     const angle = head.asked[input.dataset.crease] ?? 0;
     if (document.activeElement !== input) input.value = angle * 180 / Math.PI;

@@ -3,7 +3,7 @@ import * as THREE from "./vendor/three.module.min.js";
 import { $, ask, now, number, tell } from "./common.js";
 import { camera, redraw, renderer, scene, seen, vector, beforeDrawn } from "./view.js";
 
-const NEAR = 16; // pixels in which a jaw is taken
+const NEAR = 16, FINGER = 28; // pixels in which a jaw is taken, by a pointer and by a finger
 const ink = new THREE.MeshBasicMaterial({ color: 0xb06000, depthTest: false, transparent: true, opacity: 0.9 });
 const ball = () => { const item = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), ink); item.renderOrder = 2; item.visible = false; item.frustumCulled = false; scene.add(item); return item; };
 const jaws = [ball(), ball()];
@@ -34,7 +34,7 @@ export function forget() { first = null; redraw(); }
 export function taken(event) {
   for (const pinch of now.head?.pinches ?? []) for (const side of [-1, 1]) {
     const [x, y] = seen(at(pinch, side));
-    if (Math.hypot(x - event.clientX, y - event.clientY) < NEAR) { dragged = { pinch, side }; return true; }
+    if (Math.hypot(x - event.clientX, y - event.clientY) < (event.pointerType === "touch" ? FINGER : NEAR)) { dragged = { pinch, side }; return true; }
   }
   return false;
 }

@@ -3,6 +3,7 @@ import * as THREE from "./vendor/three.module.min.js";
 import { $, ask, now, number } from "./common.js";
 import { camera, controls, renderer, scene, surface, vector, beforeDrawn } from "./view.js";
 import * as pinch from "./pinch.js";
+import { fingers } from "./touch.js";
 
 const ray = new THREE.Raycaster(), plane = new THREE.Plane(), spot = new THREE.Vector3();
 const string = new THREE.Line(new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]), new THREE.LineBasicMaterial({ color: 0xb06000 }));
@@ -33,6 +34,7 @@ export function pulls(hand, took) {
     if (!now.sheet || event.button !== 0 || event.defaultPrevented) return;
     down.add(event.pointerId);
     hand(true);
+    if (fingers(event)) { if (stroke) pinch.forget(); pinch.released(); node = null; stroke = false; return; } // a second finger: they move the view
     if (pinch.taken(event)) { hold(event); took(); return; }
     const found = under(event);
     if (found === null) return;
@@ -46,11 +48,13 @@ export function pulls(hand, took) {
 }
 function hold(event) { controls.enabled = false; renderer.domElement.setPointerCapture(event.pointerId); }
 renderer.domElement.addEventListener("pointermove", (event) => {
+  if (fingers(event)) return;
   aim(event);
   if (pinch.moved(ray.ray) || node === null) return;
   if (ray.ray.intersectPlane(plane, spot)) ask({ do: "pull", node, to: spot.toArray() });
 });
 const drop = (event) => {
+  fingers(event);
   if (stroke && event.type === "pointerup") pinch.choose(under(event), true);
   if (pinch.released() || stroke || node !== null) controls.enabled = true;
   node = null; stroke = false;

@@ -1,11 +1,11 @@
 // The window of bh studio: draws what the server sends, sends what a hand does. No physics is in here.
-import { $, ask, connect, drawn, now, save, tell } from "./common.js";
+import { $, ask, asked, connect, drawn, now, save, tell } from "./common.js";
 import { draw, fit, lay, move, seen, vector } from "./view.js";
 import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
 import { badge, finer, hand, refined, seenCoarse } from "./finer.js";
-import { history, numbers, panel, slider } from "./panel.js";
-import { remember, saveFilm, savePicture } from "./record.js";
+import { history, numbers, oneCrease, panel, slider } from "./panel.js";
+import { remember, saveFilm, saveMoving, savePicture } from "./record.js";
 
 // ---------------------------------------------------------------- what the server sends
 
@@ -16,12 +16,14 @@ function answer(message) {
 }
 
 function show(sheet) {
+  const same = now.sheet?.name === sheet.name && now.sheet.points.length === sheet.points.length && now.sheet.points.every((x, i) => x === sheet.points[i]);
   Object.assign(now, { sheet, head: null, points: new Float32Array(sheet.points) });
-  seenCoarse(null); lay(sheet); fit();
+  seenCoarse(null); lay(sheet);
+  if (!same) fit(); // who turned it looks on from there
   flat(choose); panel();
 }
 
-function choose(name) { $("each").open = true; slider(name)?.focus(); }
+function choose(name) { $("each").open = true; oneCrease(name); (slider(name) ?? $("kind")).focus(); }
 
 function frame(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
@@ -49,9 +51,10 @@ $("flatten").onclick = () => ask({ do: "flatten" });
 $("let-go").onclick = letGo;
 $("check").onclick = () => { tell("It is solved anew from flat ..."); ask({ do: "check" }); };
 $("library").onchange = (e) => { if (e.target.value) ask({ do: "pattern", name: e.target.value }); };
-const OWN = { picture: savePicture, film: () => saveFilm("gif"), mp4: () => saveFilm("mp4") };
+const OWN = { picture: savePicture, film: () => saveFilm("gif"), mp4: saveMoving };
 $("export").onchange = (e) => { const what = e.target.value; e.target.value = ""; if (OWN[what]) OWN[what](); else if (what) { tell("It is written ..."); ask({ do: "export", what }); } };
 $("spring").onclick = () => ask({ do: "spring", crease: $("spring-of").value, Lstar: Number($("Lstar").value) || null });
+$("contact").onchange = (e) => { tell(e.target.checked ? "It is folded anew from flat, with panels that stop each other ..." : "Panels pass through each other from now on."); ask({ do: "contact", on: e.target.checked }); };
 $("material").onchange = (e) => ask({ do: "material", name: e.target.value });
 $("E").onchange = (e) => ask({ do: "material", E: Number(e.target.value) });
 $("t").onchange = (e) => ask({ do: "material", t: Number(e.target.value) });
@@ -74,5 +77,5 @@ async function open(file) {
 }
 
 connect(answer, frame); draw();
-window.studio = { get points() { return now.points; }, get rest() { return now.head?.rest ?? false; }, get head() { return now.head; }, get sheet() { return now.sheet; }, get refined() { return refined(); },
+window.studio = { get points() { return now.points; }, get rest() { return Boolean(now.head?.rest) && now.head.heard === asked; }, get head() { return now.head; }, get sheet() { return now.sheet; }, get refined() { return refined(); },
   place: (node) => seen(vector(now.points, node)), spot: (at) => seen(vector(at, 0)) };
