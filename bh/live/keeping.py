@@ -45,18 +45,19 @@ def kept_steps(
     tangent: Tangent | None = None
     factor: Factor | None = None
     least, steps = now.imbalance, 0
+    moved: tuple[Array, Array] | None = None  # forces before the last step, and the step
     sizes: list[float] = []
     while now.imbalance > newton.tolerance and steps < newton.full:
+        new = factor is None or tangent is None
         if factor is None or tangent is None:
+            if tangent is not None and moved is not None:
+                forces, moved = tangent.predicted_forces(*moved), None
             tangent = system.tangent(q, lam, forces)
             factor, shift = factorise_shifted(tangent.matrix, 0.0, newton.full_shift)
             if factor is None:
                 return Solution(q, now, steps, False, INDEFINITE)
             if shift > 0.0:
                 break
-            new = True
-        else:
-            new = False
         dq = -factor.solve(now.residual)
         if not float(np.abs(dq).max(initial=0.0)) < ENDLESS:
             return Solution(q, now, steps, False, "singular tangent")
@@ -71,7 +72,7 @@ def kept_steps(
             return Solution(q, now, steps, False, "slow contraction")
         if not np.isfinite(there.energy) or 1e-8 * there.imbalance > max(least, 1.0):
             return Solution(q + dq, there, steps + 1, False, "diverged")
-        forces = tangent.predicted_forces(now.forces, dq)
+        moved = now.forces, dq
         factor = factor if left <= KEEPS or not new else None
         near = now.imbalance <= NEAR_SADDLE
         q, now, steps = q + dq, there, steps + 1
@@ -81,5 +82,7 @@ def kept_steps(
             break
     if steps and now.imbalance <= newton.tolerance:
         return Solution(q, now, steps, True)
+    if tangent is not None and moved is not None:
+        forces = tangent.predicted_forces(*moved)
     found = yield from newton.full_steps(system, q, lam, forces)
     return found.after(steps)
