@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from bh.solvers.creeping import slow
 from bh.solvers.factor import Factor
 from bh.solvers.modes import factorise_shifted
 from bh.solvers.newton import ENDLESS, INDEFINITE, NEAR_SADDLE, Newton, Solution
-from bh.solvers.system import System, Tangent, limited
+from bh.solvers.system import Evaluation, System, limited, unchanged
 
 Array = NDArray[np.float64]
 KEEPS = 1e-2  # part of the imbalance that a step may leave, behind which its factor serves the next one
@@ -42,21 +42,22 @@ def kept_steps(
     now = system.evaluate(q, lam)
     if not np.isfinite(now.energy):
         return Solution(q, now, 0, False, "the guess has no energy")
-    tangent: Tangent | None = None
+    predicted: Callable[[Array, Array], Array] = unchanged  # forces, by the last tangent
     factor: Factor | None = None
     least, steps = now.imbalance, 0
+    moved: tuple[Array, Array] | None = None  # forces before the last step, and the step
     sizes: list[float] = []
     while now.imbalance > newton.tolerance and steps < newton.full:
-        if factor is None or tangent is None:
+        new = factor is None
+        if factor is None:
+            forces, moved = forces if moved is None else predicted(*moved), None
             tangent = system.tangent(q, lam, forces)
+            predicted = tangent.predicted_forces
             factor, shift = factorise_shifted(tangent.matrix, 0.0, newton.full_shift)
             if factor is None:
                 return Solution(q, now, steps, False, INDEFINITE)
             if shift > 0.0:
                 break
-            new = True
-        else:
-            new = False
         dq = -factor.solve(now.residual)
         if not float(np.abs(dq).max(initial=0.0)) < ENDLESS:
             return Solution(q, now, steps, False, "singular tangent")
@@ -69,9 +70,9 @@ def kept_steps(
         sizes.append(float(np.linalg.norm(dq[: system.primal])))
         if newton.hasty and now.imbalance > NEAR_SADDLE and slow(sizes):
             return Solution(q, now, steps, False, "slow contraction")
-        if not np.isfinite(there.energy) or 1e-8 * there.imbalance > max(least, 1.0):
+        if _diverged(there, least):
             return Solution(q + dq, there, steps + 1, False, "diverged")
-        forces = tangent.predicted_forces(now.forces, dq)
+        moved = now.forces, dq
         factor = factor if left <= KEEPS or not new else None
         near = now.imbalance <= NEAR_SADDLE
         q, now, steps = q + dq, there, steps + 1
@@ -81,5 +82,11 @@ def kept_steps(
             break
     if steps and now.imbalance <= newton.tolerance:
         return Solution(q, now, steps, True)
+    forces = forces if moved is None else predicted(*moved)
     found = yield from newton.full_steps(system, q, lam, forces)
     return found.after(steps)
+
+
+def _diverged(there: Evaluation, least: float) -> bool:
+    """Whether a step has run away; `least` is the smallest imbalance before it."""
+    return not np.isfinite(there.energy) or 1e-8 * there.imbalance > max(least, 1.0)

@@ -380,8 +380,11 @@ class Session:
 
     def _begin(self, way: Way, state: State | None) -> _Under:
         items = way.actuations(self.model.creases, self._gone) or (Force([0], each=(0.0, 0.0, 0.0)),)
-        load = self._builder.build(Step(items))
-        system = self._formulation.system(self.model, load, state)
+        step = Step(items)
+        load = self._builder.build(step)
+        # shells look up the step that they are in: the first, or the one behind that of the state
+        walked = replace(self.model, steps=(step,) if state is None else (step, step))
+        system = self._formulation.system(walked, load, state)
         q = system.start()
         march = March(system, [point(system, q, 0.0)], 0.0, self._settings, self._settles)
         march.unseen = state is not None and self._under.march.unseen
