@@ -207,6 +207,10 @@ def machine() -> str:
     )
 
 
+HEAD = (
+    "Written by `make bench-table`; do not edit. Every figure is of the run of that command that is told below: this "
+    "page is its record."
+)
 TEXT = (Path(__file__).with_name("performance.txt")).read_text(encoding="utf-8")
 
 
@@ -220,7 +224,7 @@ def main() -> None:
     page = [
         "# Performance",
         "",
-        "Written by `make bench-table`; do not edit.",
+        HEAD,
         "",
         about,
         "",

@@ -310,8 +310,8 @@ def _stage(result: CaseResult, stage: Stage, discs: Sequence[Disc]) -> None:
         ]
         flat = sum(disc.formulation != "shell" for disc in discs)
         converged(result, claim, levels[:flat])
-        for level in levels[flat:]:
-            by_shell(result, claim if level is levels[-1] else replace(claim, tolerance=None), level)
+        for level, disc in zip(levels[flat:], discs[flat:], strict=True):
+            by_shell(result, claim if disc.mesh == SHELL[-1] else replace(claim, tolerance=None), level)
 
 
 def _with_holes(
