@@ -228,6 +228,7 @@ def _environment(link: Callable[[str, str], str]) -> Any:
         "number": formatting.number,
         "share": formatting.share,
         "seconds": formatting.seconds,
+        "words": formatting.words,
         "plain": typeset,
         "date": formatting.date,
         "unlike": lambda params, common: {key: v for key, v in params.items() if key not in common},
