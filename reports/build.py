@@ -15,7 +15,7 @@ from bh.plotting import interactive
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import replacing
 from reports import formatting
-from reports.changes import MOST, changes, since_kept
+from reports.changes import MOST, changes, since_kept, since_release
 from reports.claims import Claim, claims, claims_csv
 from reports.figures import (
     Plot,
@@ -133,6 +133,7 @@ class Site:
         self.results = read(folder / "checks.json")
         self.cases = _cases(self.results, folder)
         self.changes = changes(folder, self.results)
+        self.since_release = since_release(self.results)
         self.since_kept = since_kept(self.results)
         self.verdicts = groups(self.results.checks)
         ran = [case.name for case in self.cases]
