@@ -15,7 +15,7 @@ from bh.plotting import interactive
 from meshes.errors import FileFormatError, InputError
 from meshes.io.export import replacing
 from reports import formatting
-from reports.changes import MOST, changes, since_kept
+from reports.changes import MOST, changes, since_kept, since_release
 from reports.claims import Claim, claims, claims_csv
 from reports.figures import (
     Plot,
@@ -133,6 +133,7 @@ class Site:
         self.results = read(folder / "checks.json")
         self.cases = _cases(self.results, folder)
         self.changes = changes(folder, self.results)
+        self.since_release = since_release(self.results)
         self.since_kept = since_kept(self.results)
         self.verdicts = groups(self.results.checks)
         ran = [case.name for case in self.cases]
@@ -228,6 +229,7 @@ def _environment(link: Callable[[str, str], str]) -> Any:
         "number": formatting.number,
         "share": formatting.share,
         "seconds": formatting.seconds,
+        "words": formatting.words,
         "plain": typeset,
         "date": formatting.date,
         "unlike": lambda params, common: {key: v for key, v in params.items() if key not in common},

@@ -1,20 +1,20 @@
-"""What became of the records since the last stored results, and since those that are kept with the project."""
+"""What became of the records since the last release, the last stored results, and those kept with the project."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from reports.figures import ReportError
 from reports.records import Check, Results, read
+from verification.framework.release import RELEASE, Key, digest, keys
 from verification.framework.run import RECORDS
 
 PREVIOUS = "previous.json"
-FOUND = ("rate", "error_bar", "finest")  # parameters that are results: they do not tell records apart
+TIMES = ("s", "ms")
 MOVED = 1e-6  # relative change from which a value counts as moved
 MOST = 12  # moves that are listed
 
@@ -76,43 +76,89 @@ def since_kept(results: Results, records: Path = RECORDS) -> tuple[Changes, list
     return _compared(min(dates), checks, results, frozenset(names)), names
 
 
+@dataclass(frozen=True)
+class Release:
+    """Changes since a release.
+
+    Attributes:
+        version: that was released.
+        changes: of the cases that it had.
+        cases: how many it had.
+        later: cases of now that it had not.
+    """
+
+    version: str
+    changes: Changes
+    cases: int
+    later: list[str]
+
+
+def since_release(results: Results, file: Path = RELEASE) -> Release | None:
+    """Against the records of the last release; None where there are none, or all cases were run with fewer points.
+
+    Args:
+        results: of this report.
+        file: what the release has kept (`verification.framework.release`).
+    """
+    try:
+        kept = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    whole = [i.name for i in results.cases if not (results.quick if i.quick is None else i.quick)]
+    had = frozenset(name for name in whole if name in kept["cases"])
+    if not had:
+        return None
+    known = {key: value for name in had for key, value in kept["cases"][name].items()}
+    pairs: list[tuple[int, Check | None, Check]] = []
+    for key, (number, check) in _by_key(results.checks).items():
+        if check.case in had:
+            old = known.pop(digest(key), None)
+            # what tells a record is the same then and now; the error is not kept
+            then = None if old is None else replace(check, value=old[0], passed=old[1], error=None)
+            pairs.append((number, then, check))
+    found = _sorted(kept["date"], pairs, gone=len(known))
+    return Release(kept["version"], found, len(kept["cases"]), [name for name in whole if name not in had])
+
+
 def _compared(
     date: str, before: Sequence[Check], results: Results, only: frozenset[str] | None = None
 ) -> Changes:
     """What became of the records `before`; of some cases only, where they are named."""
     known = _by_key(before)
-    found = Changes(date, gone=0)
-    new = same = 0
+    pairs: list[tuple[int, Check | None, Check]] = []
     for key, (number, check) in _by_key(results.checks).items():
-        if only is not None and check.case not in only:
-            continue
-        old = known.pop(key, None)
+        if only is None or check.case in only:
+            old = known.pop(key, None)
+            pairs.append((number, None if old is None else old[1], check))
+    return _sorted(date, pairs, gone=len(known))
+
+
+def _sorted(date: str, pairs: Sequence[tuple[int, Check | None, Check]], gone: int) -> Changes:
+    """Changes of records, each with its number and what it was; times are measured anew and are no changes."""
+    found = Changes(date, gone=gone)
+    new = same = 0
+    for number, old, check in pairs:
         if old is None:
             new += 1
             continue
-        if old[1].passed and check.passed is False:
-            found.broken.append((number, old[1], check))
-        elif old[1].passed is False and check.passed:
-            found.mended.append((number, old[1], check))
-        move = _move(old[1].value, check.value)
+        if old.passed and check.passed is False:
+            found.broken.append((number, old, check))
+        elif old.passed is False and check.passed:
+            found.mended.append((number, old, check))
+        move = 0.0 if check.unit in TIMES else _move(old.value, check.value)
         if move > MOVED:
-            found.moved.append((number, old[1], check, move))
+            found.moved.append((number, old, check, move))
         else:
             same += 1
     found.moved.sort(key=lambda row: -row[3])
-    return Changes(date, found.broken, found.mended, found.moved, new, len(known), same)
+    return replace(found, new=new, same=same)
 
 
-def _by_key(checks: Sequence[Check]) -> dict[Any, tuple[int, Check]]:
-    found: dict[Any, tuple[int, Check]] = {}
-    for number, check in enumerate(checks, start=1):
-        params = {key: value for key, value in check.params.items() if key not in FOUND}
-        key = (check.case, check.quantity, check.source, json.dumps(params, sort_keys=True))
-        twice = 0
-        while (*key, twice) in found:
-            twice += 1
-        found[(*key, twice)] = (number, check)
-    return found
+def _by_key(checks: Sequence[Check]) -> dict[Key, tuple[int, Check]]:
+    plain = [
+        {name: getattr(check, name) for name in ("case", "quantity", "source", "params")} for check in checks
+    ]
+    return {key: (n, check) for n, (key, check) in enumerate(zip(keys(plain), checks, strict=True), start=1)}
 
 
 def _move(before: float | None, now: float | None) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from datetime import datetime, timedelta
 from typing import Any
@@ -60,10 +61,17 @@ def params(given: dict[str, Any]) -> str:
     )
 
 
+def words(name: str) -> str:
+    """A quantity in words: names of variables lose their underscores, indices such as those of k_x keep theirs."""
+    return re.sub(r"(?<=[a-z]{2})_(?=[a-z]{2})", " ", name)
+
+
 def _plain(value: Any) -> str:
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: "none"}[value]
-    if isinstance(value, int | float):
+    if isinstance(value, int):
+        return str(value)  # a count or a seed, which is typed again as it stands
+    if isinstance(value, float):
         return number(float(value))
     if isinstance(value, Iterable) and not isinstance(value, str | dict):
         return "(" + ", ".join(_plain(part) for part in value) + ")"

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.analysis.clouds import IDENTITY, Motion, ScanError, checked
+from bh.analysis.nearest import boxes
 from bh.formulations.state import State
 from meshes.topology import Ints
 
@@ -34,22 +35,20 @@ SETTLED = 0.02  # of the standard error: the motion has settled when a step is s
 
 
 class Surface:
-    """The triangles of a solved sheet, ready to be asked for nearest points (a cell locator of VTK).
+    """The triangles of a solved sheet, ready to be asked for nearest points (`bh.analysis.nearest`).
 
     Args:
         state: the sheet.
     """
 
     def __init__(self, state: State) -> None:
-        """Make the locator of a state."""
-        import pyvista as pv
-
+        """Make the tree of a state."""
         if not (hasattr(state, "points") and hasattr(state, "mesh")):
             raise ScanError(f"a {type(state).__name__} is not a state; give one of a path, such as path[-1]")
         mesh = state.mesh
         self.points: Array = np.asarray(state.points, dtype=float)
         self.triangles: Ints = mesh.triangles
-        self._data = pv.PolyData.from_regular_faces(self.points, self.triangles)
+        self._boxes = boxes(self.points, self.triangles)
         sides = mesh.triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
         alone = mesh.topology.edge_triangles[mesh.topology.find_edges(sides), 1] < 0
         self._free = alone.reshape(-1, 3)  # is the side opposite to each corner an edge of the sheet?
@@ -60,8 +59,7 @@ class Surface:
         Args:
             points: (k, 3), mm.
         """
-        cells, found = self._data.find_closest_cell(points, return_closest_point=True)
-        return np.asarray(found, dtype=float).reshape(-1, 3), np.asarray(cells, dtype=np.int64).reshape(-1)
+        return self._boxes.nearest(points)
 
     def on_edge(self, found: Array, cells: Ints) -> NDArray[np.bool_]:
         """Whether points lie on an edge of the sheet, to rounding.
@@ -96,7 +94,10 @@ class Surface:
             raise ScanError(
                 f"spacing = {spacing} makes some {4 * area / spacing**2:.1g} points; use a larger one"
             )
-        finer = self._data.subdivide_adaptive(max_edge_len=spacing, max_tri_area=spacing**2, max_n_passes=30)
+        import pyvista as pv
+
+        data = pv.PolyData.from_regular_faces(self.points, self.triangles)
+        finer = data.subdivide_adaptive(max_edge_len=spacing, max_tri_area=spacing**2, max_n_passes=30)
         return np.asarray(finer.points, dtype=float)
 
 

@@ -84,6 +84,8 @@ class LoadControl:
             finding out by cutting it; only of use where something else can pass it (`Automatic`).
         guess: unknowns (n,) near an equilibrium of a system at a lambda, or None: tried where Newton's method finds no
             way from the last states, before the energy is minimised.
+        locate: whether critical points that an increment passes are located, by bisection, and recorded; the states
+            are the same without.
     """
 
     first_rotation: float = math.radians(90.0)
@@ -100,6 +102,7 @@ class LoadControl:
     at_bifurcation: AtBifurcation = "stable"
     foresee: bool = False
     guess: Callable[[System, float], Array | None] | None = field(default=None, compare=False)
+    locate: bool = True
 
     def limits(self, system: System) -> tuple[float, float]:
         """First and largest increment of lambda for a system."""
@@ -254,7 +257,7 @@ class LoadControl:
         self, system: System, here: Point, found: Solution, lam: float
     ) -> tuple[CriticalPoint, ...]:
         """What lies between the last state and the one found at `lam` on its branch, if stability changed."""
-        if not found.converged or found.negative is None:
+        if not (self.locate and found.converged) or found.negative is None:
             return ()
         before = here.negative
         if before is None:  # where a step begins nobody has looked yet

@@ -87,6 +87,13 @@ def test_bifurcation_of_the_column() -> None:
     assert found[-1].stable
 
 
+def test_states_are_the_same_where_critical_points_are_not_located() -> None:
+    one, two = (follow(Column(), LoadControl(locate=locate), np.zeros(2)) for locate in (True, False))
+    assert [item.point.q.tolist() for item in one] == [item.point.q.tolist() for item in two]
+    assert sum(len(item.critical) for item in one) == 1
+    assert not any(item.critical for item in two)
+
+
 def test_staying_on_the_primary_branch() -> None:
     found = follow(Column(), Automatic(at_bifurcation="primary"), np.zeros(2))
     assert found[-1].point.lam == 1.0

@@ -143,6 +143,7 @@ def test_links_lead_to_pages_and_places(chromium: Any, folder: Path) -> None:
     for name in ("Chapter 3", "Solver", "Verdict"):
         page.get_by_role("navigation").get_by_role("link", name=name).click()
         assert page.get_by_role("navigation").locator("[aria-current=page]").inner_text().endswith(name)
+    page.locator("summary").click()
     page.locator(".failures a").first.click()
     page.wait_for_url("**/report/chapter-3.html#check-*")
     assert page.evaluate("document.querySelector(':target').classList.contains('fail')")

@@ -18,14 +18,15 @@ import meshes
 from bh.plotting import interactive
 from meshes.errors import InputError
 from reports.build import build, one_page
-from reports.changes import changes, since_kept
+from reports.changes import changes, since_kept, since_release
 from reports.claims import claims
 from reports.pdf import browser, print_report
 from reports.records import Case, CaseInfo, Check, Frames, Results, read, schema
 from tests.unit.test_report import Page, record, results, write
 from verification.framework import run as runner
-from verification.framework.cases import ALL_CASES
+from verification.framework.cases import ALL_CASES, BY_NAME
 from verification.framework.chapters import CHAPTERS, OTHER, chapter_of
+from verification.framework.release import RELEASE, of_release
 from verification.framework.run import RECORDS, run
 
 
@@ -210,6 +211,40 @@ def test_changes_against_the_records_that_are_kept(tmp_path: Path) -> None:
     assert [number for number, _, _ in found[0].mended] == [held]
     assert found[0].new == found[0].gone == 0
     assert found[0].same == len(mine) - 1
+
+
+def test_changes_since_the_release(tmp_path: Path) -> None:
+    """A release keeps a value and a verdict for each record; what moved since is told beside what is new or gone."""
+    data = {**results(tmp_path), "quick": False}
+    write(tmp_path, data)
+    file = tmp_path / "release.json"
+    name = data["cases"][0]["name"]
+    mine = [n for n, check in enumerate(data["checks"], 1) if check["case"] == name]
+    held = next(n for n in mine if data["checks"][n - 1]["passed"])
+    before = json.loads(json.dumps(data))
+    assert since_release(read(tmp_path / "checks.json"), file) is None
+    before["cases"] = before["cases"][:1]
+    before["checks"][held - 1] |= {"passed": False, "value": before["checks"][held - 1]["value"] + 1.0}
+    before["checks"][held - 1]["params"]["error_bar"] = 0.1  # a result: the record is the same one
+    before["checks"].append({**before["checks"][held - 1], "quantity": "what is gone"})
+    file.write_text(json.dumps(of_release(before, "1.2.3")))
+    found = since_release(read(tmp_path / "checks.json"), file)
+    assert found is not None
+    assert (found.version, found.cases, name in found.later) == ("1.2.3", 1, False)
+    assert len(found.later) == len(data["cases"]) - 1
+    assert [n for n, _, _ in found.changes.mended] == [n for n, *_ in found.changes.moved] == [held]
+    assert (found.changes.gone, found.changes.new, found.changes.same) == (1, 0, len(mine) - 1)
+    data["checks"][held - 1]["unit"] = "s"  # times are measured anew, and no changes
+    write(tmp_path, data)
+    again = since_release(read(tmp_path / "checks.json"), file)
+    assert again is not None
+    assert not again.changes.moved
+
+
+def test_the_shipped_release_is_read() -> None:
+    kept = json.loads(RELEASE.read_text(encoding="utf-8"))
+    assert set(kept["cases"]) <= set(BY_NAME)
+    assert all(len(key) == 12 for case in kept["cases"].values() for key in case)
 
 
 def test_a_run_keeps_the_results_that_it_replaces(tmp_path: Path) -> None:

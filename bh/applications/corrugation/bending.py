@@ -176,7 +176,7 @@ def three_point(folded: Folded, azimuth: float, rig: Rig | None = None) -> Bendi
     items.append(bar("bar", 0.0, height + depth, rig.bar, rig.travel, math.atan(slope)))
     # as on a test stand: where the sheet snaps it goes to the next stable state, and the bar goes on
     first, largest = min(0.1, 0.2 * rig.largest) / rig.travel, rig.largest / rig.travel
-    snapping = LoadControl(first=first, largest=largest, work_mismatch=math.inf, smallest=1e-4)
+    snapping = LoadControl(first=first, largest=largest, work_mismatch=math.inf, smallest=1e-4, locate=False)
     # other stable states beside the last one are of no use: the curve is of those that a test stand passes
     path = trace(start.model.step(*items), after=start, strategy=snapping, warn=False, neighbours=False)
     return _evaluate(path, azimuth, rig)

@@ -5,15 +5,19 @@ A problem has continuous variables in a box and switches (pinched or not); an op
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.applications.inverse.segments import DesignError
+
+if TYPE_CHECKING:
+    from pymoo.core.duplicate import DuplicateElimination
+    from pymoo.core.individual import Individual
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -151,7 +155,9 @@ class Genetic:
                 value, violation = problem.evaluate(*arrays(rows))
                 out["F"], out["G"] = value[:, None], violation[:, None]
 
-        algorithm = ea.MixedVariableGA(pop_size=self.population)
+        alike = _alike(ea)
+        mating = ea.MixedVariableMating(eliminate_duplicates=alike)
+        algorithm = ea.MixedVariableGA(pop_size=self.population, mating=mating, eliminate_duplicates=alike)
         algorithm.setup(Wrapped(), termination=("n_gen", self.generations), seed=seed, verbose=False)
         top: Found | None = None
         count, since = 0, 0
@@ -309,7 +315,8 @@ def _pymoo() -> SimpleNamespace:
     """The parts of pymoo that are used, in one name space."""
     try:
         from pymoo.config import Config
-        from pymoo.core.mixed import MixedVariableGA
+        from pymoo.core.duplicate import DuplicateElimination
+        from pymoo.core.mixed import MixedVariableGA, MixedVariableMating
         from pymoo.core.problem import Problem as Base
         from pymoo.core.variable import Binary, Real
     except ImportError as error:
@@ -317,4 +324,33 @@ def _pymoo() -> SimpleNamespace:
             f"the genetic algorithm needs pymoo ({error}); add the extra: pip install 'curved-crease-workbench[design]'"
         ) from error
     Config.warnings["not_compiled"] = False
-    return SimpleNamespace(Problem=Base, Real=Real, Binary=Binary, MixedVariableGA=MixedVariableGA)
+    return SimpleNamespace(
+        Problem=Base,
+        Real=Real,
+        Binary=Binary,
+        MixedVariableGA=MixedVariableGA,
+        MixedVariableMating=MixedVariableMating,
+        DuplicateElimination=DuplicateElimination,
+    )
+
+
+def _alike(ea: SimpleNamespace) -> DuplicateElimination:
+    """What pymoo leaves out of a generation: candidates that are equal to a later one of it, or to one of another.
+
+    pymoo compares all pairs, variable by variable, which takes more time than all the rest; a set finds the same ones.
+    """
+
+    def mark(
+        _: object, these: Iterable[Individual], others: Iterable[Individual] | None, marked: Bools
+    ) -> Bools:
+        keys = [tuple(sorted(each.X.items())) for each in these]
+        if others is not None:
+            known = {tuple(sorted(each.X.items())) for each in others}
+            marked[[key in known for key in keys]] = True
+            return marked
+        last = {key: place for place, key in enumerate(keys)}
+        marked[[last[key] > place for place, key in enumerate(keys)]] = True
+        return marked
+
+    found: DuplicateElimination = type("Alike", (ea.DuplicateElimination,), {"_do": mark})()
+    return found
