@@ -230,7 +230,7 @@ def test_a_point_is_reached(target: tuple[float, float, float]) -> None:
 
 
 def test_out_of_reach() -> None:
-    with pytest.raises(DesignError, match="no crease of up to 1 segments"):
+    with pytest.raises(DesignError, match="no crease of one segment was found"):
         Reach(most=1, model="source")((0.0, 0.0, 50.0))
     with pytest.raises(DesignError, match="three coordinates"):
         Reach(model="source")((0.0, 0.0))

@@ -168,5 +168,5 @@ def test_pinches_are_where_they_should_be() -> None:
 def test_bad_designs() -> None:
     with pytest.raises(DesignError, match="one of each"):
         model([0.01], [100.0, 100.0], [True])
-    with pytest.raises(DesignError, match="meets itself.*turns by 371 degrees in all"):
+    with pytest.raises(DesignError, match=r"meets itself.*turns by 371 degrees in all"):
         model([0.012, 0.012, 0.012], [180.0, 180.0, 180.0], [False] * 3)

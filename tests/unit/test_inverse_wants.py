@@ -95,7 +95,7 @@ def test_points_of_the_variants(data: Dataset) -> None:
 
 @pytest.mark.parametrize("level", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_differences_are_those_of_strips(level: int) -> None:
-    """A whole strip with each thing off by a step moves as the chain of its mesh, where pinches lie on the same cells."""
+    """A whole strip with each thing off by a step moves as the chain of its mesh, where pinches lie on equal cells."""
     length = [130.0, 120.0]  # multiples of 5 mm: a node is in the middle of each pinch, as in the pieces
     mesh = LEVELS["pinch"][level]
     same = converged().on_mesh(level)
@@ -107,7 +107,7 @@ def test_differences_are_those_of_strips(level: int) -> None:
             for s in (1.0, -1.0)
         )
         whole = 0.5 * (up - down)
-        assert np.linalg.norm(moves[name] - whole) < 0.01 * np.linalg.norm(whole), name
+        assert np.linalg.norm(moves[name] - whole) < 0.02 * np.linalg.norm(whole), name
 
 
 def test_differences_are_those_of_fine_meshes() -> None:
@@ -161,7 +161,7 @@ def test_without_variants_nothing_is_made_up() -> None:
     with pytest.raises(DesignError, match="no variants"):
         predicted(bare, K0, LENGTH, ON)
     with pytest.raises(KeyError):
-        PieceData(surrogate.loaded(models.beside(models.SHIPPED))).series(1)
+        PieceData(surrogate.loaded(models.beside(models.SHIPPED))).series(3)
 
 
 # --- wants --------------------------------------------------------------------------------------------------
