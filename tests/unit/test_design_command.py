@@ -40,7 +40,7 @@ def test_example(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     )
     assert 0.0 < about["error_bar_mm"] == measured["its error bar"] < 1.0
     assert 0.0 < measured["distance of the strip by the shell"] < 10.0
-    assert measured["end by the shell, change with its mesh"] > 0.0
+    assert measured["change of that end with the mesh of the shell"] > 0.0
     assert "95% of strips end in an ellipsoid of semi-axes" in told
     assert len(about["tolerance"]["semi_axes_mm"]) == 3
     assert about["tolerance"]["spreads"]["fold"] == 0.02

@@ -12,7 +12,7 @@ pytest.importorskip("xarray")
 from xarray import Dataset
 
 from bh.applications.inverse import models, surrogate
-from bh.applications.inverse.along import along, along_strip
+from bh.applications.inverse.along import along, along_strip, landed
 from bh.applications.inverse.boxes import ROOM, depths
 from bh.applications.inverse.converged import Converged
 from bh.applications.inverse.descent import descend
@@ -336,6 +336,15 @@ def test_what_cannot_be_had(wants: Wants, told: str) -> None:
     with pytest.raises(DesignError, match=told) as error:
         Reach(most=1)(wants)
     assert "\n" not in str(error.value)
+
+
+def test_the_crease_that_is_drawn_ends_where_its_strip_lands() -> None:
+    """A strip on one mesh ends millimetres beside; what is drawn as its limit does not."""
+    k0, length, pinched = [-0.012, -0.005], [170.0, 200.0], [True, False]
+    end = converged().forward(k0, length, pinched)[0][-1] + [1.0, 0.0, -2.0]
+    crease = landed(converged(), k0, length, pinched, end)
+    np.testing.assert_allclose(crease[[0, -1]], [[0.0, 0.0, 0.0], end], atol=1e-12)
+    assert np.linalg.norm(np.diff(crease, axis=0), axis=1).sum() == pytest.approx(370.0, rel=0.01)
 
 
 def test_a_tolerance_below_the_error_bar_is_told() -> None:

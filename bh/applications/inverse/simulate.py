@@ -97,8 +97,8 @@ def model(
     except PatternError as error:
         turn = math.degrees(sum(abs(k * size) for k, size in zip(k0, lengths, strict=True)))
         raise DesignError(
-            f"the flat strip meets itself, so it cannot be cut from one sheet: its crease turns by {turn:.0f} degrees in "
-            f"all; make it less curved, or shorter ({error})"
+            f"the flat strip meets itself, so it cannot be cut from one sheet: its crease turns by {turn:.0f} degrees "
+            f"in all; make it less curved, or shorter ({error})"
         ) from error
     along = max(2, round(whole / setting.edge))
     mesh = structured(pattern, along=along, rows=setting.rows, kind=setting.kind)  # type: ignore[arg-type]
