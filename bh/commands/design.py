@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from bh.applications.inverse.along import landed
-from bh.applications.inverse.fit import fit_curve, move_tip
+from bh.applications.inverse.fit import fit_curve, folded_fit, move_tip
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.judge import Verdict, judge
 from bh.applications.inverse.models import Name, model, read
@@ -236,9 +236,8 @@ def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answ
 
 def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> Answer:
     curve = CURVES[name] if name in CURVES else read_curve(inside(folder, name, "target.curve"))
-    problem, top = fit_curve(curve, search.segments, seed=search.seed)[-1]
+    problem, top, landing = folded_fit(fit_curve(curve, search.segments, seed=search.seed), surrogate)
     design = problem.design(top.x)
-    landing = surrogate.land(*design.lists())
     at = np.linspace(0.0, 1.0, problem.samples)
     crease = landing.strip.crease()
     s = arc_lengths(crease)
@@ -248,6 +247,10 @@ def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> 
         "mean distance by the arcs": (top.value * problem.size, "mm"),
         "mean distance of the simulated strip": (float(np.linalg.norm(points - goal, axis=1).mean()), "mm"),
         "length of the curve": (problem.size, "mm"),
+        "segments": (
+            float(design.n),
+            "" if design.n == search.segments else "(more cannot be cut or folded)",
+        ),
     }
     return Answer(design, landing, measure, goal, surrogate)
 
