@@ -15,14 +15,15 @@ import typer
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from bh.applications.inverse.fit import fit_curve, move_tip
+from bh.applications.inverse.along import landed
+from bh.applications.inverse.fit import fit_curve, folded_fit, move_tip
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.judge import Verdict, judge
 from bh.applications.inverse.models import Name, model, read
 from bh.applications.inverse.problems import CURVES, Design
 from bh.applications.inverse.reach import Library, Reach, size_of
 from bh.applications.inverse.segments import DesignError
-from bh.applications.inverse.simulate import Landing, Simulated
+from bh.applications.inverse.simulate import Landing, Simulated, frames
 from bh.applications.inverse.tolerances import Region, Spreads, Tolerance, predicted, region
 from bh.applications.inverse.wants import Wants
 from bh.errors import InputError
@@ -162,7 +163,7 @@ class Answer:
             DesignError: the shell does not get there.
         """
         verdict = judge(*self.design.lists(), self.surrogate.setting)
-        more = {"end by the shell, change with its mesh": (verdict.change, "mm")}
+        more = {"change of that end with the mesh of the shell": (verdict.change, "mm")}
         if self.wants is not None:
             more = {"distance of the strip by the shell": (verdict.missed(self.goal[0]), "mm"), **more}
         return replace(self, verdict=verdict, measure={**self.measure, **more})
@@ -217,7 +218,7 @@ def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answ
     found = reach(wants)
     assert found.landing is not None
     measure = {
-        "distance by interpolation": (found.missed, "mm"),
+        "distance by the model": (found.missed, "mm"),
         "distance of the simulated strip": (found.missed_simulated, "mm"),
         "its error bar": (found.bar, "mm"),
         CLEARS: (float(found.clear), YES_OR_NO),
@@ -235,9 +236,8 @@ def _point(target: TargetTable, search: SearchTable, surrogate: Forward) -> Answ
 
 def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> Answer:
     curve = CURVES[name] if name in CURVES else read_curve(inside(folder, name, "target.curve"))
-    problem, top = fit_curve(curve, search.segments, seed=search.seed)[-1]
+    problem, top, landing = folded_fit(fit_curve(curve, search.segments, seed=search.seed), surrogate)
     design = problem.design(top.x)
-    landing = surrogate.land(*design.lists())
     at = np.linspace(0.0, 1.0, problem.samples)
     crease = landing.strip.crease()
     s = arc_lengths(crease)
@@ -247,6 +247,10 @@ def _curve(name: str, search: SearchTable, folder: Path, surrogate: Forward) -> 
         "mean distance by the arcs": (top.value * problem.size, "mm"),
         "mean distance of the simulated strip": (float(np.linalg.norm(points - goal, axis=1).mean()), "mm"),
         "length of the curve": (problem.size, "mm"),
+        "segments": (
+            float(design.n),
+            "" if design.n == search.segments else "(more cannot be cut or folded)",
+        ),
     }
     return Answer(design, landing, measure, goal, surrogate)
 
@@ -260,7 +264,7 @@ def _tip(search: SearchTable, surrogate: Forward) -> Answer:
         surrogate.land(k0, length, [False] * design.n),
     )
     measure = {
-        "movement of the tip by interpolation": (-top.value, "mm"),
+        "movement of the tip by the model": (-top.value, "mm"),
         "movement of the tip of the simulated strip": (float(np.linalg.norm(after.end - before.end)), "mm"),
         "its error bar": (after.bar + before.bar, "mm"),
     }
@@ -360,9 +364,8 @@ def _told(tolerance: Tolerance | None, where: Region | None) -> str:
     by = sorted(((float(np.linalg.norm(move)), name) for name, move in tolerance.moves.items()), reverse=True)
     most = ", ".join(f"{name} {moved:.2g}" for moved, name in by[:3])
     axes = " x ".join(f"{axis:.2g}" for axis in where.axes)
-    return (
-        f"{PROBABILITY:.0%} of strips end in an ellipsoid of semi-axes {axes} mm; by one spread of {most} mm"
-    )
+    inside = f"{PROBABILITY:.0%} of strips end in an ellipsoid of semi-axes {axes} mm"
+    return f"{inside}; what moves the end most, in mm by one standard deviation: {most}"
 
 
 def picture(answer: Answer) -> Figure:
@@ -385,11 +388,19 @@ def picture(answer: Answer) -> Figure:
     if len(middle):
         flat.plot(*crease[middle, :2].T, "v", color="C3", ms=9, label="pinches")
     flat.set(title="pattern", xlabel="x, mm", ylabel="y, mm", aspect="equal")
-    origin, frame = state.points[mesh.nodes("crease:crease")[0]], _start(answer)
+    origin, frame = state.points[mesh.nodes("crease:crease")[0]], frames(answer.strip.path[-1])[0][1]
     x = (state.points - origin) @ frame
+    limit = None  # fits of curves are outside of the data set
+    if len(answer.goal) == 1:
+        limit = landed(answer.surrogate, *answer.design.lists(), answer.landing.end)
     for ax, (i, j), title in ((above, (0, 1), "folded, from above"), (side, (0, 2), "folded, from the side")):
-        for name, colour in (("edge:inner", "0.5"), ("edge:outer", "0.5"), ("crease:crease", "C0")):
-            ax.plot(*x[mesh.nodes(name)][:, [i, j]].T, color=colour, lw=1.0)
+        for name, colour in (("edge:inner", "0.8"), ("edge:outer", "0.8"), ("crease:crease", "0.5")):
+            label = "simulated on one mesh" if name == "crease:crease" else None
+            ax.plot(*x[mesh.nodes(name)][:, [i, j]].T, color=colour, lw=1.0, label=label)
+        if limit is not None:  # a mesh of 4 rows is millimetres from it where strips are pinched
+            ax.plot(*limit[:, [i, j]].T, color="C0", lw=1.5, label="crease, limit of fine meshes")
+        if answer.verdict is not None:
+            ax.plot(*answer.verdict.end[[i, j]], "k+", ms=9, zorder=5, label="end by the shell")
         style = "*" if len(answer.goal) == 1 else "-"
         ax.plot(answer.goal[:, i], answer.goal[:, j], style, color="C3", ms=11, label="target")
         if answer.wants is not None:
@@ -404,12 +415,6 @@ def picture(answer: Answer) -> Figure:
     flat.legend(fontsize=8)
     above.legend(fontsize=8)
     return figure
-
-
-def _start(answer: Answer) -> Array:
-    from bh.applications.inverse.simulate import frames
-
-    return frames(answer.strip.path[-1])[0][1]
 
 
 def design(

@@ -7,6 +7,7 @@ import math
 import re
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from bh.applications.inverse.segments import DesignError
 
 pytest.importorskip("xarray")
 import bh.commands.design
+from bh.applications.inverse.problems import Design
 from bh.commands.cli import main
 from bh.paths.path import Path as Trace
 
@@ -40,7 +42,7 @@ def test_example(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     )
     assert 0.0 < about["error_bar_mm"] == measured["its error bar"] < 1.0
     assert 0.0 < measured["distance of the strip by the shell"] < 10.0
-    assert measured["end by the shell, change with its mesh"] > 0.0
+    assert measured["change of that end with the mesh of the shell"] > 0.0
     assert "95% of strips end in an ellipsoid of semi-axes" in told
     assert len(about["tolerance"]["semi_axes_mm"]) == 3
     assert about["tolerance"]["spreads"]["fold"] == 0.02
@@ -52,6 +54,22 @@ def test_example(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     drawn = read_pattern(folder / "pattern.svg")
     size = np.ptp(np.vstack(drawn.rings), axis=0)
     np.testing.assert_allclose(size, np.ptp(path.model.mesh.points[:, :2], axis=0), atol=0.1)
+
+
+def test_a_strip_that_meets_itself_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is taken only where no other was found."""
+    command = bh.commands.design
+    design = Design(np.array([0.01]), np.array([200.0]), np.array([True]))
+    measure = {command.CLEARS: (0.0, command.YES_OR_NO)}
+    answer = SimpleNamespace(design=design, measure=measure, tolerance=None, region=None)
+    monkeypatch.setattr(command, "solve", lambda file: answer)
+    monkeypatch.setattr(command, "write", lambda *_: [])
+    assert main(["design", "target.toml"]) == 0
+    told = capsys.readouterr().out
+    assert "clears itself in space: no" in told
+    assert "panels of this strip pass through each other" in told
 
 
 def test_a_curve_from_points(tmp_path: Path) -> None:

@@ -12,15 +12,17 @@ pytest.importorskip("xarray")
 from xarray import Dataset
 
 from bh.applications.inverse import models, surrogate
-from bh.applications.inverse.along import along, along_strip
+from bh.applications.inverse.along import along, along_strip, landed
 from bh.applications.inverse.boxes import ROOM, depths
 from bh.applications.inverse.converged import Converged
 from bh.applications.inverse.descent import descend
+from bh.applications.inverse.fit import folded_fit
 from bh.applications.inverse.levels import lagrange
 from bh.applications.inverse.models import model
+from bh.applications.inverse.optimisers import Found
 from bh.applications.inverse.piece_data import PieceData
 from bh.applications.inverse.pieces import CONVERGING, LEVELS, PieceTask
-from bh.applications.inverse.problems import Design
+from bh.applications.inverse.problems import Design, FitCurve
 from bh.applications.inverse.reach import Library, Reach
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.simulate import simulate
@@ -347,6 +349,33 @@ def test_what_cannot_be_had(wants: Wants, told: str) -> None:
     with pytest.raises(DesignError, match=told) as error:
         Reach(most=1)(wants)
     assert "\n" not in str(error.value)
+
+
+def test_the_crease_that_is_drawn_ends_where_its_strip_lands() -> None:
+    """A strip on one mesh ends millimetres beside; what is drawn as its limit does not."""
+    k0, length, pinched = [-0.012, -0.005], [170.0, 200.0], [True, False]
+    end = converged().forward(k0, length, pinched)[0][-1] + [1.0, 0.0, -2.0]
+    crease = landed(converged(), k0, length, pinched, end)
+    np.testing.assert_allclose(crease[[0, -1]], [[0.0, 0.0, 0.0], end], atol=1e-12)
+    assert np.linalg.norm(np.diff(crease, axis=0), axis=1).sum() == pytest.approx(370.0, rel=0.01)
+
+
+def test_a_fit_that_cannot_be_cut_gives_way_to_one_of_fewer_segments() -> None:
+    """An arc of 2 mm has no panels of 5 mm on its inner side."""
+    one = FitCurve(np.array([[0.0, 0.0], [100.0, 10.0]]), 1)
+    two = replace(one, n=2)
+    tight, slack = (
+        Found(np.array(x), np.zeros(0, dtype=bool), 0.0, allowed=True, evaluations=1)
+        for x in ([4.0, 0.1, 8.0, 92.0], [0.2, 100.0])
+    )
+    problem, top, landing = folded_fit([(one, slack), (two, tight)], converged())
+    assert problem is one
+    assert top is slack
+    assert landing.end[0] > 95.0
+    with pytest.raises(
+        DesignError, match="no fit of the curve can be cut and folded: the flat strip meets itself"
+    ):
+        folded_fit([(two, tight)], converged())
 
 
 def test_a_tolerance_below_the_error_bar_is_told() -> None:

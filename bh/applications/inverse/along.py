@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.applications.inverse.forward import Forward
+from bh.applications.inverse.self_intersection import Swept
 from bh.applications.inverse.simulate import Simulated
+from meshes.curves import arc_lengths
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -51,3 +55,21 @@ def along_strip(strip: Simulated, share: float) -> Array:
     i = min(int(place), len(crease) - 2)
     found: Array = crease[i] + (place - i) * (crease[i + 1] - crease[i])
     return found
+
+
+def landed(
+    surrogate: Forward, k0: Sequence[float], length: Sequence[float], pinched: Sequence[bool], end: Array
+) -> Array:
+    """(k, 3) points of the crease of one design, moved along its length so that it ends where its strip lands, mm.
+
+    Args:
+        surrogate: the model.
+        k0: (n,) curvatures before folding, 1/mm.
+        length: (n,), mm.
+        pinched: (n,).
+        end: (3,), mm.
+    """
+    points = Swept().crease(surrogate, np.asarray(k0), np.asarray(length), np.asarray(pinched))[0]
+    s = arc_lengths(points)
+    moved: Array = points + (s / s[-1])[:, None] * (end - points[-1])
+    return moved

@@ -15,6 +15,8 @@ from bh.applications.inverse.optimisers import Found, Genetic, Optimiser, Polish
 from bh.applications.inverse.problems import FitCurve, MoveTip
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule
+from bh.applications.inverse.simulate import Landing
+from bh.errors import InputError
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -60,6 +62,28 @@ def fit_curve(
                 top = other if other.better(top) else top
         found.append((task, top))
     return found
+
+
+def folded_fit(fits: Sequence[tuple[FitCurve, Found]], surrogate: Forward) -> tuple[FitCurve, Found, Landing]:
+    """The fit of most segments that can be cut and folded: beside tight arcs panels overlap.
+
+    Args:
+        fits: of `fit_curve`.
+        surrogate: that simulates whole strips.
+
+    Returns:
+        the problem, its best design, and where the strip lands.
+
+    Raises:
+        DesignError: none of them can.
+    """
+    why: InputError | None = None
+    for problem, top in reversed(fits):
+        try:
+            return problem, top, surrogate.land(*problem.design(top.x).lists())
+        except InputError as error:
+            why = error
+    raise DesignError(f"no fit of the curve can be cut and folded: {why}")
 
 
 class _Squares:
