@@ -328,3 +328,27 @@ def test_what_never_meets_takes_the_iterations_of_a_model_without_contact(name: 
 def test_a_way_that_is_not_clear_at_all_is_taken_with_contact(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SheetBarrier, "clear_ways", lambda *_: 0.0)
     assert bh.trace(letter(by=1.0)).reached
+
+
+def test_motions_are_looked_for_from_an_accepted_state_that_no_way_was_known_to() -> None:
+    """A layer that is found below the other one goes round it, though nothing is known of how it got there."""
+    mesh, above = two_layers(1.0)
+    barrier = SheetBarrier(mesh, 0.0, 0.05, 2.0)
+    far, below = above.copy(), above.copy()
+    far[3:, 0] += 100.0
+    below[3:, 2] -= 2.0
+    round_it = []
+    for z, ways in ((0.0, np.arange(0.0, 31.0, 5.0)), (2.0, np.arange(30.0, -1.0, -5.0))):
+        for way in ways:
+            round_it.append(below.copy())
+            round_it[-1][3:] += [way, 0.0, z]
+
+    def tried() -> bool:
+        for x in round_it:
+            barrier.forces(x, np.zeros_like(x))
+        return barrier.passed(below, round_it[-1])
+
+    assert barrier.begin(far)
+    assert tried()  # nothing is known of a way from `far` to `below`
+    assert not tried()  # but of one from `below`
+    assert barrier.passed(below, above)  # straight through the other layer

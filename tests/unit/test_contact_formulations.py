@@ -116,3 +116,15 @@ def test_a_shell_with_friction_is_refused() -> None:
     model = replace(pressed("linear-shell").model, friction=0.3)
     with pytest.raises(bh.ModelError, match="the shell knows no friction"):
         bh.trace(model)
+
+
+@pytest.mark.slow
+def test_a_letter_by_the_shell_slips_where_its_edges_meet_head_on_and_goes_on() -> None:
+    """Both outer panels fold alike; it stalled at 0.878, where ways were looked for from a state long before."""
+    mesh = meshes.structured(meshes.strip(10.0, 60.0, creases=[20.0, 40.0]), along=3, rows=6)
+    model = bh.Model(mesh, bh.Sheet(E=4000.0, t=0.127), formulation="shell", contact="auto")
+    path = bh.trace(model.step(*(bh.Fold(c, by=2.4, Lstar=5.0) for c in mesh.creases)), warn=False)
+    assert path.reached, path.reason
+    assert first_contact(path) is None
+    assert path[-1].energy.contact > 0.0
+    assert sum(record.iterations for record in path.records) < 400  # 859 to where it stalled

@@ -280,7 +280,10 @@ class SheetBarrier:
         """
         if self._asleep or self._detection.linked(moved):
             return False
-        return not (self.clear(moved) and self.free_part(x, moved) >= 1.0)
+        # positions that were tried may have led the chain astray; motions are looked for from x again
+        self._detection.go_back(x)
+        free = self.clear(moved) and self.free_part(x, moved) >= 1.0
+        return not (free and self._detection.linked(moved))
 
     def approach(self, x: Array, moved: Array) -> float:
         """How much of the straight way from x to `moved` leads to where the first pair is half within the reach.

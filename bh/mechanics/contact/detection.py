@@ -118,6 +118,15 @@ class Detection:
         self._ways.clear()
         self._keep(x)
 
+    def go_back(self, x: Array) -> None:
+        """Take x, an accepted state, for the one that others are linked with, unless it is among those that are known.
+
+        Args:
+            x: (nodes, 3) positions, mm.
+        """
+        if not self._known(x):
+            self.begin(x)
+
     def linked(self, x: Array) -> bool:
         """Is there a motion to x, from where the links begin, in which nothing passes through anything? If so, keep x.
 

@@ -205,11 +205,11 @@ def deep(result: CaseResult, context: Context) -> None:
     angle, ratio = _curve(free)
     series = [line("without contact", np.degrees(angle).tolist(), ratio.tolist(), "reference")]
     t = fig5_3.T
-    kinds: tuple[tuple[str, Gap, float], ...] = (
+    pressed: tuple[tuple[str, Gap, float], ...] = (
         ("thickness of 0.5 mm", "thickness", t),
         ("gap of 0.2 mm", BEYOND, BEYOND),
     )
-    for name, contact, rest in kinds:
+    for name, contact, rest in pressed:
         path = closed(contact)
         _clear(result, f"Fig. 5.3 pressed shut, {name}", path)
         turned, curved = _curve(path)
