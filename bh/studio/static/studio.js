@@ -10,7 +10,7 @@ import { remember, saveFilm, saveMoving, savePicture } from "./record.js";
 // ---------------------------------------------------------------- what the server sends
 
 function answer(message) {
-  if (message.kind === "sheet") show(message);
+  if (message.kind === "sheet") { show(message); if ($("message").textContent.endsWith("...")) tell(""); }
   else if (message.kind === "file") { save(message.name, message.data); tell(`${message.name} is saved.`); }
   else if (message.kind === "line") tell(message.text);
 }

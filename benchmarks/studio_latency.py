@@ -1,0 +1,104 @@
+"""From the slider to the picture: `python -m benchmarks.studio_latency`, better on a quiet machine.
+
+A browser on this machine, without a graphics card, moves the slider "All creases"; the time is that from the slider's
+own event to the end of the drawing of the picture that shows its state, seen in the page. "Drag" is one event behind
+the other. "Pause" is an event after a second of rest, when the finer mesh is being solved and has to give way. The
+state shown is one in equilibrium with what was asked for. Beside it: processor time that the server took for an event
+(of all its threads), which a busy machine does not change, and the load of the machine, as `uptime` tells it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import threading
+import time
+
+import numpy as np
+
+from benchmarks.studio import CELLS, sheet
+from bh.live import Session
+from bh.runtime.terminal import say
+from bh.studio.server import Studio
+from bh.studio.sheets import LiveSheet
+from tests.unit.browsers import opened
+
+EVENTS, FIRST = 45, 5  # of the slider, and how many of them warm up
+PAUSES = 12
+ASKED = (33, 66, 150)  # ms
+WATCH = """async () => {
+  const { whenDrawn } = await import("./static/view.js");
+  window.done = () => {};
+  whenDrawn(() => window.done());
+}"""
+EVENT = """(value) => new Promise((found) => {
+  const slider = document.getElementById("percent"), began = performance.now();
+  window.done = () => {
+    const { head } = studio;
+    if (!(head.rest || head.arrived)) return;
+    if (Math.abs(100 * Object.values(head.asked)[0] / Math.PI - value) > 0.3) return;
+    window.done = () => {}; found(performance.now() - began);
+  };
+  slider.value = value; slider.dispatchEvent(new Event("input", { bubbles: true }));
+  slider.dispatchEvent(new Event("change", { bubbles: true }));
+})"""
+
+
+def measured(what: LiveSheet, pause: float) -> tuple[list[float], list[float]]:
+    """Milliseconds from the event to the picture, and of the processor for it.
+
+    Args:
+        what: the sheet.
+        pause: s between two events.
+    """
+    studio, found = Studio(what), []
+    stop = threading.Event()
+
+    async def serve() -> None:
+        server, address = studio.serve()
+        found.append(address)
+        while not stop.is_set():
+            await asyncio.sleep(0.05)
+        await studio.close(server)
+
+    thread = threading.Thread(target=lambda: asyncio.run(serve()), daemon=True)
+    thread.start()
+    while not found:
+        time.sleep(0.01)
+    times, spent = [], []
+    with opened() as chromium:
+        page = chromium.new_context(viewport={"width": 1400, "height": 820}, bypass_csp=True).new_page()
+        page.set_default_timeout(120_000)
+        page.goto(found[0])
+        page.wait_for_function("window.studio?.head")
+        page.evaluate(WATCH)
+        for k in range(FIRST + (PAUSES if pause else EVENTS - FIRST)):
+            if pause:
+                page.wait_for_timeout(1e3 * pause)
+            began = time.process_time()
+            times.append(page.evaluate(EVENT, 1.0 * (k + 1)))
+            spent.append(1e3 * (time.process_time() - began))
+    stop.set()
+    thread.join(10.0)
+    return times[FIRST:], spent[FIRST:]
+
+
+def main() -> None:
+    """Print a line a size and a way of moving; sizes may be given as numbers 1 to 3."""
+    chosen = [int(each) - 1 for each in sys.argv[1:]] or range(len(CELLS))
+    for number in chosen:
+        what = sheet(*CELLS[number])
+        size = Session(what.model).size
+        for name, pause in (("drag", 0.0), ("pause", 1.0)):
+            times, spent = measured(what, pause)
+            middle, most = np.percentile(times, [50, 95])
+            say(
+                f"{size:,} unknowns, {name}: median {middle:.0f} ms, 95th percentile {most:.0f} ms, processor "
+                f"{np.median(spent):.0f} ms, {len(times)} events ({ASKED[number]} ms asked); "
+                f"load {os.getloadavg()[0]:.1f}"
+            )
+
+
+if __name__ == "__main__":
+    main()
