@@ -91,12 +91,12 @@ class March:
     def _look(self) -> Generator[Array, None, bool]:
         """Count negative modes of the newest state; from an unstable one downhill, or stuck. Whether it has moved."""
         here = self.here
-        evaluation = self.system.evaluate(here.q, here.lam)
-        negative = count_negative(self.system.tangent(here.q, here.lam, evaluation.forces).matrix)
+        negative = count_negative(self.system.tangent(here.q, here.lam, here.forces).matrix)
         self.points[-1] = replace(here, negative=negative)
         if not negative:
             self.unseen = False
             return False
+        evaluation = self.system.evaluate(here.q, here.lam)
         saddle = Solution(here.q, evaluation, 0, True, negative=negative)
         found = yield from self._downhill(saddle, here.lam)
         passed = self.system.penetration(here.q, here.lam, found.q, here.lam)

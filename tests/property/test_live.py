@@ -130,6 +130,25 @@ def test_rest_is_where_a_run_from_flat_ends(kind: str, seed: int) -> None:
     np.testing.assert_allclose(frame.points, path[-1].points, atol=SAME * size)
 
 
+def test_panels_that_touch_rest_where_a_run_ends() -> None:
+    """Three panels close until the outer ones press on each other, in pieces of one iteration."""
+    sector = meshes.annulus_sector([60.0, 75.0], 15.0, 0.6, folds=["mountain", "mountain"])
+    model = bh.Model(meshes.structured(sector, along=5, rows=2), CARD, contact=2.0)
+    for crease in model.mesh.creases:
+        model = model.crease(crease, Lstar=10.0)
+    session = Session(model)
+    session.fold("all", 3.1)
+    frame = session.update(1e-9)
+    while not (frame.at_rest or frame.note):
+        frame = session.update(1e-9)
+        assert session.imbalance() <= BALANCED
+    assert frame.at_rest
+    assert frame.state.energy.contact > 0.0
+    size = float(np.ptp(session.mesh.points))
+    path = bh.trace(session.scene(), warn=False)
+    np.testing.assert_allclose(frame.points, path[-1].points, atol=SAME * size)
+
+
 @pytest.mark.parametrize("kind", ["consistent", "bars-and-hinges", "pulls", "springs"])
 def test_undo_goes_back_through_what_was_at_rest(kind: str) -> None:
     """Step by step, to the same shapes, and forward again."""
