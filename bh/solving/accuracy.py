@@ -8,7 +8,9 @@ two values v1, v2 and the order p that the last three show, but not more than `O
 
 where |v2 - v1| counts as at least what second order leaves of the difference before it: values that go up and then
 down are close to each other once without being close to their limit. Where they turn back, or the differences do not
-fall, p is `ORDERS[0]`. Meshes that snap to another branch in other steps than the last one does are left out.
+fall, p is `ORDERS[0]`. Meshes of gmsh are no halves of each other, so three of them show no order that is worth much:
+SAFETY is twice as large until a fourth one is solved. Meshes that snap to another branch in other steps than the last
+one does are left out.
 """
 
 from __future__ import annotations
@@ -40,10 +42,11 @@ from bh.solving.levels import Levels
 from bh.solving.mesh_choice import Ladder
 from bh.solving.race import Race
 from meshes import MeshError, SheetMesh
-from meshes.cells import Cells
+from meshes.cells import Cells, GmshCells
 
 Array = NDArray[np.float64]
 SAFETY = 1.5
+FEW_UNLIKE = 4, 2.0  # meshes of gmsh before which the safety is so many times as large
 ORDERS = (1.0, 2.0)
 NOTHING = 1e-6  # of E t^3: an energy that is none, such as that of straight creases that nothing holds
 
@@ -96,7 +99,8 @@ def solve(
             race.out[name] = f"{name} has no mesh of this sheet ({error.args[0].split(';')[0]})"
             continue
         trials = mark_doubtful([*trials, trial])
-        error_, order = estimate(trusted(trials, name), nothing(model, goal))
+        values = trusted(trials, name)
+        error_, order = estimate(values, nothing(model, goal), safety(path, len(values)))
         found.append(_Found(path, error_, order, name, str(trial.mesh)))
         if error_ <= goal.within:
             break
@@ -269,12 +273,25 @@ def trusted(trials: Sequence[Trial], name: str) -> list[Array]:
     return [trial.value for trial in own if not trial.doubtful and trial.snaps == own[-1].snaps]
 
 
-def estimate(values: Sequence[Array], nothing: float = 0.0) -> tuple[float, float]:
+def safety(path: Path, meshes: int) -> float:
+    """On the difference of the last two meshes.
+
+    Args:
+        path: on the last one.
+        meshes: how many values there are.
+    """
+    few, times = FEW_UNLIKE
+    unlike = isinstance(path.model.mesh.cells, GmshCells)
+    return SAFETY * times if unlike and meshes < few else SAFETY
+
+
+def estimate(values: Sequence[Array], nothing: float = 0.0, safety: float = SAFETY) -> tuple[float, float]:
     """(estimated relative error of the last value, observed order) of values on meshes twice as fine each.
 
     Args:
         values: vectors, coarse to fine.
         nothing: a size below which a value is none; the error is told of that size then.
+        safety: factor on what the order says.
 
     Returns:
         (inf, nan) for fewer than three of them in a row.
@@ -290,7 +307,7 @@ def estimate(values: Sequence[Array], nothing: float = 0.0) -> tuple[float, floa
     order = math.log2(before / now) if onward and 0.0 < now < before else math.nan
     p = min(max(order, ORDERS[0]), ORDERS[1]) if math.isfinite(order) else ORDERS[0]
     left = max(now, before / 2.0 ** ORDERS[1]) / (2.0**p - 1.0)
-    return SAFETY * left / size, order
+    return safety * left / size, order
 
 
 def candidates(symmetric: bool = False) -> dict[str, Refinement]:

@@ -333,3 +333,15 @@ def test_what_is_known_survives_plain_data() -> None:
     for trial in older:
         del trial["snaps"]
     assert Accuracy.from_dict({**data, "trials": older}).as_dict() == data
+
+
+def test_three_meshes_of_gmsh_are_trusted_half_as_much() -> None:
+    """The same values say twice the error where meshes are no halves of each other, until there is a fourth."""
+    halved = bh.Path(model())
+    unlike = bh.Path(bh.Model(meshes.unstructured(SECTOR, size=8.0), SHEET, formulation="consistent"))
+    safety = bh.solving.accuracy.safety
+    assert safety(unlike, 3) == 2.0 * safety(halved, 3)
+    assert safety(unlike, 4) == safety(halved, 4) == safety(halved, 3)
+    values = [np.array([value]) for value in (0.546, 0.674, 0.708)]
+    told = [estimate(values, 0.0, safety(path, 3))[0] for path in (halved, unlike)]
+    assert told[1] == pytest.approx(2.0 * told[0])
