@@ -131,6 +131,8 @@ def _task(tables: dict[str, object], file: Path) -> Task:
         with within(f"free.{name}"):
             setter(copy.deepcopy(text), name)
 
+            _check_units(text, name, as_table(as_table(tables["free"], "free")[name], "free"), place)
+
     def build(values: Mapping[str, float]) -> Model:
         changed = copy.deepcopy(text)
         for name, value in values.items():
@@ -148,6 +150,19 @@ def _task(tables: dict[str, object], file: Path) -> Task:
         _whole(tables, "seed", 0),
         place,
     )
+
+
+def _check_units(scene: dict[str, object], name: str, given: dict[str, object], place: Path) -> None:
+    """Texts with units are of the kind that the key of the scene has: the scene reads them as its own."""
+    for key, value in given.items():
+        if isinstance(value, str):
+            changed = copy.deepcopy(scene)
+            setter(changed, name)(value)
+            try:
+                scene_from_tables(changed, place.parent, place.name)
+            except SceneError as error:  # a bound may lie where no scene is, such as 0
+                if f'"{value}" is no ' in str(error):
+                    raise SceneError(f'{key} = "{value}" cannot be ({error})') from error
 
 
 def _whole(tables: Mapping[str, object], key: str, otherwise: int) -> int:
@@ -188,9 +203,12 @@ def _text(file: Path, what: str) -> str:
 def _column(file: Path, name: str) -> list[float]:
     """The numbers of a column of a CSV file."""
     rows = list(csv.DictReader(_text(file, "the readings").splitlines()))
-    names = list(rows[0]) if rows else []
+    names = [each for each in rows[0] if each is not None] if rows else []  # None: more fields than names
     if name not in names:
-        raise SceneError(f"'{file.name}' has no column '{name}'; it has {', '.join(names) or 'no rows'}")
+        hint = "; separate fields by commas" if any(";" in each or "\t" in each for each in names) else ""
+        raise SceneError(
+            f"'{file.name}' has no column '{name}'; it has {', '.join(names) or 'no rows'}{hint}"
+        )
     found = []
     for line, row in enumerate(rows, 2):
         try:

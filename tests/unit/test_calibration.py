@@ -266,6 +266,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         ({"key": "sheet.EE"}, ["unknown key sheet.EE"]),
         ({"begin": "500.0"}, ["begin between them"]),
         ({"begin": '"50 bananas"'}, ["free.creases.crease.Lstar.begin"]),
+        ({"begin": '"50MPa"'}, ["free.creases.crease.Lstar", "50MPa", "is no length"]),
     ],
 )
 def test_bad_files(
