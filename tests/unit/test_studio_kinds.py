@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +21,8 @@ from bh.studio.messages import read
 from bh.studio.sheets import of_file, of_library
 
 DATA = Path(__file__).resolve().parents[1] / "data"
-NARROW: dict[str, float | list[float]] = {  # two wide panels beside a narrow one
-    "length": 60.0,
-    "width": 50.0,
-    "creases": [22.0, 28.0],
-}
+# two wide panels beside a narrow one
+NARROW: Mapping[str, float | Sequence[float]] = {"length": 60.0, "width": 50.0, "creases": [22.0, 28.0]}
 
 
 def take(desk: Desk, **message: object) -> list[dict[str, object]]:
