@@ -98,7 +98,7 @@ STUDIES = (
     Study("problem_a", "6", seconds=25),
     Study("problem_b", "6", seconds=42),
     Study("problem_c", "6", long=True),
-    Study("two_models", "6", seconds=60),
+    Study("two_models", "6", seconds=70),
     Study("landing", "6", long=True),
     Study("tolerances", "6", long=True),
 )
