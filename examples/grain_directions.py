@@ -1,7 +1,8 @@
 """One card, folded along one curved crease, with its grain along, across and at 45 degrees to the crease's middle.
 
-Nothing holds the card, so that the grain alone decides how far its ends come together; at 45 degrees it winds up, one
-end against the other. Pictures are coloured by the stress over the strength of the card.
+Nothing holds the card and the same couple folds it, so that the grain alone decides how far: by 49, 57 and 66 degrees,
+and at 45 degrees the card winds up, one end against the other. Pictures are coloured by the stress
+over the strength of the card.
 """
 
 import numpy as np
@@ -35,12 +36,15 @@ GRAINS = {
 }
 for picture, off in GRAINS.items():
     card = bh.materials.sheet("card-300", grain=ALONG + off)
-    path = bh.trace(bh.Model(mesh, card).fold("crease", by="60deg")).require()
+    model = bh.Model(mesh, card).crease("crease", stiffness=0.001).moment("crease", to=0.03)
+    path = bh.trace(model).require()
     last = path[-1]
     ends = [last.points[mesh.nodes(f"edge:{side}")].mean(axis=0) for side in ("start", "end")]
     apart = np.linalg.norm(ends[1] - ends[0])
+    folded = np.degrees(last.fold_angle("crease").mean())
     print(
-        f"grain at {np.degrees(off):.0f} degrees: energy {last.energy.total:.3f} N mm, ends {apart:.2f} mm apart, "
+        f"grain at {np.degrees(off):.0f} degrees: folded by {folded:.1f} degrees, "
+        f"energy {last.energy.total:.3f} N mm, ends {apart:.2f} mm apart, "
         f"wound by {wound(last):.2f} degrees, stress up to {last.stress().worst().utilisation:.2f} of the strength"
     )
     bh.plotting.picture(last, picture, "utilisation", (900, 560))
