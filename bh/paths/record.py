@@ -155,6 +155,9 @@ def not_settled(records: Sequence[Record], system: Callable[[int], System]) -> l
     Args:
         records: of a path.
         system: of a step, by its number.
+
+    Returns:
+        the lines, in the order of the steps; none where everything has settled.
     """
     lines = []
     for step in dict.fromkeys(record.step for record in records if record.history is not None):
