@@ -351,4 +351,6 @@ def test_motions_are_looked_for_from_an_accepted_state_that_no_way_was_known_to(
     assert barrier.begin(far)
     assert tried()  # nothing is known of a way from `far` to `below`
     assert not tried()  # but of one from `below`
-    assert barrier.passed(below, above)  # straight through the other layer
+    other = SheetBarrier(mesh, 0.0, 0.05, 2.0)
+    assert other.begin(below)
+    assert other.passed(below, above)  # straight through the other layer, where no way round was tried
