@@ -14,6 +14,8 @@ import bh
 import meshes
 from bh.model.serialise import describe, rebuild
 from bh.scene.load import parse_scene
+from bh.sweep.measures import Measure
+from bh.sweep.scenes import SceneTask
 from meshes.curves import Arc, Line, Polyline, sample
 
 SHEET = bh.Sheet(E=4000.0, nu=0.3, t=0.2)
@@ -204,6 +206,25 @@ def test_one_wide_crease_beside_a_sharp_one() -> None:
         for number in "12":
             angle = state.fold_angle(f"crease-{number}").mean()
             assert angle == pytest.approx(math.pi - 2.5 if number in folded else 0.0, abs=1e-6)
+            assert state.dihedral(f"crease-{number}").mean() == pytest.approx(math.pi - angle, abs=1e-12)
+
+
+def test_angles_of_wide_creases_are_read_as_those_of_sharp_ones() -> None:
+    """A sweep has them in place of the two flat lines, and can measure them; steps can end by them."""
+    text = two("[creases.all]\nwidth = 2\nLstar = 20\n[creases.crease-2]\nLstar = 5")
+    model = parse_scene(text).model
+    for observable in ("fold_angle", "dihedral"):
+        Measure("angle", observable, "crease-1").check(model)
+    with pytest.raises(bh.InputError, match="is a strip, not a line"):
+        Measure("moment", "moment", "crease-1").check(model)
+    until = bh.Until("fold_angle", 0.3, of="crease-1")
+    step = replace(model.steps[0], until=until)
+    path = bh.trace(replace(model, steps=(step,)), estimate=False, neighbours=False).require()
+    assert path[-1].fold_angle("crease-1").mean() == pytest.approx(0.3, abs=1e-5)
+    measured = SceneTask(text, {}).measure(path)
+    assert {k for k in measured if k.startswith("dihedral_")} == {
+        f"dihedral_crease-{n}{end}" for n in "12" for end in ("", "_min", "_max")
+    }
 
 
 def test_a_strip_is_told_once() -> None:
