@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from bh.applications.inverse.along import landed
+from bh.applications.inverse.converged import Converged
 from bh.applications.inverse.fit import fit_curve, folded_fit, move_tip
 from bh.applications.inverse.forward import Forward
 from bh.applications.inverse.judge import Verdict, judge
@@ -390,8 +391,8 @@ def picture(answer: Answer) -> Figure:
     flat.set(title="pattern", xlabel="x, mm", ylabel="y, mm", aspect="equal")
     origin, frame = state.points[mesh.nodes("crease:crease")[0]], frames(answer.strip.path[-1])[0][1]
     x = (state.points - origin) @ frame
-    limit = None  # fits of curves are outside of the data set
-    if len(answer.goal) == 1:
+    limit = None  # fits of curves are outside of the data set, and the source's model is of one mesh
+    if len(answer.goal) == 1 and isinstance(answer.surrogate, Converged):
         limit = landed(answer.surrogate, *answer.design.lists(), answer.landing.end)
     for ax, (i, j), title in ((above, (0, 1), "folded, from above"), (side, (0, 2), "folded, from the side")):
         for name, colour in (("edge:inner", "0.8"), ("edge:outer", "0.8"), ("crease:crease", "0.5")):

@@ -112,11 +112,13 @@ class State:
         return f"State(step {self.step}, lambda {self.lam:.4g}, energy {self.energy.total:.4g} N mm{stable}{ended})"
 
     def dihedral(self, crease: str) -> Array:
-        """Dihedral angles along a crease, one an edge in order, rad.
+        """Dihedral angles along a crease, one an edge in order, rad; of a wide crease see `fold_angle`.
 
         Returns:
             (edges,) in order along the crease, 0 to 2 pi, less than pi at a mountain.
         """
+        if crease in wide_names(self.mesh):
+            return np.pi - self.fold_angle(crease)
         return self.dihedral_angles[crease_hinges(self.mesh, crease)]
 
     def fold_angle(self, crease: str) -> Array:

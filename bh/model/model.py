@@ -288,16 +288,15 @@ class Model:
             name: of the crease.
             Lstar: of the sharp crease that it stands for, mm: the sheet's material, as thin as it takes.
             stiffness: the same, N mm / (mm rad).
-            sheet: the strip's material and thickness.
-            stiff: factor of the sheet's moduli.
+            sheet: the strip's material and thickness, instead of the model's.
+            stiff: factor of the moduli.
             **values: of `bh.Sheet`, such as t = 0.1.
 
         Raises:
             ModelError: there is no such strip, or it is told twice or not at all; one line.
         """
-        if sheet is None:
-            sheet = strip_sheet(self.mesh, name, self.sheet, Lstar, stiffness, stiff, **values)
-        return replace(self, zones=(*self.zones, SheetZone(f"strip:{name}", sheet)))
+        made = strip_sheet(self.mesh, name, self.sheet, Lstar, stiffness, sheet, stiff, **values)
+        return replace(self, zones=(*self.zones, SheetZone(f"strip:{name}", made)))
 
     def step(
         self,

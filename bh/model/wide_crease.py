@@ -24,7 +24,6 @@ from meshes.topology import Ints
 from meshes.wide import SIDES, STRIP
 
 Floats = NDArray[np.float64]
-MOST = math.pi  # fold angle that a strip is asked for: more would be a roll
 
 
 def wide_names(mesh: SheetMesh) -> tuple[str, ...]:
@@ -59,6 +58,7 @@ def strip_sheet(
     sheet: Sheet,
     Lstar: Typed | None = None,
     stiffness: Typed | None = None,
+    other: Sheet | None = None,
     stiff: float = 1.0,
     **values: float | str | None,
 ) -> Sheet:
@@ -71,6 +71,7 @@ def strip_sheet(
         Lstar: of the sharp crease that the strip stands for, mm: the strip is the sheet's material, so thin that it
             turns by the same angle under the same moment.
         stiffness: the same as a moment a length and angle, N mm / (mm rad).
+        other: what the strip is made of, instead of the sheet around it.
         stiff: factor of the moduli.
         **values: fields of `bh.Sheet`, such as t.
 
@@ -81,13 +82,13 @@ def strip_sheet(
         known = ", ".join(wide_names(mesh)) or "none; draw them by meshes.wide_creases"
         raise ModelError(f"the sheet has no wide crease '{name}'; it has {known}")
     given = [key for key, value in (("Lstar", Lstar), ("stiffness", stiffness)) if value is not None]
-    given += [f"stiff = {stiff:g}"] * (stiff != 1.0) + list(values)
+    given += ["sheet"] * (other is not None) + [f"stiff = {stiff:g}"] * (stiff != 1.0) + list(values)
     if not given:
         raise ModelError(
             f"wide crease '{name}' needs Lstar or stiffness, or what its strip is made of: t, E, material or stiff"
         )
     if Lstar is None and stiffness is None:
-        return changed(sheet, stiff, **values)
+        return changed(sheet if other is None else other, stiff, **values)
     if len(given) > 1:
         raise ModelError(
             f"wide crease '{name}' has {given[0]} and {given[1]}, which say the same; give one of them"
@@ -159,7 +160,7 @@ def fold_strips(
         rest: rest dihedral angle, rad.
 
     Returns:
-        whether nothing is left to fold: there are no sharp creases of this name.
+        whether nothing is left to fold: the crease is wide, or "all" are.
 
     Raises:
         ModelError: the fold asks for what strips cannot do; one line.
@@ -176,9 +177,8 @@ def fold_strips(
         builder.grow(
             inside, np.zeros((len(inside), 3)), rest_curvature(mesh, name, inside, math.pi - float(rest))
         )
-    return bool(names) and all(
-        mesh.folds.get(each, "flat") == "flat" or each in names for each in mesh.creases
-    )
+    sharp = any(mesh.folds.get(each, "flat") != "flat" for each in mesh.creases)
+    return crease in names or (bool(names) and not sharp)
 
 
 def rest_curvature(mesh: SheetMesh, name: str, triangles: Ints, fold: float) -> Array:

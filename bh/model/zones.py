@@ -133,10 +133,14 @@ def sections(mesh: SheetMesh, sheet: Sheet, zones: tuple[SheetZone, ...]) -> Sec
     if not zones:
         return Sections((sheet,), None)
     of = np.zeros(len(mesh.triangles), dtype=np.int64)
-    for number, zone in enumerate(zones, 1):
+    strips = [number for number, zone in enumerate(zones, 1) if _is_strip(zone)]
+    for number, zone in sorted(enumerate(zones, 1), key=lambda item: _is_strip(item[1])):
         inside = triangles_in(mesh, zone.where, f"zone {number}")
-        twice = np.flatnonzero(inside & (of > 0))
-        if len(twice) and not str(zone.where).startswith(STRIP):
+        taken = inside & (of > 0)
+        if _is_strip(zone):  # it is taken out of zones around it
+            taken &= np.isin(of, strips)
+        twice = np.flatnonzero(taken)
+        if len(twice):
             x, y, _ = mesh.points[mesh.triangles[twice[0]]].mean(axis=0)
             raise ModelError(
                 f"zones {of[twice[0]]} and {number} overlap at ({x:.4g}, {y:.4g}) mm; let every place be in one"
@@ -228,6 +232,10 @@ def _enclosed(mesh: SheetMesh, place: str, what: str) -> Bools:
     if not inside.any():
         raise ModelError(f"{what}: the lines '{place}' enclose nothing; close them, or name a face")
     return np.asarray(inside)
+
+
+def _is_strip(zone: SheetZone) -> bool:
+    return isinstance(zone.where, str) and zone.where.startswith(STRIP)
 
 
 def _strip(mesh: SheetMesh, crease: str, what: str) -> Bools:

@@ -230,7 +230,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     asked = [_steps(item, f"steps[{i}]", folder) for i, item in enumerate(steps)]
     numbers = [i for i, legs in enumerate(asked) for _ in legs]
     wide = wide_tables(creases)
-    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data, sheet.t, wide)
+    drawn = mesh_of(data["pattern"], data.get("mesh"), folder, "accuracy" in data, sheet.t, creases)
     model = Model(
         mesh=not_flat(data, drawn.mesh),
         sheet=sheet,

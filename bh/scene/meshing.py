@@ -11,14 +11,13 @@ from bh.model.plugins import made
 from bh.scene.patterns import LIBRARY, DrawingPattern
 from bh.scene.reading import as_table, inside, nearest, read_table, shown, within, without
 from bh.scene.tables import DrawnTable, GmshTable, MeshTable
-from bh.scene.wide_creases import widened
+from bh.scene.wide_creases import wide_tables, widened
 from meshes import CreasePattern, SheetMesh, structured
 from meshes.choices import first_mesh
 
 if TYPE_CHECKING:
     from meshes.io.drawing import DrawingOptions
 
-WideCreases = dict[str, dict[str, object]]
 ROOM = 1.03  # thicknesses between layers that are untangled: they press on each other up to 1.005
 
 
@@ -45,7 +44,7 @@ def mesh_of(
     folder: Path,
     anew: bool = False,
     thickness: float | None = None,
-    wide: WideCreases | None = None,
+    creases: dict[str, object] | None = None,
 ) -> Drawn:
     """The meshed sheet of a scene, and what it was made from.
 
@@ -54,7 +53,7 @@ def mesh_of(
         mesh: table [mesh], or None for a coarse one that only shows the places (the mesh is chosen by the run).
         folder: where files that these name are looked for.
         anew: without a table [mesh], the faces of a FOLD file are not the mesh, but a coarse one of its pattern.
-        wide: tables of creases that are strips.
+        creases: tables of creases, of which some may be strips.
         thickness: of the sheet, mm, that layers of a folded form are moved apart by; None where it is not known.
 
     Raises:
@@ -63,8 +62,8 @@ def mesh_of(
     """
     table = as_table(pattern, "pattern")
     if "file" in table:
-        return _mesh_from_file(table, mesh, folder, anew, thickness, wide or {})
-    drawn = widened(_drawn(table), wide or {})
+        return _mesh_from_file(table, mesh, folder, anew, thickness, creases or {})
+    drawn = widened(_drawn(table), creases or {})
     if mesh is None:
         with within("pattern"):
             return Drawn(first_mesh(drawn), drawn)
@@ -133,7 +132,7 @@ def _mesh_from_file(
     folder: Path,
     anew: bool,
     thickness: float | None,
-    wide: WideCreases,
+    creases: dict[str, object],
 ) -> Drawn:
     from meshes.io import read_drawn, read_fold, read_pattern
     from meshes.io.drawing import PATTERNS
@@ -163,6 +162,7 @@ def _mesh_from_file(
     }
     how = None if mesh is None else _mesh_table(as_table(mesh, "mesh"))
     own_faces = isinstance(how, DrawnTable) or (mesh is None and not anew)
+    wide = wide_tables(creases)
     if wide and (isinstance(how, DrawnTable) or (suffix == ".fold" and own_faces)):
         raise SceneError(
             f"creases.{next(iter(wide))}.width: a wide crease changes the faces of the drawing; give [mesh] kind = "
@@ -177,7 +177,7 @@ def _mesh_from_file(
         if isinstance(how, DrawnTable) or (suffix == ".fold" and own_faces):
             return Drawn(read_drawn(file, **options), None, file, options)
         drawn = read_pattern(file, **options)
-    drawn = widened(drawn, wide)
+    drawn = widened(drawn, creases)
     with within("pattern.file"):
         if how is None:
             return Drawn(first_mesh(drawn), drawn, file, options)

@@ -37,18 +37,18 @@ def wide_tables(creases: dict[str, object]) -> dict[str, dict[str, object]]:
     return {name: item for name, item in creases.items() if isinstance(item, dict) and "width" in item}
 
 
-def widened(pattern: CreasePattern, creases: dict[str, dict[str, object]]) -> CreasePattern:
+def widened(pattern: CreasePattern, creases: dict[str, object]) -> CreasePattern:
     """The pattern with its wide creases.
 
     Args:
         pattern: as it is drawn.
-        creases: tables of the wide ones.
+        creases: all tables of creases; one without a width stays a line, whatever the table for all says.
 
     Raises:
         SceneError: a crease that cannot be wide; one line.
     """
     widths = {}
-    for name, item in creases.items():
+    for name, item in wide_tables(creases).items():
         table = read_table(WideCreaseTable, item, f"creases.{name}")
         if name != EVERY:
             widths[name] = table.width

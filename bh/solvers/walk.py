@@ -86,7 +86,7 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
     walked once more from the former in shorter increments. So it is where the state with the zero is not stable, though
     the strategy is to follow stable ones: a long increment has passed a bifurcation that nothing told of.
     """
-    points = list(task.history)
+    points, begun = list(task.history), False
     stable = getattr(task.strategy, "at_bifurcation", None) == "stable"
     left, passed, shorter, spent = goal(points[-1]), "", 0, 0
     while (item := next(items, None)) is not None:
@@ -100,8 +100,8 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
             lost = found is None or (stable and bool(found[0].negative))
             if lost and shorter < MOST_SHORTER and increment > 0.0:
                 shorter, spent = shorter + 1, spent + item.iterations
-                origin = task.origin or (task.history[-1] if len(points) > len(task.history) else None)
-                items = task.strategy.follow(task.system, points[-3:], increment, origin)
+                origin = task.origin or (task.history[-1] if begun else None)
+                items = task.strategy.follow(task.system, points, increment, origin)
                 continue
             note = "the target lies between two states, but the path to it was lost"
             iterations = item.iterations + spent
@@ -119,8 +119,9 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
             )
             return
         yield replace(item, iterations=item.iterations + spent) if spent else item
-        points.append(item.point)
-        spent = 0
+        # nothing is extrapolated through a jump
+        points = [item.point] if item.jumped else [*points[-2:], item.point]
+        begun, spent = True, 0
         if left * now < 0.0:
             passed = f"; a jump at lambda {item.point.lam:.6g} passed it, from {left:+.6g} to {now:+.6g}"
         left = now

@@ -12,6 +12,7 @@ from bh.model.model import Model
 from bh.model.plugins import consent
 from bh.model.supports import AXES, select
 from bh.model.until import Until
+from bh.model.wide_crease import wide_names
 from bh.paths.path import Path
 from bh.scene.reading import nearest
 from bh.sweep.points import SweepError
@@ -100,7 +101,8 @@ class Measure:
                 f"measure.values.{self.name}.since = {self.since} does not lie before step {last}"
             )
         if self.observable in CREASES:
-            model.mesh.crease_edges(str(self.of))
+            if self.observable not in ANGLES or self.of not in wide_names(model.mesh):
+                model.mesh.crease_edges(str(self.of))
         elif self.of is not None:
             select(model.mesh, self.of)
 

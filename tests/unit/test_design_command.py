@@ -17,6 +17,7 @@ from bh.applications.inverse.segments import DesignError
 
 pytest.importorskip("xarray")
 import bh.commands.design
+from bh.applications.inverse.models import model
 from bh.applications.inverse.problems import Design
 from bh.commands.cli import main
 from bh.paths.path import Path as Trace
@@ -54,6 +55,17 @@ def test_example(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
     drawn = read_pattern(folder / "pattern.svg")
     size = np.ptp(np.vstack(drawn.rings), axis=0)
     np.testing.assert_allclose(size, np.ptp(path.model.mesh.points[:, :2], axis=0), atol=0.1)
+
+
+def test_the_sources_model_has_no_limit_in_the_picture() -> None:
+    """It is of one mesh."""
+    surrogate = model("source")
+    design = Design(np.array([0.01]), np.array([60.0]), np.array([False]))
+    landing = surrogate.land(*design.lists())
+    answer = bh.commands.design.Answer(design, landing, {}, landing.end[None], surrogate)
+    labels = {line.get_label() for ax in bh.commands.design.picture(answer).axes for line in ax.lines}
+    assert "target" in labels
+    assert not any("limit" in str(label) for label in labels)
 
 
 def test_a_strip_that_meets_itself_is_told(

@@ -213,6 +213,7 @@ class Steps:
     def __init__(self, at_bifurcation: str = "stable") -> None:
         self.at_bifurcation = at_bifurcation
         self.asked: list[float | None] = []
+        self.histories: list[list[float]] = []
 
     @staticmethod
     def at(lam: float, negative: int = 0) -> Any:
@@ -220,6 +221,7 @@ class Steps:
 
     def follow(self, system: Any, history: Any, increment: Any = None, origin: Any = None) -> Any:
         self.asked.append(increment)
+        self.histories.append([each.lam for each in history])
         lam, step = history[-1].lam, increment or 0.5
         while lam < 1.0:
             lam += step
@@ -252,6 +254,19 @@ def test_a_target_whose_path_was_lost_is_walked_to_in_shorter_increments(
     *_, last = walk(Steps().task())
     assert last.outcome == "target-missed"
     assert "path to it was lost" in last.note
+
+
+def test_shorter_increments_are_not_extrapolated_through_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
+    """States before a jump lie on another branch."""
+    steps = Steps()
+    jumped = [
+        Increment(Steps.at(lam), Outcome.REACHED, 1, 0.0, 0.1, jumped=lam == 0.2)
+        for lam in (0.1, 0.2, 0.3, 0.4)
+    ]
+    monkeypatch.setattr("bh.solvers.walk.locate_zero", lambda *_: None)
+    task = steps.task()
+    list(_until(task, iter(jumped), task.goal))  # type: ignore[arg-type]
+    assert steps.histories[0] == pytest.approx([0.2, 0.3])
 
 
 @pytest.mark.parametrize(("at_bifurcation", "found"), [("stable", [0.125, 0.25, 0.35]), ("primary", [0.35])])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ import bh
 import meshes
 from bh.model.serialise import describe, rebuild
 from bh.scene.load import parse_scene
+from bh.sweep.measures import Measure
+from bh.sweep.scenes import SceneTask
 from meshes.curves import Arc, Line, Polyline, sample
 
 SHEET = bh.Sheet(E=4000.0, nu=0.3, t=0.2)
@@ -183,6 +186,65 @@ def test_bad_input_is_one_line(old: str, new: str, said: str) -> None:
     with pytest.raises(bh.InputError, match=said) as caught:
         bh.trace(parse_scene(SCENE.replace(old, new)).model)
     assert "\n" not in str(caught.value)
+
+
+def two(text: str) -> str:
+    """The scene of a plain strip of two creases, with these tables of creases."""
+    pattern = '[pattern]\nkind = "strip"\nlength = 60\nwidth = 30\ncreases = [10, 20]\n'
+    mesh = '[sheet]\nE = 4000.0\nt = 0.2\n[mesh]\nkind = "alternating"\nalong = 8\nrows = 1\n'
+    return f'{pattern}{mesh}{text}\n[[steps]]\nfold = {{ crease = "all", rest = 2.5 }}'
+
+
+def test_one_wide_crease_beside_a_sharp_one() -> None:
+    """Either is folded alone, and both by "all"; the table for all leaves creases with a table of their own."""
+    model = parse_scene(two("[creases.all]\nwidth = 2\nLstar = 20\n[creases.crease-2]\nLstar = 5")).model
+    assert model.mesh.creases == ("crease-1-right", "crease-1-left", "crease-2")
+    for crease, folded in (("crease-1", "1"), ("crease-2", "2"), ("all", "12")):
+        state = bh.trace(replace(model, steps=()).fold(crease, rest=2.5), estimate=False, neighbours=False)[
+            -1
+        ]
+        for number in "12":
+            angle = state.fold_angle(f"crease-{number}").mean()
+            assert angle == pytest.approx(math.pi - 2.5 if number in folded else 0.0, abs=1e-6)
+            assert state.dihedral(f"crease-{number}").mean() == pytest.approx(math.pi - angle, abs=1e-12)
+
+
+def test_angles_of_wide_creases_are_read_as_those_of_sharp_ones() -> None:
+    """A sweep has them in place of the two flat lines, and can measure them; steps can end by them."""
+    text = two("[creases.all]\nwidth = 2\nLstar = 20\n[creases.crease-2]\nLstar = 5")
+    model = parse_scene(text).model
+    for observable in ("fold_angle", "dihedral"):
+        Measure("angle", observable, "crease-1").check(model)
+    with pytest.raises(bh.InputError, match="is a strip, not a line"):
+        Measure("moment", "moment", "crease-1").check(model)
+    until = bh.Until("fold_angle", 0.3, of="crease-1")
+    step = replace(model.steps[0], until=until)
+    path = bh.trace(replace(model, steps=(step,)), estimate=False, neighbours=False).require()
+    assert path[-1].fold_angle("crease-1").mean() == pytest.approx(0.3, abs=1e-5)
+    measured = SceneTask(text, {}).measure(path)
+    assert {k for k in measured if k.startswith("dihedral_")} == {
+        f"dihedral_crease-{n}{end}" for n in "12" for end in ("", "_min", "_max")
+    }
+
+
+def test_a_strip_is_told_once() -> None:
+    """What is given beside a sheet is not left out; strips are taken out of zones in any order, not out of strips."""
+    mesh = mesh_of(meshes.wide_creases(SECTOR, 1.0), 12, 2)
+    model, other = bh.Model(mesh, SHEET), bh.Sheet(E=2000.0, t=0.1)
+    assert model.wide_crease("crease", sheet=other, stiff=0.5).zones[0].sheet.E == 1000.0
+    with pytest.raises(bh.InputError, match="has Lstar and sheet, which say the same"):
+        model.wide_crease("crease", Lstar=20.0, sheet=other)
+    with pytest.raises(bh.InputError, match="no wide crease 'no'"):
+        model.wide_crease("no", sheet=other)
+    for made in (
+        model.zone("all", t=0.3).wide_crease("crease", t=0.1),
+        model.wide_crease("crease", t=0.1).zone("all", t=0.3),
+    ):
+        assert made.sections.of is not None
+        t = np.array([sheet.t for sheet in made.sections.sheets])[made.sections.of]
+        assert set(t) == {0.1, 0.3}
+    with pytest.raises(bh.InputError, match="zones 1 and 2 overlap at"):
+        _ = model.wide_crease("crease", t=0.1).wide_crease("crease", t=0.05).sections
 
 
 def test_patterns_that_cannot() -> None:
