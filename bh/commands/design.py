@@ -260,10 +260,8 @@ def _tip(search: SearchTable, surrogate: Forward) -> Answer:
     problem, top = move_tip(search.segments, seed=search.seed, surrogate=surrogate)[-1]
     design = problem.design(top.x, top.on)
     k0, length, _ = design.lists()
-    after, before = (
-        surrogate.land(*design.lists()),
-        surrogate.land(k0, length, [False] * design.n),
-    )
+    after = surrogate.land(*design.lists())
+    before = surrogate.land(k0, length, [False] * design.n)
     measure = {
         "movement of the tip by the model": (-top.value, "mm"),
         "movement of the tip of the simulated strip": (float(np.linalg.norm(after.end - before.end)), "mm"),
