@@ -15,7 +15,7 @@ from meshes.cells import Cells, GmshCells, Kind, RuledCells
 from meshes.curves import Array
 from meshes.errors import MeshError
 from meshes.mesh import SheetMesh
-from meshes.pattern import CreasePattern
+from meshes.pattern import CreasePattern, sheet_polygon
 from meshes.structured import structured
 from meshes.tapered import tapers
 
@@ -106,8 +106,6 @@ def _turning(points: Array) -> float:
 
 def panel_width(pattern: CreasePattern) -> float:
     """Width of a typical panel, mm: of the sheet's area over its creases and half of its rim."""
-    import shapely
-
-    sheet = shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:]))
+    sheet = sheet_polygon(pattern.rings)
     lines = 0.5 * float(sheet.length) + sum(crease.curve.length for crease in pattern.creases)
     return max(float(sheet.area) / lines, 2.0 * math.sqrt(float(sheet.area)) / 1e3)

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from meshes.curves import Array, Curve, sample
 from meshes.errors import PatternError
 from meshes.topology import Ints
+
+if TYPE_CHECKING:
+    from shapely import Polygon
 
 FoldKind = Literal["mountain", "valley", "flat"]
 FOLD_KINDS: tuple[FoldKind, ...] = ("mountain", "valley", "flat")
@@ -168,6 +171,17 @@ def drawn_angles(pattern: CreasePattern, sets: Mapping[str, Ints]) -> dict[str, 
     }
 
 
+def sheet_polygon(rings: Sequence[Array]) -> Polygon:
+    """The flat sheet inside its outline, without its holes, as a polygon of shapely.
+
+    Args:
+        rings: (k, 2) corners of the outline, then those of every hole, mm.
+    """
+    import shapely
+
+    return shapely.Polygon(rings[0], holes=list(rings[1:]))
+
+
 def _check_geometry(rings: Sequence[Array], curves: Sequence[tuple[str, Curve]]) -> None:
     """Creases and cuts (in words) lie inside the outline, are simple and do not cross; predicates by shapely."""
     import shapely
@@ -177,7 +191,7 @@ def _check_geometry(rings: Sequence[Array], curves: Sequence[tuple[str, Curve]])
     for ring in rings:
         if len(ring) < 3 or not np.all(np.isfinite(ring)):
             raise PatternError("a boundary ring needs at least three finite points")
-    sheet = shapely.Polygon(rings[0], holes=list(rings[1:]))
+    sheet = sheet_polygon(rings)
     if not sheet.is_valid or sheet.area <= 0.0:
         raise PatternError(
             f"the outline is not a simple polygon ({shapely.is_valid_reason(sheet)}); redraw it"

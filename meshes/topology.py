@@ -174,3 +174,15 @@ def boundary_loops(topology: Topology) -> list[Ints]:
         seen.update(loop)
         loops.append(np.asarray(loop, dtype=np.int64))
     return sorted(loops, key=len, reverse=True)
+
+
+def chain_nodes(pairs: Ints) -> Ints:
+    """Nodes of a chain of edges in order; of one that closes the first is repeated last.
+
+    Args:
+        pairs: (k, 2) nodes of the edges, each beginning where the one before ends.
+
+    Returns:
+        (k + 1,) node numbers.
+    """
+    return np.append(pairs[:, 0], pairs[-1, 1])

@@ -23,7 +23,7 @@ from meshes.errors import MeshError
 from meshes.limits import check_limit
 from meshes.meetings import breaks
 from meshes.mesh import Origin, SheetMesh
-from meshes.pattern import CreasePattern, drawn_angles, with_groups
+from meshes.pattern import CreasePattern, drawn_angles, sheet_polygon, with_groups
 from meshes.quantities import Typed, number
 from meshes.topology import Ints
 
@@ -182,9 +182,7 @@ def _expected(pattern: CreasePattern, curves: Mapping[str, Curve], sizes: Sizes)
 
 def sheet_area(pattern: CreasePattern) -> float:
     """Area of the flat sheet inside its outline, without its holes, mm^2."""
-    import shapely
-
-    return float(shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).area)
+    return float(sheet_polygon(pattern.rings).area)
 
 
 def _chains(
@@ -239,7 +237,7 @@ def _faces(pattern: CreasePattern, points: Array, segments: Ints) -> Faces:
     """Regions that the segments cut the sheet into."""
     import shapely
 
-    sheet = shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:]))
+    sheet = sheet_polygon(pattern.rings)
 
     lines = shapely.linestrings(points[segments])
     _check_apart(points, segments, lines)

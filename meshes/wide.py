@@ -14,7 +14,7 @@ import numpy as np
 
 from meshes.curves import Arc, ArcChain, Array, Curve, Line, Polyline, sample
 from meshes.errors import PatternError
-from meshes.pattern import Crease, CreasePattern
+from meshes.pattern import Crease, CreasePattern, sheet_polygon
 from meshes.quantities import Typed, number
 
 STRIP = "strip:"  # a place that has both lines of a wide crease
@@ -153,7 +153,7 @@ def _chords(pattern: CreasePattern, crease: Crease, by: float) -> Curve:
         before = points[0] + reach * _unit(points[0] - points[1])
         behind = points[-1] + reach * _unit(points[-1] - points[-2])
         whole = shapely.LineString(np.vstack((before, points, behind))).offset_curve(by, join_style="mitre")
-        sheet = shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:]))
+        sheet = sheet_polygon(pattern.rings)
         parts = shapely.get_parts(whole.intersection(sheet))
         longest = max(parts, key=lambda part: float(part.length), default=None)
         if longest is None or longest.geom_type != "LineString" or longest.is_empty:
@@ -186,7 +186,7 @@ def _check_apart(
 
     lines = {f"crease '{c.name}'": shapely.LineString(sample(c.curve)) for c in pattern.creases}
     lines |= {f"cut '{name}'": shapely.LineString(sample(curve)) for name, curve in pattern.cuts}
-    sheet = shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).buffer(2e-3)
+    sheet = sheet_polygon(pattern.rings).buffer(2e-3)
     strips: dict[str, Any] = {}
     for name, (left, right) in sides.items():
         one, two = sample(left), sample(right)

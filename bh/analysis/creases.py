@@ -23,6 +23,7 @@ from bh.loading.load_step import crease_hinges
 from bh.runtime.one_line import OneLine
 from meshes import SheetMesh
 from meshes.curves import arc_lengths
+from meshes.topology import chain_nodes
 
 Array = NDArray[np.float64]
 STRAIGHT = (
@@ -237,7 +238,7 @@ def _chain(mesh: SheetMesh, crease: str) -> tuple[NDArray[np.int64], bool]:
         raise ModelError(
             f"crease '{crease}' is not one chain of edges in order; split it where it branches or is interrupted"
         )
-    nodes = np.append(pairs[:, 0], pairs[-1, 1])
+    nodes = chain_nodes(pairs)
     return nodes, bool(nodes[0] == nodes[-1])
 
 

@@ -22,6 +22,7 @@ from bh.formulations.state import State
 from bh.loading.load_step import crease_hinges
 from bh.runtime.one_line import OneLine
 from meshes import SheetMesh
+from meshes.topology import chain_nodes
 
 Array = NDArray[np.float64]
 SIDES = ("left", "right")
@@ -74,7 +75,7 @@ def panel_generators(
         raise ModelError("generators are measured in the flat sheet; this one is made curved")
     pairs = mesh.crease_edges(crease)
     inside = _panel(mesh, crease, side)
-    line = mesh.points[np.append(pairs[:, 0], pairs[-1, 1]), :2]
+    line = mesh.points[chain_nodes(pairs), :2]
     steps = np.diff(line, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     u = np.concatenate(([0.0], np.cumsum(lengths)))

@@ -34,6 +34,7 @@ from bh.analysis.ruled import Panel
 from bh.errors import ModelError
 from meshes import SheetMesh
 from meshes.curves import Arc, Line, arc_lengths
+from meshes.topology import chain_nodes
 
 Array = NDArray[np.float64]
 SAMPLES = 401
@@ -270,7 +271,7 @@ def of_mesh(
     if not mesh.flat:
         raise ModelError("isometric folding begins with a flat sheet; this mesh is not flat")
     pairs = mesh.crease_edges(crease)
-    nodes = mesh.points[np.append(pairs[:, 0], pairs[-1, 1]), :2]
+    nodes = mesh.points[chain_nodes(pairs), :2]
     curve = mesh.curves.get(f"crease:{crease}")
     ends = nodes[0], nodes[-1]
     if np.linalg.norm(ends[1] - ends[0]) < 1e-9 * mesh.size:

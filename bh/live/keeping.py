@@ -7,11 +7,11 @@ from collections.abc import Callable, Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.creeping import slow
+from bh.solvers.creeping import diverged, slow
 from bh.solvers.factor import Factor
 from bh.solvers.modes import factorise_shifted
 from bh.solvers.newton import ENDLESS, INDEFINITE, NEAR_SADDLE, Newton, Solution
-from bh.solvers.system import Evaluation, System, limited, unchanged
+from bh.solvers.system import System, limited, unchanged
 
 Array = NDArray[np.float64]
 KEEPS = 1e-2  # part of the imbalance that a step may leave, behind which its factor serves the next one
@@ -70,7 +70,7 @@ def kept_steps(
         sizes.append(float(np.linalg.norm(dq[: system.primal])))
         if newton.hasty and now.imbalance > NEAR_SADDLE and slow(sizes):
             return Solution(q, now, steps, False, "slow contraction")
-        if _diverged(there, least):
+        if diverged(there, least):
             return Solution(q + dq, there, steps + 1, False, "diverged")
         moved = now.forces, dq
         factor = factor if left <= KEEPS or not new else None
@@ -85,8 +85,3 @@ def kept_steps(
     forces = forces if moved is None else predicted(*moved)
     found = yield from newton.full_steps(system, q, lam, forces)
     return found.after(steps)
-
-
-def _diverged(there: Evaluation, least: float) -> bool:
-    """Whether a step has run away; `least` is the smallest imbalance before it."""
-    return not np.isfinite(there.energy) or 1e-8 * there.imbalance > max(least, 1.0)

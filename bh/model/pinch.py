@@ -25,7 +25,7 @@ from bh.model.step import Actuation, StepBuilder, Zone
 from meshes import SheetMesh
 from meshes.curves import arc_lengths
 from meshes.quantities import degrees_meant, take_units
-from meshes.topology import Ints
+from meshes.topology import Ints, chain_nodes
 
 Array = NDArray[np.float64]
 Profile = Literal["cosine", "grip"]
@@ -214,7 +214,7 @@ def chain(mesh: SheetMesh, crease: str) -> Chain:
             f"pinch of crease '{crease}': it is not one line, so there is no way along it; name one line of it"
         )
     pairs = mesh.crease_edges(crease)
-    s = arc_lengths(mesh.points[np.append(pairs[:, 0], pairs[-1, 1])])
+    s = arc_lengths(mesh.points[chain_nodes(pairs)])
     return Chain(np.column_stack((s[:-1], s[1:])), bool(pairs[0, 0] == pairs[-1, 1]))
 
 

@@ -20,7 +20,7 @@ from bh.model.zones import changed, triangles_in
 from meshes import SheetMesh
 from meshes.curves import Array, sample
 from meshes.quantities import Typed, number
-from meshes.topology import Ints
+from meshes.topology import Ints, chain_nodes
 from meshes.wide import SIDES, STRIP
 
 Floats = NDArray[np.float64]
@@ -102,9 +102,8 @@ def strip_sheet(
         raise ModelError(f"wide crease '{name}': {given[0]} = {value:g} cannot be; give a positive number")
     k = value if stiffness is not None else sheet.bending_stiffness(nu=0.0) / value
     wide = float(np.mean(_Ways(mesh, name).across(_stations(mesh, name))[1]))
-    softer = (
-        k * wide / sheet.bending_stiffness()
-    )  # a strip turns by the sharp crease's angle and by the sheet's
+    # a strip turns by the sharp crease's angle and by the sheet's
+    softer = k * wide / sheet.bending_stiffness()
     return replace(sheet, t=sheet.t * (softer / (1.0 + softer)) ** (1.0 / 3.0))
 
 
@@ -119,7 +118,7 @@ class _Ways:
             shapely.LineString(
                 sample(mesh.curves[line], 1e-5)
                 if line in mesh.curves and mesh.drawn is mesh.points
-                else mesh.points[_chain(mesh.edge_sets[line]), :2]
+                else mesh.points[chain_nodes(mesh.edge_sets[line]), :2]
             )
             for line in lines
         ]
@@ -137,10 +136,6 @@ class _Ways:
         )
         width = np.linalg.norm(left - right, axis=1)
         return (left - right) / width[:, None], width
-
-
-def _chain(pairs: Ints) -> Ints:
-    return np.append(pairs[:, 0], pairs[-1, 1])
 
 
 def _stations(mesh: SheetMesh, name: str) -> Array:

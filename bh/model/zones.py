@@ -15,7 +15,7 @@ from bh.errors import ModelError
 from bh.model.laminate import laminate
 from bh.model.sheet import Sheet
 from meshes import SheetMesh
-from meshes.topology import Ints
+from meshes.topology import Ints, chain_nodes
 from meshes.wide import SIDES, STRIP
 
 Array = NDArray[np.float64]
@@ -248,7 +248,7 @@ def _strip(mesh: SheetMesh, crease: str, what: str) -> Bools:
     topology = mesh.topology
     pairs = [mesh.edge_sets[f"crease:{crease}-{side}"] for side in SIDES]
     at = topology.edge_triangles[topology.find_edges(pairs[0])]
-    other = shapely.LineString(mesh.points[np.append(pairs[1][:, 0], pairs[1][-1, 1]), :2])
+    other = shapely.LineString(mesh.points[chain_nodes(pairs[1]), :2])
     middle = mesh.points[mesh.triangles[at]].mean(axis=2)[..., :2]
     near = shapely.distance(other, shapely.points(middle)).argmin(axis=1)
     label = _pieces(mesh, np.vstack(pairs))

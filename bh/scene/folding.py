@@ -21,6 +21,7 @@ from bh.scene.foldable import Found, understood
 from meshes import CreasePattern, MeshError, SheetMesh
 from meshes.cells import RuledCells
 from meshes.choices import choices, cut, panel_width
+from meshes.unstructured import sheet_area
 
 PERCENT = 80.0  # of the way, where neither the user nor the file says how far
 FULLY = math.radians(170.0)  # drawn angles beyond that mean folded flat: then 80 % of them, too
@@ -281,7 +282,7 @@ def _meshes(found: Found, width: float) -> list[tuple[str, str, str]]:
     ruled = found.faces is not None and len(pattern.facets) >= len(pattern.creases)
     if ruled:
         scenes += drawn
-    size = max(width, math.sqrt(_area(pattern)) / 60.0)
+    size = max(width, math.sqrt(sheet_area(pattern)) / 60.0)
     for finer in (1.0, 2.0, 4.0):
         words = f"triangles of {size / finer:.3g} mm by gmsh"
         scenes.append((f'kind = "gmsh"\nsize = {size / finer:.4g}', words, "consistent"))
@@ -328,12 +329,6 @@ def _narrowest(found: Found, width: float) -> float:
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     heights = 2.0 * found.faces.areas / sides.max(axis=1)
     return max(float(np.quantile(heights, 0.02)), width / 10.0)
-
-
-def _area(pattern: CreasePattern) -> float:
-    import shapely
-
-    return float(shapely.Polygon(pattern.rings[0], holes=list(pattern.rings[1:])).area)
 
 
 def _tolerance(found: Found) -> float:

@@ -83,8 +83,9 @@ def strips_of(mesh: SheetMesh, creases: dict[str, dict[str, object]], sheet: She
     """
     found = []
     for name in wide_names(mesh):
-        at = f"creases.{name if name in creases else EVERY}"
-        item = as_table(creases[at.removeprefix("creases.")], at)
+        own = name if name in creases else EVERY
+        at = f"creases.{own}"
+        item = as_table(creases[own], at)
         table = read_table(WideCreaseTable, item, at)
         if table.Lstar is not None or table.stiffness is not None or not set(item) - set(OWN):
             other = next((key for key in item if key not in OWN), None)

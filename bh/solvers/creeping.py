@@ -1,8 +1,12 @@
-"""When a way downhill has come next to its state, and only creeps along a mode that hardly resists."""
+"""When steps lead nowhere: a way downhill that only creeps along a mode that hardly resists, and one that runs away."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+
+import numpy as np
+
+from bh.solvers.system import Evaluation
 
 CREEPS = "creeps"  # why the globalised way of Newton's method gave up
 STEPS, LEAST = 8, 1e-6  # steps, and the part of the energy that all of them together gain where they creep
@@ -24,3 +28,13 @@ def slow(sizes: Sequence[float]) -> bool:
     the linear prediction is taken out.
     """
     return len(sizes) > 4 and sizes[-1] > 0.5 * sizes[-3]
+
+
+def diverged(now: Evaluation, least: float) -> bool:
+    """Whether a step has run away.
+
+    Args:
+        now: where it ends.
+        least: smallest imbalance before it.
+    """
+    return not np.isfinite(now.energy) or 1e-8 * now.imbalance > max(least, 1.0)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.creeping import CREEPS, creeping, slow
+from bh.solvers.creeping import CREEPS, creeping, diverged, slow
 from bh.solvers.factor import Descent, Factor, IndefiniteError, Matrix
 from bh.solvers.lagging import Guess, lagged
 from bh.solvers.modes import (
@@ -196,7 +196,7 @@ class Newton:
             forces = tangent.predicted_forces(now.forces, dq)
             q, before = q + dq, now.imbalance
             now = system.evaluate(q, lam)
-            if not np.isfinite(now.energy) or 1e-8 * now.imbalance > max(least, 1.0):
+            if diverged(now, least):
                 return Solution(q, now, iteration + 1, False, "diverged")
             least = min(least, now.imbalance)
             yield q

@@ -18,11 +18,11 @@ from bh.mechanics.contact.friction import Friction, Rubbing
 from bh.scene.load import parse_scene
 from bh.solvers.load_control import LoadControl
 from tests.unit.test_moulds import box
+from verification.studies.solver.contact_more import MU, SLOPE, SPRING, WEIGHT, belt, slope
 
 Array = NDArray[np.float64]
 SHEET = bh.Sheet(E=4000.0, nu=0.0, t=0.2)
 MESH = meshes.structured(meshes.strip(20.0, 5.0, [2.5], ["flat"]), along=8, rows=1)
-MU, WEIGHT, SPRING = 0.3, 0.02, 0.01
 
 
 def plate(kind: str) -> bh.Indenter | bh.Mould:
@@ -38,23 +38,21 @@ def test_a_strip_on_a_slope_holds_until_tan_is_mu_and_slides_beyond(kind: str) -
 
     A soft spring says how far it slides: what friction does not hold.
     """
-    model = bh.Model(MESH, SHEET, contact=False, friction=MU).spring("all", total=(SPRING, SPRING, 1e-3))
-    model = model.step(plate(kind), bh.Force("all", total=(0.0, 0.0, -WEIGHT)))
-    path = bh.trace(model.step(plate(kind), bh.Force("all", total=(2.0 * MU * WEIGHT, 0.0, -WEIGHT))))
+    path = slope(plate(kind))
     assert path.reached, path.steps[-1].reason
     slid = 0
     for state in path:
         if state.step == 0:
             continue
         way = float((state.points - MESH.points)[:, 0].mean())
-        slope = 2.0 * MU * state.lam  # tan of its angle
+        lean = SLOPE * MU * state.lam  # tan of its angle
         spring = state.contact_forces["plate"][0]
-        if slope < MU:
+        if lean < MU:
             assert way < 0.01 * SHEET.t  # sticks: less than the slip that a contact bears
-            assert spring == pytest.approx(-slope * WEIGHT, rel=0.02)
+            assert spring == pytest.approx(-lean * WEIGHT, rel=0.02)
             continue
         slid += 1
-        assert way == pytest.approx((slope - MU) * WEIGHT / SPRING, rel=0.002)
+        assert way == pytest.approx((lean - MU) * WEIGHT / SPRING, rel=0.002)
         assert spring == pytest.approx(-MU * state.contact_forces["plate"][2], rel=1e-3)
         assert state.energy.friction == pytest.approx(MU * WEIGHT * way, rel=0.01)
     assert slid >= 2
@@ -113,20 +111,9 @@ def test_friction_that_has_not_settled_is_told_also_by_a_path_from_its_file(
 
 def capstan(mu: float) -> float:
     """Force of the pulled end over that of the other, round half a turn of a drum."""
-    R, hold, gap, soft = 5.0, 0.2, 0.02, 1e-3
-    mesh = meshes.structured(meshes.strip(60.0, 2.0, [1.0], ["flat"]), along=96, rows=1)
-    drum = bh.Indenter("drum", (30.0, 1.0, -R - gap), 0.5 * math.pi, 2.0 * R, 2.0 * R, R, gap=gap)
-    model = bh.Model(mesh, bh.Sheet(E=4000.0, nu=0.0, t=0.02), contact=False, friction=mu)
-    model = model.support("edge:start", "y").support("edge:end", "y").spring("all", total=(soft,) * 3)
-    ends = [bh.Force(at, total=(0.0, 0.0, -hold)) for at in ("edge:start", "edge:end")]
-    model = model.step(drum, *ends).step(drum, bh.Displace("edge:end", "z", further=-0.5))
-    path = bh.trace(model, neighbours=False)
+    ratio, path = belt(mu)
     assert path.reached, path.steps[-1].reason
-    points, last = path[-1].points, path[-1].reactions[mesh.nodes("edge:end"), 2].sum()
-    hanging = points[:, 2] < -R - gap
-    carried = soft * -points[:, 2] / len(points)  # by the springs, on the way from an end to the drum
-    left, right = (carried[hanging & side].sum() for side in (points[:, 0] < 30.0, points[:, 0] > 30.0))
-    return float((hold - last - right) / (hold - left))
+    return ratio
 
 
 @pytest.mark.slow

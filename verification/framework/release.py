@@ -14,12 +14,8 @@ from pathlib import Path
 from typing import Any
 
 RELEASE = Path(__file__).parents[1] / "release.json"
-FOUND = (
-    "rate",
-    "error_bar",
-    "finest",
-    "seconds",
-)  # parameters that are results: they do not tell records apart
+# parameters that are results: they do not tell records apart
+FOUND = ("rate", "error_bar", "finest", "seconds")
 
 Key = tuple[str, str, str, str, int]
 

@@ -322,11 +322,15 @@ class Converged:
         return self._pairs
 
     @cached_property
-    def _pairs(self) -> dict[str, tuple[Converged, Converged]]:
+    def _made(self) -> dict[tuple[str, int], Mapping[str, Series]]:
+        """The functions of strips with one thing a step less and a step more."""
         data = self._variants()
+        return {(name, sign): data.series(name, sign, self._level) for name in STEPS for sign in (-1, 1)}
 
+    @cached_property
+    def _pairs(self) -> dict[str, tuple[Converged, Converged]]:
         def one(name: str, sign: int) -> Converged:
-            return Converged(data.series(name, sign, self._level), variants(self.setting)[name, sign])
+            return Converged(self._made[name, sign], variants(self.setting)[name, sign])
 
         return {name: (one(name, -1), one(name, 1)) for name in STEPS}
 
@@ -363,10 +367,9 @@ class Converged:
     @cached_property
     def _slopes(self) -> dict[str, dict[str, Series]]:
         """What each function changes by with one unit of each thing."""
-        data = self._variants()
         found: dict[str, dict[str, Series]] = {}
         for thing, step in STEPS.items():
-            down, up = (data.series(thing, sign, self._level) for sign in (-1, 1))
+            down, up = self._made[thing, -1], self._made[thing, 1]
             found[thing] = {
                 name: (up[name] + down[name].times(-1.0)).times(0.5 / step) for name in self._series
             }

@@ -79,8 +79,7 @@ class PieceData:
     @cached_property
     def limits(self) -> dict[str, Limit]:
         """Limits of the same functions; what lies between arcs is read with the limit of the arcs."""
-        arcs = Limit.of([self._arcs(i) for i in range(len(self.levels["arc"]))])
-        found = {"arc": arcs}
+        found = {"arc": self._arc}
         kinds: tuple[tuple[str, Kind, Callable[[int, Arc], Array]], ...] = (
             ("end", "arc", self._ends),
             ("pinch", "pinch", self._pinches),
@@ -88,7 +87,7 @@ class PieceData:
         )
         for name, kind, values in kinds:
             count = len(self.levels[kind])
-            found[name] = Limit.of([values(i, going(arcs.value)) for i in range(count)])
+            found[name] = Limit.of([values(i, going(self._arc.value)) for i in range(count)])
         return found
 
     def pinches(self, count: int) -> Limit:
@@ -97,8 +96,11 @@ class PieceData:
         Args:
             count: of the levels, 3 or more.
         """
-        arcs = Limit.of([self._arcs(i) for i in range(len(self.levels["arc"]))])
-        return Limit.of([self._pinches(i, going(arcs.value)) for i in range(count)])
+        return Limit.of([self._pinches(i, going(self._arc.value)) for i in range(count)])
+
+    @cached_property
+    def _arc(self) -> Limit:
+        return Limit.of([self._arcs(i) for i in range(len(self.levels["arc"]))])
 
     def _halved(self, level: Level, value: Callable[[float], Array]) -> Array:
         """(degree + 1, 6) values at all curvatures from those at the ones from zero."""

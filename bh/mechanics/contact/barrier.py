@@ -41,9 +41,8 @@ NAMED = 3  # pairs in a message
 # presses takes for its part of gradient and Hessian
 SEARCHED, DETECTED, PRESSED = 1.2e-6, 4e-7, 2e-6
 ipctk.set_num_threads(1)  # sums in one order, so that the same input gives the same numbers
-ipctk.set_logger_level(
-    ipctk.LoggerLevel.error
-)  # it warns of ways that begin too near, which are refused here
+# it warns of ways that begin too near, which are refused here
+ipctk.set_logger_level(ipctk.LoggerLevel.error)
 
 
 class SheetBarrier:

@@ -25,9 +25,8 @@ from meshes.topology import Ints
 
 Array = NDArray[np.float64]
 ROW = 16  # numbers of a contact in what is remembered: kind and nodes, s, normal, force, weights
-HEAD = (
-    4  # numbers before the positions: energies by forces of ends and by means, lambda, what had not settled
-)
+# numbers before the positions: energies by forces of ends and by means, lambda, what had not settled
+HEAD = 4
 TINY = 1e-300
 
 

@@ -42,7 +42,7 @@ def problems() -> tuple[Problem, ...]:
 
 def _mesh(formulation: str, along: int, long: float, wide: float) -> meshes.SheetMesh:
     rows = max(round(along * wide / long), 1)
-    return meshes.structured(meshes.strip(long, wide), along=along, rows=rows, kind=KINDS[formulation])  # type: ignore[arg-type]
+    return meshes.structured(meshes.strip(long, wide), along=along, rows=rows, kind=KINDS[formulation])
 
 
 def _state(formulation: str, mesh: meshes.SheetMesh, sheet: bh.Sheet, *acts: bh.Actuation) -> bh.State:

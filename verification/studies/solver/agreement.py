@@ -40,9 +40,8 @@ KINDS: tuple[tuple[str, Callable[[np.random.Generator], honesty_scenes.Draw]], .
     ("closed ring", honesty_scenes.ring),
 )
 LEVELS = {"network": (2.5, 5.0), "wide panel": (2.5, 5.0), "closed ring": (1.0, 2.0)}  # rows of the shell
-LIMIT_S = (
-    300.0  # processor time of a sheet; the default of a ring may take 40 s, then come its work and the shells
-)
+# processor time of a sheet; the default of a ring may take 40 s, then come its work and the shells
+LIMIT_S = 300.0
 SOURCE = "mutual: the default, the shell on meshes of its own, and the work done"
 
 

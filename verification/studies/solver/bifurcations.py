@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from bh.solvers.system import System
 from bh.solvers.walk import Walk, walk
 from meshes.curves import Arc
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
+from verification.studies.solver.closed_forms import KINDS
 from verification.theory import actuated as laminates
 from verification.theory.free_plate import FreePlate, cross_ply, disc, isotropic
 from verification.theory.rings import overcurved
@@ -42,7 +42,6 @@ FIBRES = (130000.0, 9000.0, 0.3, 5000.0)  # E1, E2, nu12, G12
 SWELL, PLY = (-1e-7, 3e-5), 0.125
 RING, WIDE, THIN = 50.0, 2.5, 0.1  # mean radius, width and thickness of the ring, mm; its nu is 0
 BROAD = 20.0  # width of a ring that is no rod, mm
-KINDS: dict[str, Literal["alternating", "mirrored"]] = {"consistent": "alternating", "shell": "mirrored"}
 
 
 @dataclass(frozen=True)

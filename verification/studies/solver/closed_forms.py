@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Cost, line, plot
 
 Levels = Mapping[str, Sequence[int]]
-KINDS = {"consistent": "alternating", "shell": "mirrored"}
+KINDS: Mapping[str, Kind] = {"consistent": "alternating", "shell": "mirrored"}  # of cells
 LEVELS: Levels = {"consistent": (8, 16, 32), "shell": (8, 16)}  # cells along
 LEAST = 1e-7  # %, of errors that are drawn
 

@@ -19,12 +19,8 @@ from meshes.topology import Ints
 from verification.framework.checks import CaseResult, Context
 
 Array = NDArray[np.float64]
-MU, WEIGHT, SPRING, SLOPE = (
-    0.3,
-    0.02,
-    0.01,
-    2.0,
-)  # N, N / mm, and the slope at the end over that at which it slips
+MU, WEIGHT, SPRING = 0.3, 0.02, 0.01  # coefficient, N, N / mm
+SLOPE = 2.0  # at the end, over that at which it slips
 FACETS, TRAVEL, GAP, RADIUS = 48, 1.5, 0.005, 2.0  # of a mould of a cylinder; mm
 SHUT = ((1, 0.2), (2, 0.2), (2, 0.4))  # rows of cells a panel, and thickness, mm
 PANEL = 10.0  # mm
@@ -47,10 +43,14 @@ def more(result: CaseResult, context: Context) -> None:
 # ------------------------------------------------------------------------------------ friction
 
 
-def slope() -> Path:
-    """A strip on a plate that a soft spring holds; its weight leans along the plate by more than it can hold."""
+def slope(plate: bh.Indenter | bh.Mould | None = None) -> Path:
+    """A strip on a plate that a soft spring holds; its weight leans along the plate by more than it can hold.
+
+    Args:
+        plate: whose upper face is at z = -0.05 mm; None for a bar.
+    """
     mesh = meshes.structured(meshes.strip(20.0, 5.0, [2.5], ["flat"]), along=8, rows=1)
-    plate = bh.Indenter("plate", (10.0, 2.5, -1.05), 0.5 * math.pi, 100.0, 2.0, 0.5)
+    plate = plate or bh.Indenter("plate", (10.0, 2.5, -1.05), 0.5 * math.pi, 100.0, 2.0, 0.5)
     model = bh.Model(mesh, bh.Sheet(E=4000.0, nu=0.0, t=0.2), contact=False, friction=MU)
     model = model.spring("all", total=(SPRING, SPRING, 1e-3))
     model = model.step(plate, bh.Force("all", total=(0.0, 0.0, -WEIGHT)))

@@ -15,7 +15,7 @@ import bh
 import meshes
 from meshes.cells import Kind
 from verification.framework.checks import CaseResult, Context
-from verification.studies.solver.closed_forms import Levels, Problem, judge
+from verification.studies.solver.closed_forms import KINDS, Levels, Problem, judge
 from verification.theory import heavy, orthotropic
 
 CASE = "real_sheets"
@@ -108,7 +108,7 @@ def exact_problems() -> tuple[Problem, ...]:
 
 
 def _rows(formulation: str, along: int, ratio: float) -> tuple[int, Kind]:
-    return max(round(along * ratio), 1), "alternating" if formulation == "consistent" else "mirrored"
+    return max(round(along * ratio), 1), KINDS[formulation]
 
 
 def _last(model: bh.Model) -> bh.State:
