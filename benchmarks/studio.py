@@ -6,9 +6,7 @@ frame and its drawing. `--session` leaves the window out.
 
 from __future__ import annotations
 
-import asyncio
 import sys
-import threading
 import time
 
 import numpy as np
@@ -17,9 +15,9 @@ import bh
 import meshes
 from bh.live import Session
 from bh.runtime.terminal import say
-from bh.studio.server import Studio
 from bh.studio.sheets import LiveSheet, of_model
 from tests.unit.browsers import opened
+from tests.unit.studio_visits import served
 
 CELLS = ((20, 4), (48, 8), (96, 16))  # about 1,000, 5,000 and 20,000 unknowns
 EVENTS = 40
@@ -61,18 +59,9 @@ def session_times(what: LiveSheet, rests: bool) -> tuple[list[float], list[float
 
 def window_times(what: LiveSheet) -> list[float]:
     """Seconds from the event to the drawn frame."""
-    studio, found = Studio(what), []
-
-    async def serve() -> None:
-        found.append(studio.serve()[1])
-        await asyncio.Event().wait()
-
-    threading.Thread(target=lambda: asyncio.run(serve()), daemon=True).start()
-    while not found:
-        time.sleep(0.01)
-    with opened() as chromium:
+    with served(what) as address, opened() as chromium:
         page = chromium.new_context(viewport={"width": 1400, "height": 820}, bypass_csp=True).new_page()
-        page.goto(found[0])
+        page.goto(address)
         page.wait_for_function("window.studio?.head", timeout=60_000)
         times = [1e-3 * page.evaluate(EVENT, 1.0 * (k + 1)) for k in range(EVENTS)]
     return times[5:]

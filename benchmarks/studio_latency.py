@@ -9,10 +9,8 @@ state shown is one in equilibrium with what was asked for. Beside it: processor 
 
 from __future__ import annotations
 
-import asyncio
 import os
 import sys
-import threading
 import time
 
 import numpy as np
@@ -20,9 +18,9 @@ import numpy as np
 from benchmarks.studio import CELLS, sheet
 from bh.live import Session
 from bh.runtime.terminal import say
-from bh.studio.server import Studio
 from bh.studio.sheets import LiveSheet
 from tests.unit.browsers import opened
+from tests.unit.studio_visits import served
 
 EVENTS, FIRST = 45, 5  # of the slider, and how many of them warm up
 PAUSES = 12
@@ -36,7 +34,7 @@ EVENT = """(value) => new Promise((found) => {
   const slider = document.getElementById("percent"), began = performance.now();
   window.done = () => {
     const { head } = studio;
-    if (!(head.rest || head.arrived)) return;
+    if (!head.arrived) return;
     if (Math.abs(100 * Object.values(head.asked)[0] / Math.PI - value) > 0.3) return;
     window.done = () => {}; found(performance.now() - began);
   };
@@ -52,25 +50,11 @@ def measured(what: LiveSheet, pause: float) -> tuple[list[float], list[float]]:
         what: the sheet.
         pause: s between two events.
     """
-    studio, found = Studio(what), []
-    stop = threading.Event()
-
-    async def serve() -> None:
-        server, address = studio.serve()
-        found.append(address)
-        while not stop.is_set():
-            await asyncio.sleep(0.05)
-        await studio.close(server)
-
-    thread = threading.Thread(target=lambda: asyncio.run(serve()), daemon=True)
-    thread.start()
-    while not found:
-        time.sleep(0.01)
     times, spent = [], []
-    with opened() as chromium:
+    with served(what) as address, opened() as chromium:
         page = chromium.new_context(viewport={"width": 1400, "height": 820}, bypass_csp=True).new_page()
         page.set_default_timeout(120_000)
-        page.goto(found[0])
+        page.goto(address)
         page.wait_for_function("window.studio?.head")
         page.evaluate(WATCH)
         for k in range(FIRST + (PAUSES if pause else EVENTS - FIRST)):
@@ -79,8 +63,6 @@ def measured(what: LiveSheet, pause: float) -> tuple[list[float], list[float]]:
             began = time.process_time()
             times.append(page.evaluate(EVENT, 1.0 * (k + 1)))
             spent.append(1e3 * (time.process_time() - began))
-    stop.set()
-    thread.join(10.0)
     return times[FIRST:], spent[FIRST:]
 
 

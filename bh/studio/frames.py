@@ -51,6 +51,7 @@ def head_of(frame: Frame) -> Json:
     return {
         "kind": "frame",
         "rest": frame.at_rest,
+        "arrived": frame.arrived,
         "note": frame.note,
         "snapped": frame.snapped,
         "stable": frame.state.stable,

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from bh.studio.server import Studio
+from bh.studio.sheets import LiveSheet
 
 PATIENCE = 30_000  # ms
 DROP = """([name, data]) => {
@@ -23,13 +24,13 @@ DROP = """([name, data]) => {
 
 
 @contextmanager
-def served() -> Iterator[str]:
-    """A server in a thread of its own; its address."""
+def served(sheet: LiveSheet | None = None) -> Iterator[str]:
+    """A server in a thread of its own, whose windows begin with a sheet; its address."""
     found: list[str] = []
     ready, loop = threading.Event(), asyncio.new_event_loop()
 
     async def serve() -> None:
-        studio = Studio()
+        studio = Studio(sheet)
         site, where = studio.serve()
         found.append(where)
         ready.set()

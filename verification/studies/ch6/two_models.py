@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
+from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
 
 from bh.applications.inverse.forward import Forward
@@ -268,8 +269,7 @@ def _combinations(result: CaseResult, models: dict[str, Forward]) -> dict[int, d
 
 def _least_apart(points: Array) -> float:
     """Least distance between two of points (k, 3), mm."""
-    apart = np.linalg.norm(points[:, None] - points, axis=-1)
-    return float(apart[np.triu_indices(len(points), 1)].min())
+    return float(pdist(points).min())
 
 
 def _minima(result: CaseResult, models: dict[str, Forward]) -> dict[str, list[Array]]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ import bh
 import meshes
 from bh.analysis.contact import Panels, first_contact
 from bh.applications.inverse.simulate import Setting, model
+from bh.model.model import Contact
 from bh.paths.path import Path
 from bh.plotting.pictures import picture
 from meshes import SheetMesh
@@ -25,7 +25,6 @@ from verification.studies.ch5 import fig5_3
 from verification.studies.solver.hard_cases.pinching import Fan
 
 Array = NDArray[np.float64]
-Gap = Literal["thickness", "auto", False] | float  # as `Model.contact`
 PREDICATE = "the predicate of bh.contact, which shares nothing with the barrier"
 CLOSE = 0.02
 FAN, SHARE = (24, 2), 0.9558  # cells along and rows a pleat; of the folded width, that brings creases t apart
@@ -168,7 +167,7 @@ def fan(result: CaseResult, context: Context) -> None:
 # ------------------------------------------------------------------------------------ deep folds of Fig. 5.3
 
 
-def annulus(contact: Gap) -> bh.Model:
+def annulus(contact: Contact) -> bh.Model:
     """The sheet of Fig. 5.3 with one row of bars and hinges, as the source's.
 
     Args:
@@ -181,7 +180,7 @@ def annulus(contact: Gap) -> bh.Model:
     return bh.Model(mesh, bh.Sheet(E=fig5_3.E, t=fig5_3.T), formulation="bars-and-hinges", contact=contact)
 
 
-def closed(contact: Gap) -> Path:
+def closed(contact: Contact) -> Path:
     """Its crease pressed shut by stiff springs.
 
     Args:
@@ -205,7 +204,7 @@ def deep(result: CaseResult, context: Context) -> None:
     angle, ratio = _curve(free)
     series = [line("without contact", np.degrees(angle).tolist(), ratio.tolist(), "reference")]
     t = fig5_3.T
-    pressed: tuple[tuple[str, Gap, float], ...] = (
+    pressed: tuple[tuple[str, Contact, float], ...] = (
         ("thickness of 0.5 mm", "thickness", t),
         ("gap of 0.2 mm", BEYOND, BEYOND),
     )
@@ -273,7 +272,7 @@ def _curve(path: Path) -> tuple[Array, Array]:
 # ------------------------------------------------------------------------------------ strips of chapter 6
 
 
-def crossing(name: str, contact: Gap) -> Path:
+def crossing(name: str, contact: Contact) -> Path:
     """One of `STRIPS`, folded and pinched.
 
     Args:
