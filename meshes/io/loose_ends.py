@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,11 +99,11 @@ class _Sight:
         import shapely
 
         self.xy, self.edges = xy, np.array(edges)
-        self.tree = shapely.STRtree(shapely.linestrings(xy[np.array(edges)]))
+        self.tree = shapely.STRtree(shapely.linestrings(xy[self.edges]))
         self.joined = {side(*edge) for edge in edges}
         self.added: list[Side] = []
         self.tied: set[int] = set()  # ends of ties
-        self.lines: list[Any] = []  # of the ties
+        self.ties = shapely.STRtree([])  # of the added edges
 
     def add(self, pair: Side) -> None:
         """One more tie."""
@@ -113,7 +112,7 @@ class _Sight:
         self.added.append(pair)
         self.joined.add(pair)
         self.tied.update(pair)
-        self.lines.append(shapely.LineString(self.xy[list(pair)]))
+        self.ties = shapely.STRtree(shapely.linestrings(self.xy[np.array(self.added)]))
 
     def first(self, end: int, others: Ints) -> int | None:
         """The first of some vertices to which a tie from an end meets no line but at its own ends."""
@@ -128,14 +127,13 @@ class _Sight:
                 np.stack((np.broadcast_to(self.xy[end], (len(some), 2)), self.xy[some]), axis=1)
             )
             far = 1e-9 * shapely.length(ways)
-            way, edge = self.tree.query(ways, predicate="dwithin", distance=far)
-            met = way[self._in_the_way(end, some[way], self.edges[edge])]
-            for k in np.setdiff1d(np.arange(len(some)), met).tolist():
-                ties = np.array(self.added, dtype=int).reshape(-1, 2)
-                if self.lines:
-                    ties = ties[shapely.dwithin(self.lines, ways[k], far[k])]
-                if not self._in_the_way(end, np.full(len(ties), some[k]), ties).any():
-                    return int(some[k])
+            free = np.arange(len(some))
+            for tree, lines in ((self.tree, self.edges), (self.ties, np.array(self.added, dtype=int))):
+                way, line = tree.query(ways[free], predicate="dwithin", distance=far[free])
+                met = way[self._in_the_way(end, some[free[way]], lines[line].reshape(-1, 2))]
+                free = np.delete(free, np.unique(met))
+            if len(free):
+                return int(some[free[0]])
         return None
 
     def _in_the_way(self, end: int, others: Ints, segments: Ints) -> NDArray[np.bool_]:
