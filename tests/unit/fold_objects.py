@@ -1,4 +1,4 @@
-"""A small FOLD object, how tests read it, and what they ask of meshes."""
+"""A small FOLD object, how tests read it."""
 
 from __future__ import annotations
 
@@ -43,8 +43,3 @@ def pairs(mesh: SheetMesh, name: str) -> list[list[int]]:
 
 def undirected(pairs: np.ndarray) -> set[tuple[int, int]]:
     return {tuple(sorted(pair)) for pair in pairs.tolist()}
-
-
-def winding(mesh: SheetMesh) -> np.ndarray:
-    a, b, c = (mesh.points[mesh.triangles[:, k], :2] for k in range(3))
-    return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]

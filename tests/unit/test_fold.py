@@ -13,7 +13,8 @@ import pytest
 from bh.scene.folding import proposals
 from meshes import CreasePattern, FileFormatError
 from meshes.io import read_fold, read_pattern
-from tests.unit.fold_objects import DATA, SQUARE, Read, pairs, undirected, winding
+from tests.unit.asked import winding
+from tests.unit.fold_objects import DATA, SQUARE, Read, pairs, undirected
 
 
 class TestSets:
