@@ -12,6 +12,8 @@ the cache half as much.
 from __future__ import annotations
 
 import argparse
+import gc
+import importlib
 import json
 import sys
 import time
@@ -214,13 +216,9 @@ def own_imbalance(model: Model, frame: Frame) -> float:
 
 def resident() -> float:
     """Memory of this process that is in use, MB: without what waits to be collected, or lies free in the heap."""
-    import gc
-
-    import psutil
-
     gc.collect()
     give_back()
-    return float(psutil.Process().memory_info().rss) / 2**20
+    return float(importlib.import_module("psutil").Process().memory_info().rss) / 2**20  # it has no types
 
 
 def main() -> int:

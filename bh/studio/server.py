@@ -33,6 +33,7 @@ LONGEST_REQUEST = 65_536  # bytes of a request's body; no page takes one
 MOVES = ["fold", "percent", "pull", "pinch"]  # of which only the last counts
 WINDOWS = 8  # at once
 QUIET = 0.4  # s without a wish before a finer mesh is begun
+LINGERS = 1.0  # s behind the end of a window, after which its memory goes back
 POLICY = (
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self' ws:"
 )
@@ -194,7 +195,8 @@ class Window(tornado.websocket.WebSocketHandler):
         for task in self.tasks:
             task.cancel()
         self.desk = None
-        give_back()
+        # a thread may be in the middle of an iteration, and holds the desk until that ends
+        asyncio.get_running_loop().call_later(LINGERS, give_back)
 
     def _begin(self, work: Coroutine[None, None, None]) -> None:
         """A task that ends with the window, and that the server waits for when it ends."""
