@@ -8,6 +8,7 @@ import numpy as np
 
 from bh.loading.load_step import crease_hinges
 from bh.model.model import Model, drawn_flat
+from bh.model.wide_crease import wide_names
 from meshes import SheetMesh
 from meshes.topology import dihedral_angles
 
@@ -53,6 +54,16 @@ def chains(mesh: SheetMesh, names: list[str]) -> list[str]:
             found.append(name)
             seen |= edges
     return [name for name in names if name in found]
+
+
+def handled(mesh: SheetMesh) -> list[str]:
+    """Names of the creases that a hand folds: chains that are drawn to be folded, and wide creases by their own names.
+
+    Args:
+        mesh: of the sheet.
+    """
+    drawn = [name for name in mesh.creases if mesh.folds.get(name) != "flat"]
+    return [*chains(mesh, drawn), *wide_names(mesh)]
 
 
 def drawn_folds(mesh: SheetMesh, names: list[str]) -> dict[str, float]:

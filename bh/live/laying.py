@@ -145,5 +145,5 @@ class Laying:
         return Under(way, load, system, March(system, [here], 1.0, self._settings, self._settles), True)
 
     def _step(self, way: Way, gone: tuple[int, ...]) -> Step:
-        items = way.actuations(self.model.creases, gone)
+        items = way.actuations(self.model, gone)
         return Step(items or (Force([0], each=(0.0, 0.0, 0.0)),))

@@ -16,7 +16,7 @@ from bh.live.floating import Floating
 from bh.live.frame import Frame
 from bh.live.grips import Grip, Jaws, Vector
 from bh.live.history import Mark, lightened
-from bh.live.holding import chains, drawn_folds, held
+from bh.live.holding import drawn_folds, handled, held
 from bh.live.laying import Laying
 from bh.model.actuations import Pull
 from bh.model.model import Model
@@ -63,8 +63,7 @@ class Session:
         )  # but for its middle
         self._floating = Floating()
         self._laying = Laying(self.model, settings or LoadControl(), settles)
-        names = [name for name in self.mesh.creases if self.mesh.folds.get(name) != "flat"]
-        self._wanted = Controls(drawn_folds(self.mesh, chains(self.mesh, names)))
+        self._wanted = Controls(drawn_folds(self.mesh, handled(self.mesh)))
         self._gone: tuple[int, ...] = ()
         self._past: list[Mark] = []
         self._undone: list[Mark] = []
@@ -292,8 +291,7 @@ class Session:
         Returns:
             a model for `bh.trace`; where the sheet has `left` its branch on its way here, it may end on another one.
         """
-        laws = self.model.creases
-        folds = tuple(fold_of(name, angle, laws.get(name)) for name, angle in self._wanted.folds.items())
+        folds = tuple(fold_of(self.model, name, angle) for name, angle in self._wanted.folds.items())
         pulls: tuple[Actuation, ...] = tuple(
             Pull(node, grip.to, grip.stiffness) for node, grip in self._wanted.grips.items()
         )

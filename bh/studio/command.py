@@ -15,7 +15,9 @@ from bh.studio.library import LIBRARY
 def studio(
     file: Annotated[
         str | None,
-        typer.Argument(help=f"A drawing (.svg, .dxf, .fold, .cp, .opx), or a pattern: {', '.join(LIBRARY)}."),
+        typer.Argument(
+            help=f"A drawing (.svg, .dxf, .fold, .cp, .opx), a scene (.toml), or a pattern: {', '.join(LIBRARY)}."
+        ),
     ] = None,
     material: Annotated[str, typer.Option(help="paper, card, board, pet, pp, aluminium or steel.")] = "card",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of this machine; 0 for a free one.")] = 0,
@@ -24,7 +26,7 @@ def studio(
     """Fold a sheet by sliders, in a window of the browser.
 
     Args:
-        file: a drawing, or the name of a pattern of the library.
+        file: a drawing, a scene, or the name of a pattern of the library.
         material: one of those of `bh fold`.
         port: of this machine; 0 for a free one.
         browser: open it.

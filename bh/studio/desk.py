@@ -16,7 +16,7 @@ from bh.analysis.contact import self_contact
 from bh.errors import InputError
 from bh.live import Controls, Mark, Session, held
 from bh.live.history import lightened
-from bh.live.holding import chains
+from bh.live.holding import handled
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
 from bh.solving.trace import trace
@@ -232,8 +232,7 @@ class Desk:
         wanted = self.session.wanted
         parts = [angle / sheet.full[name] for name, angle in wanted.folds.items()]
         gone = float(np.median(parts)) if parts else 0.0
-        folded = [name for name, kind in sheet.model.mesh.folds.items() if kind != "flat"]
-        names = chains(sheet.model.mesh, folded)
+        names = handled(sheet.model.mesh)
         folds = {name: wanted.folds.get(name, gone * sheet.full[name]) for name in names}
         self.put(sheet, replace(wanted, folds=folds))
 
