@@ -207,7 +207,7 @@ def own_imbalance(model: Model, frame: Frame) -> float:
         as of `Evaluation`; 0 where a formulation cannot begin at a shape.
     """
     start = replace(frame.controls, folds=dict.fromkeys(frame.controls.folds, 0.0))
-    items = Way(start, frame.controls).actuations(model.creases) or (Force([0], each=(0.0, 0.0, 0.0)),)
+    items = Way(start, frame.controls).actuations(model) or (Force([0], each=(0.0, 0.0, 0.0)),)
     system = formulation(model.formulation).system(model, LoadStepBuilder(model).build(Step(items)), None)
     if not isinstance(system, PlacedSystem):
         return 0.0
