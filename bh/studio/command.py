@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from bh.studio.opening import sheet_of
-from bh.studio.server import open_window
-from bh.studio.sheets import LIBRARY
+from bh.errors import InputError
+from bh.studio.door import Door
+from bh.studio.library import LIBRARY
 
 
 def studio(
@@ -33,4 +34,17 @@ def studio(
     Raises:
         InputError: the file cannot be read or meshed, or the port is taken.
     """
-    open_window(sheet_of(file, material), port, browser)
+    door = Door.opened(port)
+    seen = browser and (file is None or file in LIBRARY or Path(file).is_file())
+    if seen:  # it starts while the program is still being read
+        door.show()
+    from bh.studio.opening import sheet_of
+    from bh.studio.server import open_window
+
+    try:
+        sheet = sheet_of(file, material)
+    except InputError as error:
+        if seen:
+            door.refuse(f"bh studio: {error}")
+        raise
+    open_window(sheet, browser=False, door=door)

@@ -361,6 +361,7 @@ class Desk:
             return None
         if self._finer is None or self._finer[0] != key:
             found = finer(self.sheet.model, frame, going)
+            give_back()  # the factors of its meshes: it may be long until the next wish
             if found is None:
                 return None
             self._finer = key, found

@@ -23,17 +23,12 @@ from bh.model.wide_crease import wide_names
 from bh.scene.folding import MATERIALS, PERCENT, Wish, proposals
 from bh.scene.load import Outputs, Scene, parse_scene
 from bh.solvers.settling import Settling
+from bh.studio.library import LIBRARY as LIBRARY
 from meshes import SheetMesh
 from meshes.pattern import FoldKind
 
 LONGEST = 5_000_000  # bytes of a drawing
 MOST_TRIANGLES = 8000  # of a sheet that is to answer at once
-LIBRARY: Mapping[str, str] = {
-    "arc": 'kind = "annulus_sector"\nradius = 100.0\nwidth = 25.0\nangle = 1.5708',
-    "pleats": 'kind = "annulus_sector"\nradius = [60.0, 75.0, 90.0]\nwidth = 15.0\nangle = 1.2\n'
-    'fold = ["mountain", "valley", "mountain"]',
-    "strip": 'kind = "strip"\nlength = 120.0\nwidth = 60.0\ncreases = [20.0, 40.0]\nfold = ["mountain", "valley"]',
-}
 BARS, BENT = "bars-and-hinges", "consistent"
 ODD = re.compile(r"[^\w .()+,=@~-]")
 ALONG, ROWS = 24, 3  # cells of the library's patterns
