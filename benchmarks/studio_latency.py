@@ -1,10 +1,15 @@
 """From the slider to the picture: `python -m benchmarks.studio_latency`, better on a quiet machine.
 
 A browser on this machine, without a graphics card, moves the slider "All creases"; the time is that from the slider's
-own event to the end of the drawing of the picture that shows its state, seen in the page. "Drag" is one event behind
-the other. "Pause" is an event after a second of rest, when the finer mesh is being solved and has to give way. The
-state shown is one in equilibrium with what was asked for. Beside it: processor time that the server took for an event
-(of all its threads), which a busy machine does not change, and the load of the machine, as `uptime` tells it.
+own event until the picture that shows its state is drawn: a pixel of it is read back, which waits for that. "Drag" is
+one event behind the other. "Pause" is an event after a second of rest, when the finer mesh is being solved and has to
+give way. The state shown is one in equilibrium with what was asked for. Beside it: processor time that the server took
+for an event (of all its threads), which a busy machine does not change, and the load of the machine, as `uptime` tells
+it.
+
+A browser that finds no graphics card draws WebGL by SwiftShader and composes the page itself: so it is started here.
+`--composed` tells it to take SwiftShader for a card, as the tests do, which it then composes the whole page by. Sizes
+may be given as numbers 1 to 3. On a busy machine `nice` does not help much: Chromium sets threads of its own back to 0.
 """
 
 from __future__ import annotations
@@ -19,14 +24,16 @@ from benchmarks.studio import CELLS, sheet
 from bh.live import Session
 from bh.runtime.terminal import say
 from bh.studio.sheets import LiveSheet
-from tests.unit.browsers import opened
+from tests.unit.browsers import OPTIONS, PLAIN, opened
 from tests.unit.studio_visits import served
 
 EVENTS, FIRST = 45, 5  # of the slider, and how many of them warm up
 PAUSES = 12
 ASKED = (33, 66, 150)  # ms
 WATCH = """async () => {
-  const { whenDrawn } = await import("./static/view.js");
+  const { renderer, whenDrawn } = await import("./static/view.js");
+  const gl = renderer.getContext(), pixel = new Uint8Array(4);
+  window.drawn = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
   window.done = () => {};
   whenDrawn(() => window.done());
 }"""
@@ -36,22 +43,25 @@ EVENT = """(value) => new Promise((found) => {
     const { head } = studio;
     if (!head.arrived) return;
     if (Math.abs(100 * Object.values(head.asked)[0] / Math.PI - value) > 0.3) return;
-    window.done = () => {}; found(performance.now() - began);
+    window.done = () => {}; drawn(); found(performance.now() - began);
   };
   slider.value = value; slider.dispatchEvent(new Event("input", { bubbles: true }));
   slider.dispatchEvent(new Event("change", { bubbles: true }));
 })"""
 
 
-def measured(what: LiveSheet, pause: float) -> tuple[list[float], list[float]]:
+def measured(
+    what: LiveSheet, pause: float, options: tuple[str, ...] = PLAIN
+) -> tuple[list[float], list[float]]:
     """Milliseconds from the event to the picture, and of the processor for it.
 
     Args:
         what: the sheet.
         pause: s between two events.
+        options: of the browser.
     """
     times, spent = [], []
-    with served(what) as address, opened() as chromium:
+    with served(what) as address, opened(options) as chromium:
         page = chromium.new_context(viewport={"width": 1400, "height": 820}, bypass_csp=True).new_page()
         page.set_default_timeout(120_000)
         page.goto(address)
@@ -67,13 +77,14 @@ def measured(what: LiveSheet, pause: float) -> tuple[list[float], list[float]]:
 
 
 def main() -> None:
-    """Print a line a size and a way of moving; sizes may be given as numbers 1 to 3."""
-    chosen = [int(each) - 1 for each in sys.argv[1:]] or range(len(CELLS))
+    """Print a line a size and a way of moving."""
+    options = OPTIONS if "--composed" in sys.argv else PLAIN
+    chosen = [int(each) - 1 for each in sys.argv[1:] if each.isdigit()] or range(len(CELLS))
     for number in chosen:
         what = sheet(*CELLS[number])
         size = Session(what.model).size
         for name, pause in (("drag", 0.0), ("pause", 1.0)):
-            times, spent = measured(what, pause)
+            times, spent = measured(what, pause, options)
             middle, most = np.percentile(times, [50, 95])
             say(
                 f"{size:,} unknowns, {name}: median {middle:.0f} ms, 95th percentile {most:.0f} ms, processor "

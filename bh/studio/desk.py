@@ -51,6 +51,10 @@ class Desk:
         self._colour = "bending"
         self._shown: tuple[object, ...] = ()
         self._snapped = False  # since the last picture
+        self._pictured: tuple[
+            object, ...
+        ] = ()  # what the window has: positions, colour, whether at rest and why not
+        self._top = 0.0  # of the scale of its colours
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
         self._flat: tuple[State, FromFlat] | None = None  # a state, and where a run from flat ends
         self._tidied = time.monotonic()
@@ -275,7 +279,32 @@ class Desk:
     @property
     def busy(self) -> bool:
         """Whether there is something to solve, or something to show that was not yet."""
-        return self._now() != self._shown or not (self.frame.at_rest or self.frame.note)
+        return self.stale or not (self.frame.at_rest or self.frame.note)
+
+    @property
+    def stale(self) -> bool:
+        """Whether something was asked since it was worked last: the frame knows nothing of it."""
+        return self._now() != self._shown
+
+    @property
+    def moving(self) -> bool:
+        """Whether the sheet is on its way to what is asked; else it is there, or cannot go on."""
+        return self.stale or not (self.frame.arrived or self.frame.note)
+
+    @property
+    def fresh(self) -> bool:
+        """Whether the window has not got these positions, or not in this colour."""
+        return not self._pictured or any(
+            a is not b for a, b in zip(self._pictured[:2], self._picture(), strict=False)
+        )
+
+    @property
+    def untold(self) -> bool:
+        """Whether the window does not know where the sheet lies, or that it is at rest there."""
+        return self.fresh or self._pictured[2:] != self._picture()[2:]
+
+    def _picture(self) -> tuple[object, ...]:
+        return self.frame.points, self._colour, self.frame.at_rest, self.frame.note
 
     def _now(self) -> tuple[object, ...]:
         return self.session.wanted, self.sheet
@@ -311,27 +340,32 @@ class Desk:
         news, self._news = self._news, []
         return news
 
-    def picture(self, heard: int = 0) -> bytes:
+    def picture(self, heard: int = 0, whole: bool = True) -> bytes:
         """The newest frame as it travels.
 
         Args:
             heard: messages that have been taken until now; it is handed on.
+            whole: with positions; False for the numbers alone, where the window has those.
 
         Returns:
             see `packed`; after the numbers (n, 3) positions, mm, and (n,) values of the colour.
         """
         frame = self.frame
-        chosen = self._colours.get(self._colour)
-        values = np.zeros(len(frame.points)) if chosen is None else chosen.values(frame.state)
+        self._pictured = self._picture()
+        arrays: tuple[NDArray[np.float64], ...] = ()
+        if whole:
+            chosen = self._colours.get(self._colour)
+            values = np.zeros(len(frame.points)) if chosen is None else chosen.values(frame.state)
+            self._top, arrays = top_of(values), (frame.points, values)
         head = {
             **head_of(frame),
             "snapped": self._snapped,
             "left": self.session.left,
-            "top": top_of(values),
+            "top": self._top,
             "heard": heard,
         }
         self._snapped = False
-        return packed(head, frame.points, values)
+        return packed(head, *arrays)
 
     def update(self, budget: float = BUDGET) -> bytes:
         """Work for a while, and the frame that came of it.
@@ -413,7 +447,8 @@ class Desk:
         return [] if found is None else [{"kind": "branch", "here": found.here, "said": found.said}]
 
     def describe(self) -> Json:
-        """The sheet as a window draws it: flat, with its creases by name."""
+        """The sheet as a window draws it: flat, with its creases by name; what it had is gone."""
+        self._pictured = ()
         return described(self.sheet, self.session, self.material, self._colours, self._colour)
 
 

@@ -7,6 +7,7 @@ import contextlib
 import json
 import secrets
 import threading
+import time
 from collections.abc import Coroutine, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -32,6 +33,8 @@ MOVES = ["fold", "percent", "pull", "pinch"]  # of which only the last counts
 WINDOWS = 8  # at once
 QUIET = 0.4  # s without a wish before a finer mesh is begun
 LINGERS = 1.0  # s behind the end of a window, after which its memory goes back
+CALM = 0.1  # s without a word of the browser before the stability of what was reached is counted
+TELLS = 0.3  # s, after which a window is told that the way takes longer
 POLICY = (
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self' ws:"
 )
@@ -158,7 +161,10 @@ class Window(tornado.websocket.WebSocketHandler):
         self.studio = studio
         self.desk: Desk | None = None
         self.queue: asyncio.Queue[str | bytes] = asyncio.Queue()
-        self.drawn = asyncio.Event()  # the last frame was shown
+        self.drawn = True  # the last frame
+        self.stirred = asyncio.Event()  # the browser has said something
+        self.sent = self.spoken = 0.0  # s, when the last frame was, and when the browser said something
+        self.since = 0.0  # s, when the wish that the window was told nothing of was heard
         self.tasks: set[asyncio.Task[None]] = set()
         self.heard = 0  # messages
         self.taken = 0  # of them, and how many the last frame knew of
@@ -185,17 +191,19 @@ class Window(tornado.websocket.WebSocketHandler):
             kwargs: none.
         """
         self.studio.windows[self] = None
-        self.drawn.set()
+        self.set_nodelay(True)
         self._begin(self._work())
 
     def on_message(self, message: str | bytes) -> None:
         """A frame was drawn, or something is asked."""
         if message == "drawn":
-            self.drawn.set()
+            self.drawn = True
         else:
             self.heard += 1
             self.going.clear()
             self.queue.put_nowait(message)
+        self.spoken = time.monotonic()
+        self.stirred.set()
 
     def on_close(self) -> None:
         """Give everything back."""
@@ -228,34 +236,74 @@ class Window(tornado.websocket.WebSocketHandler):
             return
         await self._say(desk.describe())
         while True:
-            if not (desk.busy or self.told != self.taken) or not self.queue.empty():
-                if self.queue.empty():
-                    self.going = threading.Event()  # its own, so that one that was ended stays so
-                    self.going.set()
-                    self._begin(self._refine(desk, self.going))
-                waiting = [await self.queue.get()]
-                while not self.queue.empty():
-                    waiting.append(self.queue.get_nowait())
-                for message in newest(waiting):
-                    await self._do(desk, message)
-                self.taken += len(waiting)
-            if desk.busy or self.told != self.taken:
-                try:
-                    await run(self.studio.pool, desk.work)
-                    for answer in desk.news():
-                        await self._say(answer)
-                    if desk.busy and not self.drawn.is_set():
-                        continue  # it is solved as fast as it goes, and shown as fast as the browser draws
-                    await self.drawn.wait()
-                    self.told = self.taken
-                    frame = await run(self.studio.pool, desk.picture, self.told)
-                except Exception as error:  # a sheet that breaks takes its session down, not the server
-                    await self._say(_fault(error))
-                    desk.put(desk.sheet)
-                    await self._say(desk.describe())
-                    continue
-                self.drawn.clear()
-                await self.write_message(frame, binary=True)
+            try:
+                await self._next(desk)
+            except WebSocketClosedError:
+                raise
+            except Exception as error:  # a sheet that breaks takes its session down, not the server
+                await self._say(_fault(error))
+                desk.put(desk.sheet)
+                await self._say(desk.describe())
+
+    async def _next(self, desk: Desk) -> None:
+        """What is due: to show, to hear, to solve, or to wait. No wish waits for what only tells more of a state."""
+        if self.drawn and self._due(desk):  # first, or wishes that keep coming would keep it from being shown
+            await self._show(desk)
+        elif not self.queue.empty():
+            await self._hear(desk)
+        elif desk.moving:  # it is solved as fast as it goes, and shown as fast as the browser draws
+            await self._solve(desk)
+        elif self._due(desk):
+            await self._stir()
+        elif desk.busy:  # the sheet has arrived and is shown: what is left is to look whether it is stable
+            left = CALM - (time.monotonic() - max(self.sent, self.spoken))
+            await (self._stir(left) if left > 0.0 else self._solve(desk))
+        else:
+            self.going = threading.Event()  # its own, so that one that was ended stays so
+            self.going.set()
+            self._begin(self._refine(desk, self.going))
+            while self.queue.empty():
+                await self._stir()
+
+    async def _stir(self, most: float | None = None) -> None:
+        """Wait until the browser says something, for `most` s at the longest."""
+        self.stirred.clear()
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self.stirred.wait(), most)
+
+    async def _hear(self, desk: Desk) -> None:
+        """Do what was asked meanwhile."""
+        if self.told == self.taken:
+            self.since = time.monotonic()
+        waiting = []
+        while not self.queue.empty():
+            waiting.append(self.queue.get_nowait())
+        for message in newest(waiting):
+            await self._do(desk, message)
+        self.taken += len(waiting)
+
+    def _due(self, desk: Desk) -> bool:
+        """Whether there is something that the window does not show yet."""
+        if desk.stale:
+            return False  # the frame answers what was asked before
+        if not desk.moving:
+            return desk.untold or self.told != self.taken
+        return desk.fresh or (self.told != self.taken and time.monotonic() - self.since > TELLS)
+
+    async def _solve(self, desk: Desk) -> None:
+        """Work for a while."""
+        await asyncio.get_running_loop().run_in_executor(self.studio.pool, desk.work)
+        for answer in desk.news():
+            await self._say(answer)
+
+    async def _show(self, desk: Desk) -> None:
+        """Send the newest frame."""
+        self.told = self.taken
+        frame = await asyncio.get_running_loop().run_in_executor(
+            self.studio.pool, desk.picture, self.told, desk.fresh
+        )
+        self.drawn, self.sent = False, time.monotonic()
+        await self.write_message(frame, binary=True)
 
     async def _refine(self, desk: Desk, going: threading.Event) -> None:
         """After a while without a wish, the same state on a finer mesh."""

@@ -9,6 +9,8 @@ export const make = (tag, attributes, parent) => {
 };
 export const number = (v, digits = 3) => (Math.abs(v) < 1e-12 ? "0" : Math.abs(v) >= 1e-3 && Math.abs(v) < 1e5 ? Number(v.toPrecision(digits)).toString() : v.toExponential(2));
 export const degrees = (rad) => `${(rad * 180 / Math.PI).toFixed(1)}°`;
+// A text that is the same is not written: what is written is laid out and painted anew.
+export const write = (item, text) => { if (item.textContent !== text) item.textContent = text; };
 
 // The sheet that lies in the window, the numbers of its newest frame, and its positions, mm.
 export const now = { sheet: null, head: null, points: null };
@@ -48,15 +50,16 @@ function remembered(message) {
 // A stroke: from pointer to pointer, from key to key; what moves in it is taken back by one undo.
 let stroke = 1;
 for (const begins of ["pointerdown", "keydown", "change"]) addEventListener(begins, () => { stroke += 1; }, true);
-const MOVES = ["fold", "percent", "pull", "pinch"];
-const before = []; // what is to be done before anything is asked
-export const whenAsked = (done) => before.push(done);
+export const MOVES = ["fold", "percent", "pull", "pinch"];
+const after = []; // what is to be done once something was asked
+export const whenAsked = (done) => after.push(done);
 export let asked = 0; // messages of this connection; what was computed before the last of them is old
 export function ask(message) {
-  for (const done of before) done(message);
   if (socket?.readyState !== WebSocket.OPEN) return;
-  remembered(message); asked += 1;
-  socket.send(JSON.stringify(MOVES.includes(message.do) ? { ...message, stroke } : message));
+  asked += 1;
+  socket.send(JSON.stringify(MOVES.includes(message.do) ? { ...message, stroke } : message)); // at once: the rest can wait
+  remembered(message);
+  for (const done of after) done(message);
 }
 
 let quiet = 0;

@@ -1,6 +1,6 @@
 // The state at rest on a finer mesh: shown until a hand asks for something else.
-import { $, asked, now, number, whenAsked } from "./common.js";
-import { lay, move } from "./view.js";
+import { $, MOVES, asked, now, number, whenAsked, write } from "./common.js";
+import { lay, move, redrawSoon } from "./view.js";
 import { scale } from "./panel.js";
 
 let shown = false, said = "", coarse = null;
@@ -13,13 +13,14 @@ export function seenCoarse(values) {
   coarse = values; shown = false; said = ""; last = null; flat = null;
 }
 
-// Back to the coarse mesh at once: a point is taken, or a slider moved.
-export function back() {
+// Back to the coarse mesh at once: a point is taken, or a slider moved. Where an answer comes soon it is seen instead.
+export function back(answered = false) {
   if (!shown) return;
   lay(now.sheet); move(now.points, coarse, now.head.top); scale(now.head.top);
+  if (answered) redrawSoon();
   shown = false; said = ""; badge();
 }
-whenAsked(back);
+whenAsked((message) => { const moves = MOVES.includes(message.do); back(moves); if (moves) { said = ""; badge(); } });
 
 // A hand is on the folded sheet, or off it: what it points at must not become another mesh meanwhile.
 export function hand(on) {
@@ -45,15 +46,19 @@ export function finer(head, floats) {
 
 export function branch(message) {
   if (!now.head?.rest) return;
-  flat = message; badge();
-  $("flat-run").textContent = message.said;
+  flat = message; badge(); flatRun();
 }
+
+// Beside the numbers, which are written anew where they tell more.
+export function flatRun() { if (flat) $("flat-run").textContent = flat.said; }
 
 export function badge() {
   const { head } = now, place = $("badge");
-  place.textContent = said || (head.note ? `cannot go on: ${head.note}` : head.snapped ? "snapped" : head.rest ? "in equilibrium" : "on its way");
-  if (flat && !flat.here) place.textContent += ", on another branch than a run from flat";
-  else if (head.left && head.rest && !head.snapped) place.textContent += ", behind a snap";
-  place.classList.toggle("away-from", !said && (Boolean(head.note) || head.snapped || !head.rest));
+  if (!head) return;
+  const rest = head.rest && head.heard === asked; // what was asked since is on its way
+  const text = said || (head.note ? `cannot go on: ${head.note}` : head.snapped ? "snapped" : rest ? "in equilibrium" : "on its way");
+  const apart = flat && !flat.here ? ", on another branch than a run from flat" : head.left && rest && !head.snapped ? ", behind a snap" : "";
+  write(place, text + apart);
+  place.classList.toggle("away-from", !said && (Boolean(head.note) || head.snapped || !rest));
 }
 export const refined = () => shown;

@@ -1,5 +1,5 @@
 // Controls, numbers and curves at the side.
-import { $, ask, degrees, make, now, number, tell } from "./common.js";
+import { $, ask, degrees, make, now, number, tell, write } from "./common.js";
 import { light } from "./view.js";
 import { key, panel as pinchPanel, wide } from "./pinch.js";
 import { taken } from "./pull.js";
@@ -85,31 +85,43 @@ export const slider = (name) => [...$("sliders").querySelectorAll("input")].find
 export function scale(top) {
   const [label, unit] = now.sheet.colours[$("colour").value] ?? ["", ""];
   $("scale").hidden = !(top > 0) || !unit;
-  $("middle").textContent = number(0.5 * top); $("top").textContent = number(top); $("unit").textContent = `${label}, ${unit}`;
+  write($("middle"), number(0.5 * top)); write($("top"), number(top)); write($("unit"), `${label}, ${unit}`);
   $("scale").setAttribute("aria-label", `Colours: ${label}, from 0 to ${number(top)} ${unit}`);
 }
 
 export function numbers() {
   const { head, sheet } = now, { energy } = head;
-  const rows = [["Energy", `${number(energy.total)} N mm`], ["of bending", `${number(energy.bending)} N mm`], ["of stretching", `${number(energy.stretching)} N mm`], ["of creases", `${number(energy.folding)} N mm`], ["Stable", head.stable === null ? "not known" : head.stable ? "yes" : "no"], ["Largest strain", `${number(100 * head.strain)} %`], ["Mesh", `${sheet.triangles.length / 3} triangles, ${sheet.formulation}`], ["Error of the energy", ""], ["Panels", ""], ["A run from flat", ""], ["Solved in", `${head.ms.toFixed(0)} ms`]];
+  const rows = [["Energy", `${number(energy.total)} N mm`], ["of bending", `${number(energy.bending)} N mm`], ["of stretching", `${number(energy.stretching)} N mm`], ["of creases", `${number(energy.folding)} N mm`], ["Stable", head.stable === null ? "not known" : head.stable ? "yes" : "no"], ["Largest strain", `${number(100 * head.strain)} %`], ["Mesh", `${sheet.triangles.length / 3} triangles, ${sheet.formulation}`], ["Error of the energy", "not looked at", "error"], ["Panels", sheet.contact ? "stop each other" : "not looked at", "meets"], ["A run from flat", "not looked at", "flat-run"], ["Solved in", `${head.ms.toFixed(0)} ms`]];
   const names = Object.keys(head.folds);
   for (const name of names.slice(0, 8)) rows.push([`Fold of ${name}`, degrees(head.folds[name])]);
-  $("numbers").replaceChildren(...rows.flatMap(([a, b]) => { const dt = document.createElement("dt"), dd = document.createElement("dd"); dt.textContent = a; dd.textContent = b; if (a.startsWith("Error")) { dd.id = "error"; dd.textContent = "not looked at"; } if (a === "A run from flat") { dd.id = "flat-run"; dd.textContent = "not looked at"; } if (a === "Panels") { dd.id = "meets"; dd.textContent = sheet.contact ? "stop each other" : "not looked at"; } return [dt, dd]; }));
+  table(rows);
   for (const input of $("sliders").querySelectorAll("input")) {
     const angle = head.asked[input.dataset.crease] ?? 0;
     if (document.activeElement !== input) input.value = angle * 180 / Math.PI;
-    input.previousElementSibling.querySelector("output").textContent = degrees(head.folds[input.dataset.crease] ?? 0);
+    write(input.previousElementSibling.querySelector("output"), degrees(head.folds[input.dataset.crease] ?? 0));
   }
   const full = Object.fromEntries(sheet.creases.map((c) => [c.name, c.full]));
   const parts = names.map((name) => 100 * head.asked[name] / full[name]);
   if (parts.length && Math.max(...parts) - Math.min(...parts) < 0.01) {
     if (document.activeElement !== $("percent")) $("percent").value = parts[0];
-    $("percent-out").textContent = `${parts[0].toFixed(1)} %`;
-  } else $("percent-out").textContent = "each its own";
+    write($("percent-out"), `${parts[0].toFixed(1)} %`);
+  } else write($("percent-out"), "each its own");
   scale(head.top);
   $("let-go").disabled = Object.keys(head.grips).length === 0;
   pinchPanel(head);
   if (head.rest) curves();
+}
+
+// Names, values and, of some, the id; what stands there is kept where the names are the same.
+function table(rows) {
+  const list = $("numbers");
+  if (list.children.length !== 2 * rows.length) list.replaceChildren(...rows.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));
+  rows.forEach(([name, value, id = ""], row) => {
+    const [dt, dd] = [list.children[2 * row], list.children[2 * row + 1]];
+    write(dt, name); write(dd, value);
+    if (dd.id !== id) dd.id = id;
+    if (id === "error") dd.removeAttribute("title");
+  });
 }
 
 function curves() {

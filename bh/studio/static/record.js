@@ -59,7 +59,7 @@ whenDrawn(() => {
   if (filming && filming.length < MOST) filming.push(copy(WIDE).toDataURL("image/jpeg", 0.85).split(",")[1]);
 });
 export async function savePicture() {
-  const canvas = await new Promise((done) => { wanted = done; picture(); });
+  const canvas = await new Promise((done) => { wanted = done; picture(true); });
   save(`${now.sheet.name.replace(/\.\w+$/, "")}.png`, canvas.toDataURL("image/png").split(",")[1]);
 }
 // Where the browser writes films itself: what it can write, the first that goes.

@@ -1,9 +1,9 @@
 // The window of bh studio: draws what the server sends, sends what a hand does. No physics is in here.
 import { $, ask, asked, connect, drawn, now, save, tell } from "./common.js";
-import { draw, fit, lay, move, seen, vector } from "./view.js";
+import { draw, fit, lay, move, picture, seen, smoothUnless, vector } from "./view.js";
 import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
-import { badge, branch, finer, hand, refined, seenCoarse } from "./finer.js";
+import { back, badge, branch, finer, flatRun, hand, refined, seenCoarse } from "./finer.js";
 import { history, numbers, oneCrease, panel, slider } from "./panel.js";
 import { remember, saveFilm, saveMoving, savePicture } from "./record.js";
 
@@ -33,13 +33,33 @@ function frame(buffer) {
   if (head.kind === "finer") { finer(head, floats); return; }
   now.head = head;
   if (!now.sheet) { drawn(); return; }
-  const n = now.sheet.points.length / 3, values = floats.subarray(3 * n, 4 * n);
-  now.points = floats.subarray(0, 3 * n);
-  seenCoarse(values);
-  move(now.points, values, head.top);
-  numbers(); badge();
-  requestAnimationFrame(drawn);
+  const n = now.sheet.points.length / 3;
+  if (floats.length) { // else the sheet lies as it did, and only the numbers tell more
+    const values = floats.subarray(3 * n, 4 * n);
+    now.points = floats.subarray(0, 3 * n);
+    seenCoarse(values);
+    move(now.points, values, head.top);
+    picture(); // not when the browser draws next: where that is slow, it is so because of the picture before
+    if (drawing) drawing = 2; else { drawing = 1; drawn(); requestAnimationFrame(rested); }
+  } else { back(); drawn(); }
+  badge(); said();
   remember(head);
+}
+
+// Another frame may come before the browser has shown one, not more of them: they would only wait for each other.
+let drawing = 0;
+function rested() {
+  if (drawing === 2) { drawing = 1; drawn(); requestAnimationFrame(rested); } else drawing = 0;
+}
+
+smoothUnless(() => now.head && (now.head.heard !== asked || !(now.head.arrived || now.head.note)));
+
+// Numbers and curves at the side: at rest at once, on the way now and then, as each of them is painted anew.
+const OFTEN = 250; // ms
+let later = 0;
+function said() {
+  if (now.head.rest || now.head.note) { clearTimeout(later); later = 0; numbers(); flatRun(); }
+  else later ||= setTimeout(() => { later = 0; if (now.head) numbers(); }, OFTEN);
 }
 
 // ---------------------------------------------------------------- what is clicked

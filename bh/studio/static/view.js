@@ -2,8 +2,11 @@
 import * as THREE from "./vendor/three.module.min.js";
 import { OrbitControls } from "./vendor/OrbitControls.js";
 import { $ } from "./common.js";
+import { smoothed } from "./smooth.js";
 
-export const renderer = new THREE.WebGLRenderer({ canvas: $("folded"), antialias: true, alpha: true });
+const SOON = 250; // ms in which an answer is awaited, whose picture takes the place of another one
+const CALM = 200; // ms without another picture, after which the edges of the last one are smoothed
+export const renderer = new THREE.WebGLRenderer({ canvas: $("folded"), antialias: false, alpha: true });
 export const scene = new THREE.Scene();
 export const camera = new THREE.PerspectiveCamera(35, 1, 0.1, 1e6);
 camera.up.set(0, 0, 1);
@@ -17,21 +20,28 @@ const lines = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineB
 lines.frustumCulled = false;
 scene.add(surface, lines);
 
-let dirty = true, pairs = [], laid = null, lit = "";
+let dirty = true, pairs = [], laid = null, lit = "", calm = 0, soon = 0;
 const before = [], after = []; // what is to be done before a picture is drawn, and when it was
 export const redraw = () => { dirty = true; };
+export const redrawSoon = () => { dirty = false; clearTimeout(soon); soon = setTimeout(redraw, SOON); };
 export const beforeDrawn = (done) => before.push(done);
 export const whenDrawn = (done) => after.push(done);
 export function draw() {
   requestAnimationFrame(draw);
   if (dirty) picture();
 }
-export function picture() {
+// Smooth edges take four times as long where there is no graphics card: only what stays has them.
+export function picture(smooth = false) {
   dirty = false; camera.updateMatrixWorld();
   for (const done of before) done();
-  renderer.render(scene, camera);
+  if (smooth) smoothed(renderer, scene, camera); else renderer.render(scene, camera);
   for (const done of after) done();
+  clearTimeout(calm); clearTimeout(soon);
+  if (!smooth) calm = setTimeout(smoothen, CALM);
 }
+let awaited = () => false; // whether another picture is to come, which smooth edges would keep waiting
+export const smoothUnless = (waits) => { awaited = waits; };
+function smoothen() { if (awaited()) calm = setTimeout(smoothen, CALM); else picture(true); }
 
 function resize() {
   const box = $("stage");
@@ -53,7 +63,7 @@ const INK = { mountain: [0.55, 0.02, 0.02], valley: [0.02, 0.08, 0.5] };
 
 // Another mesh: points, triangles, boundary and creases as the server describes them.
 export function lay(mesh) {
-  laid = mesh;
+  laid = mesh; geometry.dispose();
   const n = mesh.points.length / 3, tint = [];
   geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(mesh.points), 3));
   geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * n).fill(0.82), 3));
