@@ -133,14 +133,15 @@ class Hand:
             crease = str(random.choice(session.creases))
             return [{"do": way, "crease": crease, "angle": a} for a in random.uniform(-1.0, 2.5, 3).tolist()]
         if way == "drag":
-            node = int(random.integers(len(session.mesh.points)))
+            node = self._node()
             at = self.desk.frame.points[node]
             size = float(np.ptp(session.mesh.points, axis=0).max())
             far = size * random.choice([0.02, 0.1, 0.3, 3.0], p=[0.4, 0.4, 0.15, 0.05])
             steps = np.cumsum(random.normal(0.0, far / 4.0, (random.integers(1, 15), 3)), axis=0)
             return [{"do": "pull", "node": node, "to": to} for to in (at + steps).tolist()]
         if way == "pinch":
-            a, b = random.choice(len(session.mesh.points), 2, replace=False).tolist()
+            a = self._node()
+            b = int(random.choice(np.delete(np.arange(len(session.mesh.points)), a)))
             wide = float(np.linalg.norm(self.desk.frame.points[a] - self.desk.frame.points[b]))
             parts = np.linspace(1.0, random.uniform(0.3, 1.2), random.integers(1, 10))
             return [{"do": way, "a": a, "b": b, "gap": wide * part} for part in parts.tolist()]
@@ -154,6 +155,12 @@ class Hand:
         if way == "open":
             return [self._another()] if random.random() < 0.25 else []
         return [{"do": way}] if way in ("undo", "redo", "flatten", "let-go") else []
+
+    def _node(self) -> int:
+        """Any node; one time in three one that is gripped already, where there is one."""
+        gripped, count = sorted(self.desk.session.wanted.grips), len(self.desk.session.mesh.points)
+        again = bool(gripped) and self.random.random() < 1.0 / 3.0
+        return int(self.random.choice(gripped if again else count))
 
     def _another(self) -> dict[str, object]:
         import base64

@@ -26,6 +26,18 @@ class Grip:
     to: Vector
     stiffness: float
 
+    def stiffened(self, stiffness: float, at: Array) -> Grip:
+        """The same force by another spring.
+
+        Args:
+            stiffness: of that one, N/mm.
+            at: (3,) where the node is, mm.
+        """
+        if stiffness == self.stiffness:
+            return self
+        x, y, z = (at + self.stiffness / stiffness * (np.array(self.to) - at)).tolist()
+        return Grip((x, y, z), stiffness)
+
 
 @dataclass(frozen=True)
 class Jaws:

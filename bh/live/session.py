@@ -352,14 +352,13 @@ class Session:
         state = self._state()
         self._laying.stop(under, state)
         self._release(now, state)
-        start = now
+        grips = {}
         for node, grip in self._wanted.grips.items():
-            old = now.grips.get(node)
-            if old is None or old.stiffness != grip.stiffness:  # it begins without a force
-                x, y, z = state.points[node].tolist()
-                start = replace(start, grips={**start.grips, node: Grip((x, y, z), grip.stiffness)})
-        kept = {node: start.grips[node] for node in self._wanted.grips}
-        start = Controls(start.folds, kept, self._wanted.jaws)
+            at = state.points[node]
+            x, y, z = at.tolist()
+            old = now.grips.get(node, Grip((x, y, z), grip.stiffness))  # a new one begins without a force
+            grips[node] = old.stiffened(grip.stiffness, at)
+        start = Controls(now.folds, grips, self._wanted.jaws)
         self._ways += 1
         self._under = self._laying.begin(start, self._wanted, state, self._gone, under.march.unseen)
 

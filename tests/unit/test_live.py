@@ -181,6 +181,29 @@ def test_who_is_pulled_is_pinched_no_more() -> None:
     assert set(session.wanted.grips) == {9}
 
 
+def test_who_is_pulled_and_then_pinched_goes_on_with_the_same_force() -> None:
+    """A jaw has a stiffer spring: it begins with the force of the pull, and the pull asked anew with the jaw's."""
+    session = Session(pleats())
+    node = corner(session)
+    session.fold("all", 0.4)
+    session.rest()
+    x, y, z = session.rest().points[node].tolist()
+    session.pull(node, (x, y, z + 3.0))
+    before = session.rest()
+    size = float(np.linalg.norm(before.forces[node]))
+    assert size > 1e-4
+    session.pinch(node, 0, 0.98 * float(np.linalg.norm(before.points[node] - before.points[0])))
+    began = session.update(1e-9)
+    assert began.forces[node] == pytest.approx(before.forces[node], abs=1e-6 * size)
+    for wanted in (session.wanted, before.wanted):
+        session.let_go()
+        session.ask(wanted)
+        for _ in range(12):
+            session.update(1e-9)
+            assert session.imbalance() < 1e-8
+        assert session.rest().at_rest
+
+
 def test_it_works_in_pieces_and_every_piece_is_an_equilibrium() -> None:
     """Without time an update does nothing; little by little it arrives, and each frame is a balanced state."""
     session = Session(pleats())
