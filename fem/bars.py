@@ -230,12 +230,15 @@ def distance(bar: Indenter, away: Array) -> tuple[Array, Array, Array]:
 
 
 def law(g: Array, k: float, d: float) -> tuple[Array, Array, Array]:
-    """Energy a length (N mm / mm) of a surface, and its derivatives by the distance.
+    """Energy a length of the surface of a bar, and its derivatives by the distance.
 
     Args:
         g: (k,) distances less than d, mm.
         k: stiffness, N/mm a mm.
         d: gap, mm.
+
+    Returns:
+        (k,) energy, N mm / mm, its first derivative, N / mm, negative, and its second, N / mm^2.
     """
     left, outside = d - g, g > 0.0
     return (

@@ -9,6 +9,7 @@ from reports.records import Case, Check
 
 CASE, ERROR, NO_FIGURES = "map", ": median relative error", "sheets without figures"
 NOTHING = "sheets without this quantity"
+ORDER = ("energy", "shape", "fold angle", "force", "stiffness", "stress")
 
 
 @dataclass
@@ -50,6 +51,17 @@ class SheetMap:
     kinds: dict[str, list[Row]]
     empty: list[tuple[str, str, list[str]]] = field(default_factory=list)
 
+    def sheets(self, kind: str) -> int:
+        """How many sheets of a kind have figures of some model."""
+        return max(
+            (
+                int(check.params.get("sheets") or 0)
+                for row in self.kinds[kind]
+                for _, check in row.cells.values()
+            ),
+            default=0,
+        )
+
 
 def sheet_map(cases: Iterable[Case]) -> SheetMap | None:
     """The map, if the case has been run."""
@@ -76,7 +88,7 @@ def sheet_map(cases: Iterable[Case]) -> SheetMap | None:
             row.cells[quantity] = (number, check)
     return SheetMap(
         case,
-        list(quantities),
+        sorted(quantities, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER)),
         {kind: list(rows.values()) for kind, rows in kinds.items()},
         [(quantity, why, list(names)) for (quantity, why), names in empty.items()],
     )

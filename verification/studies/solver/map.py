@@ -324,7 +324,8 @@ def _converges(result: CaseResult, kind: str) -> None:
 
 
 def _plots(result: CaseResult, kinds: list[str]) -> None:
-    """Error against time, a curve a kind, from bars and hinges to the finest mesh."""
+    """Error against time, a curve a kind, from bars and hinges to the finest mesh; of slender cells the map tells."""
+    members = {member.name for member in MEMBERS if member.slender == 1}
     for quantity in ("energy", "shape"):
         series = []
         for kind in kinds:
@@ -333,6 +334,7 @@ def _plots(result: CaseResult, kinds: list[str]) -> None:
                 for check in result.checks
                 if check.quantity == quantity + ERROR
                 and check.params["kind"] == kind
+                and check.params["model"] in members
                 and check.wall_time_s is not None
                 and math.isfinite(check.value)
             ]
