@@ -43,23 +43,24 @@ class StoppedShell(InTheWay):
     contact_blocks: ContactBlocks | None = None
     _here: Here | None = None
 
-    def hinder(self, model: Model, x: Array) -> None:
+    def hinder(self, model: Model, x: Array, pressed: bool) -> None:
         """Let panels stop each other if a model asks for it, from where the step begins.
 
         Args:
             model: of the sheet.
             x: (n, 3) positions of all nodes, mm.
+            pressed: bars press in the step.
 
         Raises:
             ModelError: contact does not fit the sheet, or the step begins with a sheet that meets itself.
         """
+        if model.rubs and (pressed or model.stops_itself):
+            raise ModelError("the shell knows no friction; take formulation consistent or bars-and-hinges")
         if not model.stops_itself:
             return
         from bh.mechanics.contact.barrier import sheet_barrier
         from bh.mechanics.contact.blocks import ContactBlocks
 
-        if model.rubs:
-            raise ModelError("the shell knows no friction; take formulation consistent or bars-and-hinges")
         if model.contact == "thickness" and any(zone.sheet.t != model.sheet.t for zone in model.zones):
             raise ModelError("contact = thickness: zones have another thickness; give a gap in mm")
         self.barrier = sheet_barrier(Model(self.mesh.linear, model.sheet, contact=model.contact))

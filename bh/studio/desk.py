@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 import bh.studio.messages as asked
 from bh.analysis.contact import self_contact
 from bh.errors import InputError
-from bh.live import Controls, Session, held
-from bh.live.holding import chains
+from bh.live import Controls, Mark, Session, held
+from bh.live.history import lightened
+from bh.live.holding import handled
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
 from bh.solving.trace import trace
@@ -30,7 +31,7 @@ FARTHEST = 10.0  # sizes of the sheet that a hand may be away from it
 REMEMBERED = 200  # strokes that are taken back
 TIDY = 5.0  # s between two times that free memory goes back to the system
 
-Asked = tuple[LiveSheet, Controls, str]
+Was = tuple[LiveSheet, Mark, str]
 
 
 class Desk:
@@ -50,24 +51,27 @@ class Desk:
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
         self._tidied = time.monotonic()
         self._news: list[Json] = []
-        self._past: list[Asked] = []  # before every stroke
-        self._undone: list[Asked] = []
+        self._past: list[Was] = []  # before every stroke
+        self._undone: list[Was] = []
         self._stroke: tuple[object, ...] | None = None
         self.put(sheet or of_library("arc"))
 
     # ------------------------------------------------------------------------------- what is asked
 
-    def put(self, sheet: LiveSheet, controls: Controls | None = None) -> None:
+    def put(self, sheet: LiveSheet, controls: Controls | None = None, there: Mark | None = None) -> None:
         """Put a sheet on the desk.
 
         Args:
             sheet: to be handled.
-            controls: as it was handled before; None for flat.
+            controls: as it was handled before; None for flat, or as it is drawn.
+            there: where it lay when it was on the desk before; None for a new one.
         """
         model = sheet.model if sheet.model.supports else held(sheet.model)
         session = Session(model, settles=sheet.settles)
         if controls is not None:
             session.ask(controls)
+        if there is not None:
+            session.go_back(there)
         self.sheet = sheet if model is sheet.model else replace(sheet, model=model)
         self.session = session
         self.frame = self.session.update(0.0)
@@ -92,23 +96,25 @@ class Desk:
         """
         if isinstance(message, asked.Plain):
             return self._plain(message.do)
-        before = self._asked()
+        before, asked_before = self._was(), (self._now(), self.material)
         answers = [self.describe()] if self._laid(message) else self._done(message)
-        if self._asked() != before:
+        if (self._now(), self.material) != asked_before:
             self._remember(message, before)
         return answers
 
-    def _asked(self) -> Asked:
-        """What lies on the desk and what is asked of it, to go back to."""
-        return self.sheet, self.session.wanted, self.material
+    def _was(self) -> Was:
+        """What lies on the desk and how, to go back to."""
+        return self.sheet, self.session.mark(), self.material
 
-    def _remember(self, message: asked.Asked, before: Asked) -> None:
+    def _remember(self, message: asked.Asked, before: Was) -> None:
         """What was asked for before a stroke; its moves after the first are of one change with it."""
         number = message.stroke if isinstance(message, asked.Move) else None
         stroke = None if number is None else (message.do, number, *_moved(message))
         if stroke is None or stroke != self._stroke:
             self._past.append(before)
-            del self._past[:-REMEMBERED]
+            marks = lightened([mark for _, mark, _ in self._past], REMEMBERED)
+            kept = self._past[-REMEMBERED:]
+            self._past = [(sheet, mark, made) for (sheet, _, made), mark in zip(kept, marks, strict=True)]
         self._stroke = stroke
         self._undone.clear()
 
@@ -162,32 +168,28 @@ class Desk:
     def _plain(self, what: str) -> list[Json]:
         if what == "check":
             return [self._check()]
-        now = self._asked()
+        now = self._was()
         if what == "flatten":
             flat = Controls(dict.fromkeys(self.session.creases, 0.0))
             if flat != self.session.wanted:
                 self._past.append(now)
                 self._undone.clear()
-                self._ask(flat)
+                self.session.let_go()
+                self.session.ask(flat)
             return []
         past, future = (self._past, self._undone) if what == "undo" else (self._undone, self._past)
         if not past:
             return [line(f"there is nothing to {what}")]
-        sheet, wanted, material = past[-1]
+        sheet, there, material = past[-1]
         if sheet is self.sheet:
-            self._ask(wanted)
+            self.session.go_back(there)
         else:
-            self.put(sheet, wanted)
+            self.put(sheet, there=there)
         self.material = material
         past.pop()
         future.append(now)
         self._stroke = None
         return [] if sheet is now[0] else [self.describe()]
-
-    def _ask(self, wanted: Controls) -> None:
-        """Ask for controls and nothing else."""
-        self.session.let_go()
-        self.session.ask(wanted)
 
     def _near(self, what: str, away: NDArray[np.float64]) -> None:
         """Refuse a place (mm from the middle of the flat sheet) from which no sheet comes back as it was."""
@@ -230,8 +232,7 @@ class Desk:
         wanted = self.session.wanted
         parts = [angle / sheet.full[name] for name, angle in wanted.folds.items()]
         gone = float(np.median(parts)) if parts else 0.0
-        folded = [name for name, kind in sheet.model.mesh.folds.items() if kind != "flat"]
-        names = chains(sheet.model.mesh, folded)
+        names = handled(sheet.model.mesh)
         folds = {name: wanted.folds.get(name, gone * sheet.full[name]) for name in names}
         self.put(sheet, replace(wanted, folds=folds))
 
@@ -352,6 +353,7 @@ class Desk:
             return None
         if self._finer is None or self._finer[0] != key:
             found = finer(self.sheet.model, frame, going)
+            give_back()  # the factors of its meshes: it may be long until the next wish
             if found is None:
                 return None
             self._finer = key, found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import tempfile
 from dataclasses import fields
@@ -11,6 +12,7 @@ from pathlib import Path
 from bh.errors import InputError
 from bh.live import Session
 from bh.model.supports import Support
+from bh.model.wide_crease import wide_names
 from bh.paths.path import Path as Trace
 from bh.paths.record import Record, StepOutcome
 from bh.scene.load import parse_scene
@@ -127,8 +129,11 @@ def _crease_lines(session: Session) -> list[str]:
 
 
 def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
-    rows = []
+    rows, strips = [], wide_names(session.mesh)
     for name, wanted in session.wanted.folds.items():
+        if name in strips:
+            rows.append(f"  {{ crease = {quoted(name)}, rest = {math.pi - wanted!r} }},")
+            continue
         angle = sheet.sense(name) * wanted + 0.0  # without -0.0
         spring = _stiffness(session, name)
         rows.append(f"  {{ crease = {quoted(name)}, by = {angle!r}{', ' if spring else ''}{spring} }},")
