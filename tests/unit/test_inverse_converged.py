@@ -23,7 +23,7 @@ from bh.applications.inverse.pieces import LARGEST, LEVELS, PieceTask, curvature
 from bh.applications.inverse.reach import Library, Reach
 from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.simulate import simulate
-from bh.applications.inverse.transforms import angles
+from bh.applications.inverse.transforms import angles, chain
 from bh.sweep import load
 
 
@@ -203,6 +203,21 @@ def test_strips_are_chains(data: Dataset) -> None:
     series = {**PieceData(data).series(0), "joint": Series(np.zeros((1, 1, 6)))}
     without = Converged(series, converged().setting).forward(k0, length, on)[0][-1]
     assert np.linalg.norm(without - strip.t) > 2.0
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_joints_are_those_of_the_chain_of_all_motions(n: int) -> None:
+    """What is compiled gives the points and frames of `motions`, for any leading axes."""
+    rng = np.random.default_rng(n)
+    forward = converged()
+    k0, length = rng.uniform(-LARGEST, LARGEST, (3, 5, n)), rng.uniform(20.0, 60.0, (3, 5, n))
+    k0[0], k0[1, :, 0] = 0.0, 1e-9  # straight, and hardly curved
+    pinched = rng.random((3, 5, n)) < 0.5
+    points, frames = chain(*forward.motions(k0, length, pinched))
+    at = [0, *(4 * i for i in range(1, n)), 4 * n + 1]
+    found = forward.forward(k0, length, pinched, check=False)
+    np.testing.assert_allclose(found[0], points[..., at, :], atol=1e-10)
+    np.testing.assert_allclose(found[1], frames[..., at, :, :], atol=1e-12)
 
 
 def test_symmetries_of_strips() -> None:

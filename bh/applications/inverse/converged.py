@@ -183,10 +183,17 @@ class Converged:
         k0, length, on = _design(k0, length, pinched)
         if check:
             self._check(k0, length, on)
-        points, frames = chain(*self.motions(k0, length, on))
-        n = k0.shape[-1]
-        at = [0, *(4 * i for i in range(1, n)), 4 * n + 1]
-        return points[..., at, :], frames[..., at, :, :]
+        from bh.applications.inverse.strip_kernel import joints
+
+        rate, half = self._at("arc", k0), 0.5 * length
+        found = joints(
+            _flat(np.stack((self._at("end", k0[..., 0]), ALONG * self._at("end", k0[..., -1])), axis=-2)),
+            _flat(np.stack((rate[..., 5] * half, rate[..., 0] * half), axis=-1)),
+            _flat(self._at("pinch", k0) * on[..., None]),
+            _flat(self._at("joint", k0[..., :-1], k0[..., 1:])),
+        )
+        points, frames = (each.reshape(*k0.shape[:-1], *each.shape[1:]) for each in found)
+        return points, frames
 
     def unpinched(self, k0: ArrayLike, length: ArrayLike) -> tuple[Array, Array]:
         """Points and frames of strips before they are pinched, see `forward`.
@@ -387,6 +394,12 @@ class Converged:
 
 def _setting(data: Dataset) -> Setting:
     return Setting(**json.loads(data.attrs["setting"]))
+
+
+def _flat(of_strips: Array) -> Array:
+    """(s, n, m) from (..., n, m)."""
+    shape = of_strips.shape  # -1 would not do: one segment has no joints
+    return of_strips.reshape(math.prod(shape[:-2]), *shape[-2:])
 
 
 def _design(k0: ArrayLike, length: ArrayLike, pinched: ArrayLike) -> tuple[Array, Array, Bools]:

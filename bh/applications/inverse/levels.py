@@ -39,7 +39,7 @@ class Series:
         each = [_vander(np.asarray(x_i), self.coefficients.shape[0] - 1) for x_i in x]
         found = np.tensordot(each[0], self.coefficients, axes=(-1, 0))
         if len(x) == 2:
-            found = (each[1][..., None] * found).sum(axis=-2)
+            found = np.einsum("...i,...ij->...j", each[1], found)
         return np.asarray(found)
 
     def __add__(self, other: Series) -> Series:

@@ -32,7 +32,8 @@ PUBLISHED = {
     ("parabolic-edge", "y"): 2.5,
 }
 SWEEP = (5.0, 100.0)  # mm, L* besides 25
-SHORT = 6.0  # mm of travel: behind three quarters of the depth no stiffness is read
+# mm of travel: behind three quarters of the depth no stiffness is read, counted from where the load sets in (up to 3)
+SHORT = 8.0
 SPAN = 50.0
 
 
