@@ -94,6 +94,15 @@ class StoppedShell(InTheWay):
         finally:
             self._here = None
 
+    def harden(self, factor: float) -> None:
+        """Let panels press by a number of times what the model asks for, until told otherwise.
+
+        Args:
+            factor: 1 for the model's own.
+        """
+        self._here = None  # what is remembered there was pressed otherwise
+        super().harden(factor)
+
     def meetings(self, x: Array) -> str:
         """Which parts of the sheet meet or lie too near, in words; empty where it is clear.
 
