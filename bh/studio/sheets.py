@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import tempfile
 import tomllib
@@ -20,7 +21,7 @@ from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model
 from bh.model.sheet import Sheet
 from bh.model.wide_crease import wide_names
-from bh.scene.folding import MATERIALS, PERCENT, Wish, proposals
+from bh.scene.folding import MATERIALS, PERCENT, Proposal, Wish, proposals
 from bh.scene.load import Outputs, Scene, parse_scene
 from bh.solvers.settling import Settling
 from bh.studio.library import LIBRARY as LIBRARY
@@ -214,7 +215,7 @@ def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
         file = Path(place) / plain
         file.write_bytes(data)
         failed: InputError | None = None
-        for offer in proposals(file, Wish(material=material)):
+        for offer in _proposals(file, Wish(material=material)):
             if offer.text.splitlines().count("[mesh]") == 0:
                 continue  # a run to an accuracy is for `bh fold`
             try:
@@ -231,6 +232,14 @@ def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
             tables = _tables(offer.text)
             return replace(live(plain, scene, tables, offer.assumed), drawing=(plain, data))
     raise failed or InputError(f"'{plain}': no mesh of it can be made; see `bh check`")
+
+
+def _proposals(file: Path, wish: Wish) -> list[Proposal]:
+    """`proposals`, whose refusals name the file and not the place where it lies meanwhile."""
+    try:
+        return proposals(file, wish)
+    except InputError as error:
+        raise InputError(str(error).replace(f"{file.parent}{os.sep}", "")) from error
 
 
 def plain_name(name: str) -> str:

@@ -155,3 +155,13 @@ def test_a_scene_of_a_drawing_comes_with_it(tmp_path: Path) -> None:
     assert again.drawing == desk.sheet.drawing
     assert again.model.creases == desk.sheet.model.creases
     np.testing.assert_array_equal(again.model.mesh.points, desk.session.mesh.points)
+
+
+@pytest.mark.parametrize("name", ["prog.exe", "noise.svg", "list.fold", "photo.dxf", "empty.cp"])
+def test_a_refused_file_is_named_as_it_was_dropped(name: str) -> None:
+    """Not by the folder where it lies meanwhile."""
+    data = {"list.fold": b"[1, 2]", "photo.dxf": b"\x89PNG", "empty.cp": b""}.get(name, b"MZ\x90<")
+    with pytest.raises(InputError) as told:
+        of_file(name, data)
+    assert str(told.value).lstrip("'").startswith(name)
+    assert "bh-studio-" not in str(told.value)

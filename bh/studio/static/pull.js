@@ -1,6 +1,6 @@
 // A hand on the folded sheet: a point is taken and pulled, its force stands beside the pointer; two are pinched.
 import * as THREE from "./vendor/three.module.min.js";
-import { $, ask, now, number } from "./common.js";
+import { $, ask, now, number, tell } from "./common.js";
 import { camera, controls, renderer, scene, surface, vector, beforeDrawn } from "./view.js";
 import * as pinch from "./pinch.js";
 import { fingers } from "./touch.js";
@@ -72,12 +72,14 @@ export function letGo() {
 // By numbers, for whom the pointer is no way: one node is lifted, two are pinched.
 $("take").onclick = () => {
   const a = $("node-a").value, b = $("node-b").value;
-  if (!now.sheet || a === "") return;
+  if (!now.sheet) return;
+  const count = now.sheet.points.length / 3, isNode = (text) => /^[0-9]+$/.test(text) && Number(text) < count;
+  if (!isNode(a) || (b !== "" && !isNode(b))) { tell(`Node '${isNode(a) ? b : a}' cannot be taken; give a whole number from 0 to ${count - 1}.`); return; }
   if (b !== "") { pinch.begin(Number(a), Number(b)); return; }
   $("lift").dataset.node = a; $("lift").disabled = false; $("lift").value = 0;
   const size = Math.max(...[0, 1].map((c) => Math.max(...now.sheet.points.filter((_, i) => i % 3 === c)) - Math.min(...now.sheet.points.filter((_, i) => i % 3 === c))));
   Object.assign($("lift"), { min: -size, max: size, step: size / 200 });
-  delete taken[a]; if (3 * Number(a) + 2 < now.points.length) take(a);
+  delete taken[a]; take(a);
   $("lift").focus();
 };
 $("lift").oninput = ({ target }) => {

@@ -4,7 +4,7 @@ import { draw, fit, lay, move, picture, seen, smoothUnless, vector } from "./vie
 import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
 import { back, badge, branch, finer, flatRun, hand, refined, seenCoarse } from "./finer.js";
-import { history, numbers, oneCrease, panel, slider } from "./panel.js";
+import { asItIs, history, numbers, oneCrease, panel, slider } from "./panel.js";
 import { remember, saveFilm, saveMoving, savePicture } from "./record.js";
 
 // ---------------------------------------------------------------- what the server sends
@@ -12,7 +12,7 @@ import { remember, saveFilm, saveMoving, savePicture } from "./record.js";
 function answer(message) {
   if (message.kind === "sheet") { show(message); if ($("message").textContent.endsWith("...")) tell(""); }
   else if (message.kind === "file") { save(message.name, message.data); tell(`${message.name} is saved.`); }
-  else if (message.kind === "line") tell(message.text);
+  else if (message.kind === "line") { tell(message.text); if (message.bad && now.sheet) asItIs(); }
   else if (message.kind === "branch") branch(message);
 }
 
