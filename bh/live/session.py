@@ -70,6 +70,7 @@ class Session:
         self._iterations = 0
         self._stable: bool | None = True
         self._left = False
+        self._ways = 0  # that it began behind the one on which it stands at first, and turns on them
         self._seen: tuple[Array, State] | None = None  # the newest state, and the unknowns that it belongs to
         self._under = self._laying.begin(self._wanted, self._wanted)
 
@@ -87,8 +88,17 @@ class Session:
 
     @property
     def left(self) -> bool:
-        """Whether it has snapped since it was flat: a run from flat may end on another branch."""
+        """Whether it has snapped since it was flat, or lies on another branch (`leave`): a run may end elsewhere."""
         return self._left
+
+    @property
+    def straight(self) -> bool:
+        """Whether it only went on from flat along one line of fold angles, without a snap, as a run from flat does."""
+        return self._ways <= 1 and not self._left
+
+    def leave(self) -> None:
+        """Note that a run from flat ends on another branch than this: what was found by such a run."""
+        self._left = True
 
     @property
     def newest(self) -> Point:
@@ -217,6 +227,7 @@ class Session:
         if under is not None:
             self._iterations += self._under.march.iterations
             self._under, self._gone, self._left = under, (), there.left
+            self._ways += 1
 
     def ask(self, wanted: Controls) -> None:
         """Ask for all controls at once, such as those of another session of the same sheet.
@@ -332,6 +343,8 @@ class Session:
         if under.march.stuck:
             return
         if (lam := under.lam_of(self._wanted)) is not None:
+            back = abs(lam) < abs(under.march.target) or lam * under.march.target < 0.0
+            self._ways += back  # past a place where branches meet it may come to another one
             under.march.target = lam
             return
         now = self._now()
@@ -347,6 +360,7 @@ class Session:
                 start = replace(start, grips={**start.grips, node: Grip((x, y, z), grip.stiffness)})
         kept = {node: start.grips[node] for node in self._wanted.grips}
         start = Controls(start.folds, kept, self._wanted.jaws)
+        self._ways += 1
         self._under = self._laying.begin(start, self._wanted, state, self._gone, under.march.unseen)
 
     @property

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 import bh.studio.messages as asked
 from bh.analysis.contact import self_contact
 from bh.errors import InputError
+from bh.formulations.state import State
 from bh.live import Controls, Mark, Session, held
 from bh.live.history import lightened
 from bh.live.holding import handled
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
 from bh.solving.trace import trace
+from bh.studio.branch import FromFlat, from_flat
 from bh.studio.colours import offered, top_of
 from bh.studio.exports import export, film, moving
 from bh.studio.finer import Finer, finer
@@ -29,6 +31,7 @@ from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
 BUDGET = 0.03  # s of an update
 FARTHEST = 10.0  # sizes of the sheet that a hand may be away from it
 REMEMBERED = 200  # strokes that are taken back
+LONGEST_REST = 20.0  # s that a file may wait for the state at rest, and for a run from flat
 TIDY = 5.0  # s between two times that free memory goes back to the system
 
 Was = tuple[LiveSheet, Mark, str]
@@ -49,6 +52,7 @@ class Desk:
         self._shown: tuple[object, ...] = ()
         self._snapped = False  # since the last picture
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
+        self._flat: tuple[State, FromFlat] | None = None  # a state, and where a run from flat ends
         self._tidied = time.monotonic()
         self._news: list[Json] = []
         self._past: list[Was] = []  # before every stroke
@@ -137,7 +141,11 @@ class Desk:
             case asked.Colour(by=by):
                 self._paint(by)
             case asked.Export(what=what):
-                name, data = export(what, self.sheet, self.session, self.session.rest(20.0))
+                self.frame = self.session.rest(LONGEST_REST)
+                if what in ("scene", "python"):
+                    ends = time.monotonic() + LONGEST_REST
+                    self.from_flat(lambda: time.monotonic() < ends)
+                name, data = export(what, self.sheet, self.session, self.frame)
                 return [_file(name, data), *self._behind_a_snap(what, name)]
             case asked.Film(pictures=pictures, ms=ms, kind=kind):
                 name = f"{Path(self.sheet.name).stem or 'sheet'}.{kind}"
@@ -210,7 +218,7 @@ class Desk:
             if what == "scene"
             else "the lines begin flat and may end elsewhere; the scene has the state"
         )
-        return [line(f"{name} is saved; it was reached by way of a snap: {how}")]
+        return [line(f"{name} is saved; it was reached round a snap or by way of a snap: {how}")]
 
     def _paint(self, by: str) -> None:
         if by != "none" and by not in self._colours:
@@ -249,7 +257,7 @@ class Desk:
 
     def _check(self) -> Json:
         """The same state by a run from flat, on this mesh and on a coarser one: how far it is off."""
-        frame = self.session.rest(20.0)
+        frame = self.session.rest(LONGEST_REST)
         if not any(step.actuations for step in self.session.scene().steps):
             return line("there is nothing to check yet")
         path = trace(self.session.scene(), estimate=True, warn=False)
@@ -377,6 +385,32 @@ class Desk:
             state.points,
             values,
         )
+
+    def from_flat(self, going: Callable[[], bool]) -> FromFlat | None:
+        """Whether the state that is shown is where a run from flat ends; where it is not, its scene brings it along.
+
+        Args:
+            going: asked while it is solved anew; False ends it.
+
+        Returns:
+            None where there is no state at rest, or it was ended.
+        """
+        frame, session = self.frame, self.session
+        if not frame.at_rest:
+            return None
+        if self._flat is None or self._flat[0] is not frame.state:
+            found = from_flat(session, frame, self.sheet.settles, going)
+            if found is None:
+                return None
+            self._flat = frame.state, found
+            if not found.here:
+                session.leave()
+        return self._flat[1]
+
+    def branch(self, going: Callable[[], bool]) -> list[Json]:
+        """What a window is told of `from_flat`; nothing where it is not known."""
+        found = self.from_flat(going)
+        return [] if found is None else [{"kind": "branch", "here": found.here, "said": found.said}]
 
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name."""

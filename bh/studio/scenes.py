@@ -72,7 +72,7 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
     lines = [f"# {sheet.name} as it stood in bh studio; mm, N, rad."]
     lines += (
         [
-            "# It was reached by way of a snap, so that a run from flat may end elsewhere. The state is saved beside:",
+            "# It was reached round a snap or by way of a snap: a run from flat may end elsewhere. It is kept beside:",
             f"#     bh run {stem}.toml --resume",
             "# begins there, and its second step solves it anew. `bh run --force` begins flat.",
         ]

@@ -272,6 +272,10 @@ class Window(tornado.websocket.WebSocketHandler):
             return
         if found is not None and going.is_set():
             await self.write_message(found, binary=True)
+        run = asyncio.get_running_loop().run_in_executor
+        for answer in await run(self.studio.pool, desk.branch, going.is_set):
+            if going.is_set():
+                await self._say(answer)
 
     async def _do(self, desk: Desk, message: str | bytes) -> None:
         """One message, answered; the last good state is kept where it cannot be done."""

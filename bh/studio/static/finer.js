@@ -4,12 +4,13 @@ import { lay, move } from "./view.js";
 import { scale } from "./panel.js";
 
 let shown = false, said = "", coarse = null;
+let flat = null; // where a run from flat ends, of the state that is shown
 let held = false, last = null; // a hand is on the sheet; the newest finer frame, which it has put off
 
 // A frame of the coarse mesh: what is seen from now on.
 export function seenCoarse(values) {
   if (shown) lay(now.sheet);
-  coarse = values; shown = false; said = ""; last = null;
+  coarse = values; shown = false; said = ""; last = null; flat = null;
 }
 
 // Back to the coarse mesh at once: a point is taken, or a slider moved.
@@ -42,10 +43,17 @@ export function finer(head, floats) {
   $("error").textContent = now.error; $("error").title = now.error;
 }
 
+export function branch(message) {
+  if (!now.head?.rest) return;
+  flat = message; badge();
+  $("flat-run").textContent = message.said;
+}
+
 export function badge() {
   const { head } = now, place = $("badge");
   place.textContent = said || (head.note ? `cannot go on: ${head.note}` : head.snapped ? "snapped" : head.rest ? "in equilibrium" : "on its way");
-  if (head.left && head.rest && !head.snapped) place.textContent += ", behind a snap";
+  if (flat && !flat.here) place.textContent += ", on another branch than a run from flat";
+  else if (head.left && head.rest && !head.snapped) place.textContent += ", behind a snap";
   place.classList.toggle("away-from", !said && (Boolean(head.note) || head.snapped || !head.rest));
 }
 export const refined = () => shown;

@@ -91,10 +91,10 @@ export function scale(top) {
 
 export function numbers() {
   const { head, sheet } = now, { energy } = head;
-  const rows = [["Energy", `${number(energy.total)} N mm`], ["of bending", `${number(energy.bending)} N mm`], ["of stretching", `${number(energy.stretching)} N mm`], ["of creases", `${number(energy.folding)} N mm`], ["Stable", head.stable === null ? "not known" : head.stable ? "yes" : "no"], ["Largest strain", `${number(100 * head.strain)} %`], ["Mesh", `${sheet.triangles.length / 3} triangles, ${sheet.formulation}`], ["Error of the energy", ""], ["Panels", ""], ["Solved in", `${head.ms.toFixed(0)} ms`]];
+  const rows = [["Energy", `${number(energy.total)} N mm`], ["of bending", `${number(energy.bending)} N mm`], ["of stretching", `${number(energy.stretching)} N mm`], ["of creases", `${number(energy.folding)} N mm`], ["Stable", head.stable === null ? "not known" : head.stable ? "yes" : "no"], ["Largest strain", `${number(100 * head.strain)} %`], ["Mesh", `${sheet.triangles.length / 3} triangles, ${sheet.formulation}`], ["Error of the energy", ""], ["Panels", ""], ["A run from flat", ""], ["Solved in", `${head.ms.toFixed(0)} ms`]];
   const names = Object.keys(head.folds);
   for (const name of names.slice(0, 8)) rows.push([`Fold of ${name}`, degrees(head.folds[name])]);
-  $("numbers").replaceChildren(...rows.flatMap(([a, b]) => { const dt = document.createElement("dt"), dd = document.createElement("dd"); dt.textContent = a; dd.textContent = b; if (a.startsWith("Error")) { dd.id = "error"; dd.textContent = "not looked at"; } if (a === "Panels") { dd.id = "meets"; dd.textContent = sheet.contact ? "stop each other" : "not looked at"; } return [dt, dd]; }));
+  $("numbers").replaceChildren(...rows.flatMap(([a, b]) => { const dt = document.createElement("dt"), dd = document.createElement("dd"); dt.textContent = a; dd.textContent = b; if (a.startsWith("Error")) { dd.id = "error"; dd.textContent = "not looked at"; } if (a === "A run from flat") { dd.id = "flat-run"; dd.textContent = "not looked at"; } if (a === "Panels") { dd.id = "meets"; dd.textContent = sheet.contact ? "stop each other" : "not looked at"; } return [dt, dd]; }));
   for (const input of $("sliders").querySelectorAll("input")) {
     const angle = head.asked[input.dataset.crease] ?? 0;
     if (document.activeElement !== input) input.value = angle * 180 / Math.PI;
