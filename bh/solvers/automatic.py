@@ -11,6 +11,7 @@ from bh.solvers.load_control import AtBifurcation, LoadControl
 from bh.solvers.newton import Solution
 from bh.solvers.outcome import Critical, Outcome
 from bh.solvers.points import ARC, LOAD, Increment, Point, point
+from bh.solvers.settled_ahead import FALLS, settled_ahead, snaps
 from bh.solvers.snapping import lets_go
 from bh.solvers.stability import leave_saddle
 from bh.solvers.system import System
@@ -47,13 +48,43 @@ class Automatic:
         origin: Point | None = None,
     ) -> Iterator[Increment]:
         """See `LoadControl.follow`; increments by arc length say so in their note."""
+        load = replace(self.load, at_bifurcation=self.at_bifurcation)
+        if lets_go(system) and self.at_bifurcation == "stable":  # no branch is of use that turns back
+            yield from load.follow(system, history[-3:], increment)
+            return
+        seen, falls = list(history), 0
+        ways = self._on_branches(system, history, increment, origin)
+        while True:
+            failure: Increment | None = None
+            for item in ways:
+                if not item.reached:
+                    failure = item
+                    break
+                seen = [item.point] if item.jumped else [*seen, item.point]
+                yield item
+            if failure is None:
+                return
+            may = self.at_bifurcation == "stable" and falls < FALLS and seen[-1].lam < 1.0 and snaps(system)
+            fallen = settled_ahead(system, seen, load) if may else None
+            if fallen is None:
+                yield failure
+                return
+            falls += 1
+            fallen = replace(
+                fallen, iterations=fallen.iterations + failure.iterations, cuts=(*failure.cuts, failure.note)
+            )
+            seen = [fallen.point]
+            yield fallen
+            ways = self._on_branches(system, [fallen.point], fallen.next_increment, None)
+
+    def _on_branches(
+        self, system: System, history: Sequence[Point], increment: float | None, origin: Point | None
+    ) -> Iterator[Increment]:
+        """The increments as far as branches of the path lead, and a failure where they do not lead to the end."""
         points = list(history)
         load = replace(self.load, at_bifurcation=self.at_bifurcation)
         hasty = replace(load, smallest=max(self.patience, load.smallest), foresee=True, brisk=NEVER)
         failure: Increment | None = None
-        if lets_go(system) and self.at_bifurcation == "stable":  # no branch is of use that turns back
-            yield from load.follow(system, points[-3:], increment)
-            return
         while True:
             if points[-1].mode != ARC:
                 failure = yield from self._run(hasty.follow(system, points[-3:], increment), points)

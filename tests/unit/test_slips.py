@@ -35,6 +35,11 @@ class Pressed(VonMisesTruss):
     def clear_ways(self, places: Sequence[tuple[Array, float]]) -> float:
         return len(places) - 1.0
 
+    def room(self, q: Array, lam: float) -> float:
+        return 1.0
+
+    def harden(self, factor: float) -> None: ...
+
     def pressing(self, q: Array, lam: float) -> bool:
         return self.presses
 
